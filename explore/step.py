@@ -1,0 +1,56 @@
+"""One turn of the closed loop, frozen; timelines, scores, progress bars and log writers iterate over these."""
+
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.chains import Chain
+from slam.matching import Matches
+from slam.robot import MotionCommand, Odometry, Scan
+from slam.segments import Segments
+from slam.stochastic_map import StochasticMap
+
+from .free_space import FreeSpace
+from .goal import Goal, SetAside
+
+
+@dataclass(frozen=True)
+class Step:
+    """Everything that one turn of sense, map, choose, drive has seen and decided."""
+
+    index: int
+    time_s: float
+    odometry: Odometry
+    """The motion that led here (zero at the first step)."""
+    scan: Scan
+    segments: Segments
+    matches: Matches
+    walls_of_segments: Int[np.ndarray, " s"]
+    """For each segment the id of the wall that it was fused into or began; -1 where it was not used."""
+    map: StochasticMap
+    """`map.belief.pose_world` is the estimate available at this step; `belief.joint` answers only until the next."""
+    chains: tuple[Chain, ...]
+    free_space: FreeSpace
+    """A view that the mission goes on updating: read it at once or copy it."""
+    graph: nx.DiGraph
+    """The visibility graph, likewise."""
+    goal: Goal | None
+    walls_to_follow: tuple[int, ...]
+    set_aside: tuple[SetAside, ...]
+    command: MotionCommand | None
+    """None at the last step."""
+    path_length_m: float
+    """By the wheels, so far."""
+    seconds: float
+    """Wall-clock time of this step, sense to command."""
+    ended: str | None
+    """`complete` or `stopped` at the last step, else None."""
+    reason: str
+    """What the robot is doing and why; at the last step, why it ended."""
+
+    @property
+    def pose_world(self) -> Float[np.ndarray, "3"]:
+        """The estimated pose."""
+        return self.map.belief.pose_world

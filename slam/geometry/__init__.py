@@ -1,0 +1,1 @@
+"""Pure functions of the plane, vectorised over their first axes."""

@@ -1,0 +1,64 @@
+"""Lines (alpha rad, r m) with n(alpha)·x = r, and segments as pairs of points.
+
+The normal points from the free side into the wall, so a line knows the side from which it was seen; the
+direction of travel with the free side on the left is t = J n.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from .poses import wrap
+
+
+def normals(alpha: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+    """Return the unit normals n(alpha), pointing into the wall."""
+    return np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
+
+
+def directions(alpha: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+    """Return the unit vectors t = J n(alpha) along the lines, free side on the left."""
+    return np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
+
+
+def through(segments: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "n 2"]:
+    """Return the lines (alpha, r) through segments that are ordered with the free side on the left."""
+    along = segments[:, 1] - segments[:, 0]
+    alpha = np.arctan2(-along[:, 0], along[:, 1])
+    return np.stack([alpha, np.sum(normals(alpha) * segments[:, 0], axis=-1)], axis=-1)
+
+
+def lines_to_world(lines_robot: Float[np.ndarray, "n 2"], pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 2"]:
+    """Return robot-frame lines in the world frame; there r may be negative."""
+    alpha = wrap(lines_robot[:, 0] + pose_world[2])
+    return np.stack([alpha, lines_robot[:, 1] + normals(alpha) @ pose_world[:2]], axis=-1)
+
+
+def project(points: Float[np.ndarray, "*n 2"], lines: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+    """Return the feet of the perpendiculars from points to their lines."""
+    n = normals(lines[..., 0])
+    off = np.sum(n * points, axis=-1) - lines[..., 1]
+    return points - off[..., None] * n
+
+
+def intersect(
+    lines_a: Float[np.ndarray, "*n 2"], lines_b: Float[np.ndarray, "*n 2"]
+) -> tuple[Float[np.ndarray, "*n 2"], Bool[np.ndarray, "*n"]]:
+    """Return the intersections of pairs of lines, and which pairs are too near to parallel (sine below 0.05)."""
+    det = np.sin(lines_b[..., 0] - lines_a[..., 0])
+    parallel = np.abs(det) < 0.05
+    safe = np.where(parallel, 1.0, det)
+    x = (lines_a[..., 1] * np.sin(lines_b[..., 0]) - lines_b[..., 1] * np.sin(lines_a[..., 0])) / safe
+    y = (lines_b[..., 1] * np.cos(lines_a[..., 0]) - lines_a[..., 1] * np.cos(lines_b[..., 0])) / safe
+    return np.stack([x, y], axis=-1), parallel
+
+
+def distance_to_segments(
+    points: Float[np.ndarray, "m 2"], segments: Float[np.ndarray, "n 2 2"]
+) -> Float[np.ndarray, "m n"]:
+    """Return the distance from each point to each segment."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    squared = np.maximum(np.sum(along**2, axis=-1), 1e-18)
+    offset = points[:, None, :] - start
+    share = np.clip(np.sum(offset * along, axis=-1) / squared, 0.0, 1.0)
+    gap = offset - share[..., None] * along
+    return np.hypot(gap[..., 0], gap[..., 1])

@@ -1,0 +1,49 @@
+"""Angles and poses (x m, y m, heading rad) of the plane."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+J = np.array([[0.0, -1.0], [1.0, 0.0]])
+"""Turns a vector by +90 degrees."""
+
+
+def wrap(angle: Any) -> Any:
+    """Return angles rad brought into [-pi, pi)."""
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
+
+
+def rotation(angle: float) -> Float[np.ndarray, "2 2"]:
+    """Return the matrix that turns vectors by `angle` rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def compose(pose_world: Float[np.ndarray, "3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Return the pose reached from `pose_world` by `motion`, which is given in that pose's frame."""
+    position = pose_world[:2] + rotation(pose_world[2]) @ motion[:2]
+    return np.array([position[0], position[1], wrap(pose_world[2] + motion[2])])
+
+
+def inverse(pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Return the pose of the old frame seen from the new one: compose(pose, inverse(pose)) = 0."""
+    position = -rotation(-pose[2]) @ pose[:2]
+    return np.array([position[0], position[1], wrap(-pose[2])])
+
+
+def to_world(points_robot: Float[np.ndarray, "*n 2"], pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 2"]:
+    """Return points given in the robot frame in the world frame."""
+    return points_robot @ rotation(pose_world[2]).T + pose_world[:2]
+
+
+def to_robot(points_world: Float[np.ndarray, "*n 2"], pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 2"]:
+    """Return points given in the world frame in the robot frame."""
+    return (points_world - pose_world[:2]) @ rotation(pose_world[2])
+
+
+def arc(forward_m: float, turn_rad: float) -> Float[np.ndarray, "3"]:
+    """Return the motion (x, y, heading) along an arc of constant curvature, in the frame of its start."""
+    half = 0.5 * turn_rad
+    chord = forward_m * np.sinc(half / np.pi)
+    return np.array([chord * np.cos(half), chord * np.sin(half), turn_rad])

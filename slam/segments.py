@@ -1,0 +1,58 @@
+"""What extraction hands to matching: the straight pieces of one scan."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Float, Int
+
+MIN_BEAMS = 5
+"""A segment of fewer beams is tentative: its first-order covariance is not to be trusted."""
+
+
+class EndKind(IntEnum):
+    """Why a segment ends where it does."""
+
+    OPEN = 0
+    """The scan has no return beyond (out of range or a gap)."""
+    OCCLUDED = 1
+    """Something nearer hides what comes next."""
+    CORNER = 2
+    """The next segment of the same scan begins here; the end is the intersection of the two lines."""
+
+
+@dataclass(frozen=True)
+class Segments:
+    """The straight pieces of one scan, in the robot frame, ordered counter-clockwise."""
+
+    lines: Float[np.ndarray, "n 2"]
+    """(alpha rad, r m): n(alpha) points from the seen side into the wall, so r > 0 here."""
+    cov: Float[np.ndarray, "n 2 2"]
+    """Covariance of (alpha, r), propagated from the radial noise."""
+    ends: Float[np.ndarray, "n 2 2"]
+    """First and last point m on the line; walking from first to last the free side is on the left."""
+    beams: Int[np.ndarray, "n 2"]
+    """First and last beam index; first > last where the segment crosses the scan's seam."""
+    beam_counts: Int[np.ndarray, " n"]
+    """Number of beams that the fit used."""
+    end_kinds: Int[np.ndarray, "n 2"]
+    """An `EndKind` for each end."""
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def is_tentative(self) -> np.ndarray:
+        """Which segments have fewer than `MIN_BEAMS` beams, shape (n,)."""
+        return self.beam_counts < MIN_BEAMS
+
+    def take(self, index: np.ndarray) -> "Segments":
+        """Return the chosen segments (integer or boolean index), in the order asked for."""
+        return Segments(
+            self.lines[index],
+            self.cov[index],
+            self.ends[index],
+            self.beams[index],
+            self.beam_counts[index],
+            self.end_kinds[index],
+        )

@@ -1,0 +1,37 @@
+"""The map: a belief about lines, and how far along each line its wall has been seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from .backend import Belief
+from .geometry.lines import directions, normals
+
+
+@dataclass(frozen=True)
+class StochasticMap:
+    """Walls in the order of `belief.ids`."""
+
+    belief: Belief
+    extents: Float[np.ndarray, "n 2"]
+    """From and to along t = J n(alpha), m, measured from the anchor; the free side is on the left."""
+    sightings: Int[np.ndarray, " n"]
+    """In how many scans each wall was seen with enough beams to be fused."""
+    tentative: Bool[np.ndarray, " n"]
+    """Walls that were not seen well enough yet to be followed or chained."""
+
+    def __len__(self) -> int:
+        return len(self.extents)
+
+    @property
+    def ids(self) -> Int[np.ndarray, " n"]:
+        """Ids of the walls, ascending."""
+        return self.belief.ids
+
+    @property
+    def ends_world(self) -> Float[np.ndarray, "n 2 2"]:
+        """First and last point of each wall, world frame, m: walking on, the free side is on the left."""
+        alpha, d = self.belief.means[:, 0], self.belief.means[:, 1]
+        feet = self.belief.anchors + d[:, None] * normals(alpha)
+        return feet[:, None, :] + self.extents[..., None] * directions(alpha)[:, None, :]
