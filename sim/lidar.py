@@ -1,0 +1,127 @@
+"""The simulated range finder: exact ranges from a pose to the true faces, and the noise on top."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.geometry.lines import distance_to_segments, normals, through
+
+_ON_THE_VERTEX = 1e-9
+"""Share of a beam step by which a face reaches past its ends, so that no beam slips between two faces that touch."""
+
+
+@dataclass(frozen=True)
+class LidarConfig:
+    """The range finder (section 4 of the paper)."""
+
+    beams: int = 180
+    """Number of beams."""
+    fov_rad: float = 2 * np.pi
+    """Field of view rad: a full turn without repeating its end, or anything less with both ends included."""
+    range_max_m: float = 4.0
+    """Returns beyond this m are rejected."""
+    sigma_m: float = 0.010
+    """Standard deviation m of the radial error of one beam."""
+    cell_m: float = 1.0
+    """Side m of the grid cells that share one list of faces within range."""
+    cells_max: int = 4096
+    """Number of cells whose lists are kept in memory."""
+
+    @property
+    def is_full_turn(self) -> bool:
+        """Whether the first beam follows the last one."""
+        return self.fov_rad > 2 * np.pi - 1e-9
+
+
+def bearings(config: LidarConfig) -> Float[np.ndarray, " k"]:
+    """Return the beam directions (k,) rad in the robot frame, strictly increasing and evenly spaced."""
+    half = 0.5 * config.fov_rad
+    return np.linspace(-half, half, config.beams, endpoint=not config.is_full_turn)
+
+
+def noisy(
+    ranges: Float[np.ndarray, " k"],
+    sigma_m: float,
+    standard_normals: Float[np.ndarray, " k"],
+    range_max_m: float = 4.0,
+) -> Float[np.ndarray, " k"]:
+    """Return ranges (k,) m with radial noise; NaN stays NaN, as does what is measured beyond `range_max_m`."""
+    measured = ranges + sigma_m * standard_normals
+    return np.where((measured > 0.0) & (measured <= range_max_m), measured, np.nan)
+
+
+class RangeFinder:
+    """Casts scans in a world of directed faces; faces seen from behind are transparent."""
+
+    def __init__(self, faces: Float[np.ndarray, "n 2 2"], config: LidarConfig = LidarConfig()) -> None:
+        """Prepare for `faces` (n, 2, 2) m in the world frame, each with its free side on the left."""
+        if config.beams < 2 or not 0.0 < config.fov_rad <= 2 * np.pi + 1e-9:
+            raise ValueError(
+                f"expected 2 beams or more over at most a full turn, received {config.beams} over {config.fov_rad} rad"
+            )
+        lengths = np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+        self._ids = np.flatnonzero(lengths > 0.0)
+        self._faces = faces[self._ids]
+        alpha_r = through(self._faces)
+        # One row a face: both ends, the normal and the distance of its line, so that one lookup brings all of them.
+        self._rows = np.column_stack([self._faces.reshape(-1, 4), normals(alpha_r[:, 0]), alpha_r[:, 1]])
+        self.config = config
+        self.bearings_rad = bearings(config)
+        self._step = float(self.bearings_rad[1] - self.bearings_rad[0])
+        self._cells: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
+
+    def cast(self, pose_world: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+        """Return exact ranges (k,) m, NaN beyond the maximum, and the index of the face of each beam, -1 for none."""
+        x, y, heading = float(pose_world[0]), float(pose_world[1]), float(pose_world[2])
+        ids, rows = self._near(x, y)
+        distance = rows[6] - rows[4] * x - rows[5] * y
+        seen = np.flatnonzero(distance > 0.0)
+        first, counts = self._beam_runs(rows[:4, seen] - np.array([[x], [y], [x], [y]]), heading)
+        # Along a beam 1/range = (n·d)/distance is linear in (cos, sin), and the nearest face is the largest.
+        normal = rows[4:6, seen] / distance[seen]
+        ends = np.cumsum(counts)
+        face = np.repeat(np.arange(len(counts)), counts)
+        beam = np.arange(len(face)) + np.repeat(first - ends + counts, counts)
+        face %= len(seen) if len(seen) else 1
+        world_bearings = self.bearings_rad + heading
+        inverse = normal[0, face] * np.cos(world_bearings)[beam] + normal[1, face] * np.sin(world_bearings)[beam]
+        best = np.full(self.config.beams, 1.0 / self.config.range_max_m)
+        np.maximum.at(best, beam, inverse)
+        hit = np.flatnonzero(inverse == best[beam])
+        face_of_beam = np.full(self.config.beams, -1)
+        face_of_beam[beam[hit]] = ids[seen[face[hit]]]
+        return np.where(face_of_beam >= 0, 1.0 / best, np.nan), face_of_beam
+
+    def _beam_runs(
+        self, ends_from_robot: Float[np.ndarray, "4 m"], heading: float
+    ) -> tuple[Int[np.ndarray, " m2"], Int[np.ndarray, " m2"]]:
+        """Return the first beam and the number of beams in the angle of each face, for this turn and the one before."""
+        bearing = np.arctan2(ends_from_robot[1::2], ends_from_robot[::2])
+        start = np.mod(bearing[0] - (heading + self.bearings_rad[0]), 2 * np.pi)
+        stop = start + np.mod(bearing[1] - bearing[0], 2 * np.pi)
+        turns = np.concatenate([start, start - 2 * np.pi]), np.concatenate([stop, stop - 2 * np.pi])
+        first = np.maximum(np.ceil(turns[0] / self._step - _ON_THE_VERTEX), 0.0)
+        last = np.minimum(np.floor(turns[1] / self._step + _ON_THE_VERTEX), self.config.beams - 1.0)
+        return first.astype(int), np.maximum(last - first + 1.0, 0.0).astype(int)
+
+    def _near(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return ids and rows (7, m) of the faces within range of the grid cell that holds (x, y)."""
+        side = self.config.cell_m
+        key = (int(x // side), int(y // side))
+        cell = self._cells.get(key)
+        if cell is None:
+            cell = self._faces_near_cell(np.array([(key[0] + 0.5) * side, (key[1] + 0.5) * side]))
+            if len(self._cells) >= self.config.cells_max:
+                self._cells.clear()
+            self._cells[key] = cell
+        return cell
+
+    def _faces_near_cell(self, centre: Float[np.ndarray, "2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return ids and rows (7, m) of the faces that some point of the cell around `centre` may see."""
+        radius = self.config.cell_m * np.sqrt(0.5)
+        reach = self.config.range_max_m + radius + 1e-9
+        faces_seen = self._rows[:, 6] - self._rows[:, 4:6] @ centre > -radius
+        near = np.flatnonzero(faces_seen)
+        near = near[distance_to_segments(centre[None], self._faces[near])[0] <= reach]
+        return self._ids[near], np.ascontiguousarray(self._rows[near].T)
