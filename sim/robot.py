@@ -1,0 +1,127 @@
+"""The simulated robot: it owns the truth, and only what `slam.robot` defines leaves it towards the software."""
+
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.geometry.lines import distance_to_segments
+from slam.geometry.poses import compose, to_world
+from slam.robot import MotionCommand, Odometry, Scan
+
+from .chance import Channel, standard_normals
+from .drive import DriveConfig, clamp, draw_slip, odometry, seconds, true_motion
+from .lidar import LidarConfig, RangeFinder, noisy
+
+
+@runtime_checkable
+class Building(Protocol):
+    """What the robot needs of a world."""
+
+    @property
+    def faces(self) -> Float[np.ndarray, "n 2 2"]:
+        """The true faces, world frame, m, each with its free side on the left."""
+        ...
+
+    @property
+    def start(self) -> Float[np.ndarray, "3"]:
+        """Start pose, m m rad."""
+        ...
+
+
+@dataclass(frozen=True)
+class RobotConfig:
+    """The body, the clock, and the two devices."""
+
+    radius_m: float = 0.2
+    """Radius m of the disc that must not touch a wall."""
+    sampling_m: float = 0.005
+    """Distance m between the places of a step that are checked for collisions."""
+    scan_s: float = 0.1
+    """How long one turn of the range finder takes, s."""
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+    drive: DriveConfig = field(default_factory=DriveConfig)
+
+
+@dataclass
+class TrueRecord:
+    """What really happened, step by step; only `experiments/` reads it."""
+
+    poses_world: list[Float[np.ndarray, "3"]] = field(default_factory=list)
+    """The true pose at each scan."""
+    faces_of_beams: list[Int[np.ndarray, " k"]] = field(default_factory=list)
+    """The face that each beam of each scan hit; -1 for none."""
+    collisions: int = 0
+    drive_time_s: float = 0.0
+    path_length_m: float = 0.0
+    """Of the true path."""
+
+
+class SimulatedRobot:
+    """A disc with a range finder and slipping wheels in a drawn building."""
+
+    def __init__(self, world: Building, seed: int, errorless: bool = False, config: RobotConfig | None = None) -> None:
+        """Stand at the start of `world`; `errorless` makes ranges and wheels exact but keeps the stated noise."""
+        self.config = config or RobotConfig()
+        self.record = TrueRecord()
+        self._seed, self._errorless = seed, errorless
+        self._finder = RangeFinder(world.faces, self.config.lidar)
+        self._faces = np.asarray(world.faces, dtype=np.float64)
+        self._low, self._high = self._faces.min(axis=1), self._faces.max(axis=1)
+        self._pose = np.array(world.start, dtype=np.float64)
+        self._time_s, self._drives = 0.0, 0
+
+    @property
+    def true_pose(self) -> Float[np.ndarray, "3"]:
+        """Where the robot really is, world frame, m m rad."""
+        return self._pose.copy()
+
+    def sense(self) -> Scan:
+        """Return the scan at the present place and record the truth about it."""
+        ranges, faces = self._finder.cast(self._pose)
+        lidar, step = self.config.lidar, len(self.record.poses_world)
+        if not self._errorless:
+            draws = standard_normals(self._seed, Channel.LASER, step, len(ranges))
+            ranges = noisy(ranges, lidar.sigma_m, draws, lidar.range_max_m)
+        self.record.poses_world.append(self._pose.copy())
+        self.record.faces_of_beams.append(np.where(np.isnan(ranges), -1, faces))
+        self._time_s += self.config.scan_s
+        return Scan(self._finder.bearings_rad, ranges, lidar.sigma_m, lidar.range_max_m, self._time_s)
+
+    def drive(self, command: MotionCommand) -> Odometry:
+        """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
+
+        Where the body would touch a wall the robot stops at the last free place of its way, the collision is
+        counted, and the wheels report the part that was driven.
+        """
+        drive = self.config.drive
+        command = clamp(command, drive)
+        draws = np.zeros(3) if self._errorless else standard_normals(self._seed, Channel.WHEELS, self._drives, 3)
+        slip = draw_slip(command, drive, draws)
+        count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
+        shares = np.linspace(0.0, 1.0, count + 1)[1:]
+        motions = true_motion(command, slip, drive, shares)
+        free = self._free_places(to_world(motions[:, :2], self._pose))
+        if free < count:
+            self.record.collisions += 1
+            share = float(shares[free - 1]) if free else 0.0
+            command = MotionCommand(share * command.forward_m, share * command.turn_rad)
+        if free:
+            self._pose = compose(self._pose, motions[free - 1])
+            self.record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
+        self._drives += 1
+        duration = seconds(command, drive)
+        self._time_s += duration
+        self.record.drive_time_s += duration
+        return odometry(command, drive)
+
+    def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:
+        """Return how many places, from the first on, keep the body clear of every face."""
+        radius = self.config.radius_m
+        low, high = places_world.min(axis=0) - radius, places_world.max(axis=0) + radius
+        near = np.flatnonzero(np.all((self._low <= high) & (self._high >= low), axis=1))
+        if not len(near):
+            return len(places_world)
+        touched = distance_to_segments(places_world, self._faces[near]).min(axis=1) < radius
+        return int(np.argmax(touched)) if touched.any() else len(places_world)

@@ -1,0 +1,87 @@
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from sim.robot import SimulatedRobot
+from slam.geometry.lines import distance_to_segments
+from slam.robot import MotionCommand, Robot
+
+
+@dataclass(frozen=True)
+class Room:
+    """A square room of 4 m with its corner at the origin."""
+
+    faces: np.ndarray
+    start: np.ndarray
+
+
+def room(heading=0.0):
+    corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+    return Room(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), np.array([2.0, 2.0, heading]))
+
+
+def test_the_simulated_robot_is_a_robot():
+    robot: Robot = SimulatedRobot(room(), seed=1)
+    assert robot.sense().ranges_m.shape == (180,)
+
+
+def test_errorless_wheels_go_where_they_are_told_and_state_their_noise():
+    robot = SimulatedRobot(room(), seed=1, errorless=True)
+    odometry = robot.drive(MotionCommand(0.1, 0.1))
+    noisy = SimulatedRobot(room(), seed=1).drive(MotionCommand(0.1, 0.1))
+    np.testing.assert_array_equal(odometry.cov, noisy.cov)
+    np.testing.assert_allclose(robot.true_pose[:2] - 2.0, odometry.motion[:2], atol=1e-12)
+
+
+def test_errorless_ranges_are_exact():
+    robot = SimulatedRobot(room(), seed=1, errorless=True)
+    scan = robot.sense()
+    ahead = np.argmin(np.abs(scan.bearings_rad))
+    assert scan.ranges_m[ahead] == pytest.approx(2.0, abs=1e-9)
+
+
+def test_the_same_seed_gives_the_same_bytes_and_wheels_never_shift_the_laser():
+    one, two = SimulatedRobot(room(), seed=5), SimulatedRobot(room(), seed=5)
+    for robot in (one, two):
+        robot.sense()
+        robot.drive(MotionCommand(0.1, 0.0))
+    assert one.true_pose.tobytes() == two.true_pose.tobytes()
+    assert one.sense().ranges_m.tobytes() == two.sense().ranges_m.tobytes()
+    still, turning = SimulatedRobot(room(), seed=5), SimulatedRobot(room(), seed=5)
+    still.sense(), turning.sense()
+    turning.drive(MotionCommand(0.0, 0.0))
+    assert still.sense().ranges_m.tobytes() == turning.sense().ranges_m.tobytes()
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.3, 0.8, 2.0])
+def test_the_body_stops_before_the_wall_and_the_collision_is_counted(heading):
+    robot = SimulatedRobot(room(heading), seed=2)
+    for _ in range(30):
+        robot.drive(MotionCommand(0.15, 0.0))
+    assert robot.record.collisions > 0
+    gap = distance_to_segments(robot.true_pose[None, :2], room().faces).min()
+    assert 0.2 <= gap < 0.35
+
+
+def test_no_collision_far_from_every_wall():
+    robot = SimulatedRobot(room(), seed=2)
+    for _ in range(72):
+        robot.drive(MotionCommand(0.02, 0.17))
+    assert robot.record.collisions == 0
+
+
+def test_a_long_command_is_shortened():
+    robot = SimulatedRobot(room(), seed=1, errorless=True)
+    assert robot.drive(MotionCommand(2.0, 0.0)).motion[0] == pytest.approx(0.15)
+
+
+def test_time_goes_on_and_the_record_follows_the_scans():
+    robot = SimulatedRobot(room(), seed=1)
+    first = robot.sense()
+    robot.drive(MotionCommand(0.15, 0.0))
+    second = robot.sense()
+    assert second.time_s == pytest.approx(first.time_s + 0.5 + 0.1)
+    assert robot.record.drive_time_s == pytest.approx(0.5)
+    assert len(robot.record.poses_world) == len(robot.record.faces_of_beams) == 2
+    assert np.all((robot.record.faces_of_beams[0] >= 0) == np.isfinite(first.ranges_m))
