@@ -14,6 +14,9 @@ from .chance import Channel, standard_normals
 from .drive import DriveConfig, clamp, draw_slip, odometry, seconds, true_motion
 from .lidar import LidarConfig, RangeFinder, noisy
 
+_CELL_M = 0.5
+"""Side of the grid cells that share one list of faces within a step's reach."""
+
 
 @runtime_checkable
 class Building(Protocol):
@@ -68,7 +71,7 @@ class SimulatedRobot:
         self._seed, self._errorless = seed, errorless
         self._finder = RangeFinder(world.faces, self.config.lidar)
         self._faces = np.asarray(world.faces, dtype=np.float64)
-        self._low, self._high = self._faces.min(axis=1), self._faces.max(axis=1)
+        self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
         self._pose = np.array(world.start, dtype=np.float64)
         self._time_s, self._drives = 0.0, 0
 
@@ -118,10 +121,18 @@ class SimulatedRobot:
 
     def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:
         """Return how many places, from the first on, keep the body clear of every face."""
-        radius = self.config.radius_m
-        low, high = places_world.min(axis=0) - radius, places_world.max(axis=0) + radius
-        near = np.flatnonzero(np.all((self._low <= high) & (self._high >= low), axis=1))
+        near = self._faces_near(places_world[0])
         if not len(near):
             return len(places_world)
-        touched = distance_to_segments(places_world, self._faces[near]).min(axis=1) < radius
+        touched = distance_to_segments(places_world, near).min(axis=1) < self.config.radius_m
         return int(np.argmax(touched)) if touched.any() else len(places_world)
+
+    def _faces_near(self, place_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "m 2 2"]:
+        """Return the faces that one step from anywhere in the grid cell of `place_world` may touch."""
+        cell = (int(place_world[0] // _CELL_M), int(place_world[1] // _CELL_M))
+        if cell not in self._near:
+            centre = (np.array([cell]) + 0.5) * _CELL_M
+            # A slipping step is a little longer than the longest command.
+            reach = np.sqrt(0.5) * _CELL_M + 2.0 * self.config.drive.step_max_m + self.config.radius_m
+            self._near[cell] = self._faces[distance_to_segments(centre, self._faces)[0] <= reach]
+        return self._near[cell]
