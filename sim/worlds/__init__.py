@@ -1,0 +1,8 @@
+"""Named worlds and the readers of drawn maps."""
+
+from .contour import Contour
+from .drawing import WorldError
+from .registry import WORLDS, load
+from .world import World
+
+__all__ = ["WORLDS", "Contour", "World", "WorldError", "load"]

@@ -1,0 +1,181 @@
+"""The reachable contour: the parts of faces that a robot can see from places that it can reach."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from jaxtyping import Bool, Float, Int
+
+PITCH_M = 0.02
+"""Spacing of the points at which faces are tested; the ends of what is seen are then refined."""
+HALVINGS = 6
+FAN_RAD = np.deg2rad(0.5)
+REACH_M = 0.001
+"""Arcs of the reachable region are polygons: a point this much farther than the radius is still touched."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """What can be seen of each face."""
+
+    face: Int[np.ndarray, " m"]
+    """Index of the face on which each interval lies, ascending."""
+    span_m: Float[np.ndarray, "m 2"]
+    """Where each interval begins and ends, m along its face."""
+    segments: Float[np.ndarray, "m 2 2"]
+    """The intervals as points, m, world frame, free side on the left."""
+    rings: Int[np.ndarray, " c"]
+    """Rings of which a part worth speaking of is seen: 0.1 m, or half of a shorter ring."""
+
+    @property
+    def length_m(self) -> float:
+        """Total length of all intervals."""
+        return float(np.sum(self.span_m[:, 1] - self.span_m[:, 0]))
+
+    @property
+    def contours(self) -> int:
+        """Number of rings of which a part worth speaking of is seen."""
+        return len(self.rings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Faces that hide, edges of the reachable region that see, and how far."""
+
+    faces: Float[np.ndarray, "n 2 2"]
+    lookouts: Float[np.ndarray, "l 2 2"]
+    faces_tree: shapely.STRtree
+    lookouts_tree: shapely.STRtree
+    radius_m: float
+    range_m: float
+
+
+def visible_contour(
+    faces: Float[np.ndarray, "n 2 2"],
+    face_rings: Int[np.ndarray, " n"],
+    reachable: shapely.Polygon,
+    radius_m: float,
+    range_m: float,
+) -> Contour:
+    """Return the parts of `faces` in line of sight within `range_m` of a point of `reachable`, m, world frame.
+
+    Whatever the region sees, its boundary sees, since a sight line leaves the region through it; and a face point
+    that the disc can touch is seen by the disc's centre. Only the rest, a few percent, needs rays.
+    """
+    if reachable.is_empty:
+        return _intervals(faces, face_rings, [np.zeros((0, 2))] * len(faces))
+    scene = _scene(faces, reachable, radius_m, range_m)
+    lengths = np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+    counts = np.maximum(np.ceil(lengths / PITCH_M).astype(int), 2)
+    face = np.repeat(np.arange(len(faces)), counts)
+    first = np.cumsum(counts) - counts
+    share = (np.arange(len(face)) - first[face] + 0.5) / counts[face]
+    seen = _seen(scene, face, share)
+    turns = np.flatnonzero((seen[:-1] != seen[1:]) & (face[:-1] == face[1:]))
+    edge = _refine(scene, face[turns], share[turns], share[turns + 1], seen[turns])
+    spans = []
+    for i in range(len(faces)):
+        mine = slice(*np.searchsorted(face[turns], [i, i + 1]))
+        marks = list(edge[mine])
+        if seen[first[i]]:
+            marks.insert(0, 0.0)
+        if seen[first[i] + counts[i] - 1]:
+            marks.append(1.0)
+        spans.append(np.array(marks).reshape(-1, 2) * lengths[i])
+    return _intervals(faces, face_rings, spans)
+
+
+def _scene(faces: Float[np.ndarray, "n 2 2"], reachable: shapely.Polygon, radius_m: float, range_m: float) -> _Scene:
+    rings = [shapely.get_coordinates(ring) for ring in (reachable.exterior, *reachable.interiors)]
+    lookouts = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    trees = [shapely.STRtree(shapely.linestrings(edges)) for edges in (faces, lookouts)]
+    return _Scene(faces, lookouts, trees[0], trees[1], radius_m, range_m)
+
+
+def _seen(scene: _Scene, face: Int[np.ndarray, " k"], share: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
+    """Return which points, given as a share of the way along their faces, the reachable region sees."""
+    ends = scene.faces[face]
+    points = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
+    touched = scene.lookouts_tree.query(shapely.points(points), predicate="dwithin", distance=scene.radius_m + REACH_M)
+    seen = np.zeros(len(face), dtype=bool)
+    seen[touched[0]] = True
+    rest = np.flatnonzero(~seen)
+    order = rest[np.argsort(face[rest], kind="stable")]
+    for group in np.split(order, np.flatnonzero(np.diff(face[order])) + 1) if len(order) else []:
+        for part in np.array_split(group, len(group) // 64 + 1):
+            seen[part] = _fan_sees(scene, int(face[part[0]]), points[part])
+    return seen
+
+
+def _fan_sees(scene: _Scene, face: int, points: Float[np.ndarray, "p 2"]) -> Bool[np.ndarray, " p"]:
+    """Return which points of one face look out, along some ray, into the reachable region before hitting a wall."""
+    hull = shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0])
+    walls = scene.faces[scene.faces_tree.query(hull, predicate="dwithin", distance=scene.range_m)]
+    lookouts = scene.lookouts[scene.lookouts_tree.query(hull, predicate="dwithin", distance=scene.range_m)]
+    along = scene.faces[face, 1] - scene.faces[face, 0]
+    side = (walls - points[0]) @ (np.array([-along[1], along[0]]) / np.hypot(*along))
+    walls, lookouts = walls[np.any(side > 1e-9, axis=1)], _in_front(lookouts, points[0], along)
+    if not len(lookouts):
+        return np.zeros(len(points), dtype=bool)
+    base = np.arctan2(along[1], along[0])
+    fan = base + np.arange(0.5 * FAN_RAD, np.pi, FAN_RAD)
+    seen = np.zeros(len(points), dtype=bool)
+    for i, point in enumerate(points):
+        # A gap narrower than the fan's step lies between corners, so rays just beside each corner find it.
+        corner = walls.reshape(-1, 2) - point
+        near = np.arctan2(corner[:, 1], corner[:, 0])
+        bearings = np.concatenate([fan, near - 1e-6, near + 1e-6])
+        bearings = bearings[(bearings - base) % (2 * np.pi) < np.pi]
+        rays = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        seen[i] = np.any(_reach(point, rays, lookouts, scene.range_m) < _reach(point, rays, walls, np.inf))
+    return seen
+
+
+def _in_front(
+    edges: Float[np.ndarray, "n 2 2"], point: Float[np.ndarray, "2"], along: Float[np.ndarray, "2"]
+) -> Float[np.ndarray, "m 2 2"]:
+    side = (edges - point) @ np.array([-along[1], along[0]])
+    return edges[np.any(side > 0, axis=1)]
+
+
+def _reach(
+    point: Float[np.ndarray, "2"], rays: Float[np.ndarray, "r 2"], edges: Float[np.ndarray, "n 2 2"], limit_m: float
+) -> Float[np.ndarray, " r"]:
+    """Return how far each unit ray runs from `point` before it meets an edge; infinite beyond `limit_m`."""
+    origin, along = edges[:, 0] - point, edges[:, 1] - edges[:, 0]
+    cross = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (origin[:, 0] * along[:, 1] - origin[:, 1] * along[:, 0]) / cross
+        share = (origin[:, 0] * rays[:, 1:] - origin[:, 1] * rays[:, :1]) / cross
+    hit = (distance > 1e-9) & (share >= 0) & (share <= 1)
+    nearest = np.min(np.where(hit, distance, np.inf), axis=1, initial=np.inf)
+    return np.where(nearest <= limit_m, nearest, np.inf)
+
+
+def _refine(
+    scene: _Scene,
+    face: Int[np.ndarray, " t"],
+    low: Float[np.ndarray, " t"],
+    high: Float[np.ndarray, " t"],
+    low_seen: Bool[np.ndarray, " t"],
+) -> Float[np.ndarray, " t"]:
+    """Return where sight begins or ends between two neighbouring points, by halving."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = _seen(scene, face, middle) == low_seen
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return 0.5 * (low + high)
+
+
+def _intervals(
+    faces: Float[np.ndarray, "n 2 2"], face_rings: Int[np.ndarray, " n"], spans: list[Float[np.ndarray, "i 2"]]
+) -> Contour:
+    face = np.repeat(np.arange(len(faces)), [len(span) for span in spans])
+    span_m = np.concatenate(spans).reshape(-1, 2)
+    lengths = np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+    along = ((faces[:, 1] - faces[:, 0]) / lengths[:, None])[face]
+    segments = faces[face, :1] + span_m[:, :, None] * along[:, None, :]
+    count = int(face_rings.max()) + 1
+    seen = np.bincount(face_rings[face], weights=span_m[:, 1] - span_m[:, 0], minlength=count)
+    whole = np.bincount(face_rings, weights=lengths, minlength=count)
+    return Contour(face, span_m, segments, np.flatnonzero(seen >= np.minimum(0.1, 0.5 * whole)))

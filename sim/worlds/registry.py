@@ -1,0 +1,69 @@
+"""The bundled worlds, and one way to load any world by name or file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from .drawing import Drawing, WorldError, as_pose, numbers, shorten
+from .files import read_bytes, read_json_map
+from .solid import build
+from .svg import read_svg
+from .world import World
+
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Bundled:
+    """A world that comes with the software."""
+
+    file: str
+    about: str
+
+
+WORLDS: dict[str, Bundled] = {
+    "paper-fig4": Bundled("paper-fig4.svg", "figure 4: one cycle with a dead end, 16 numbered walls"),
+    "paper-fig5": Bundled("paper-fig5.svg", "figures 5 and 6: rooms and dead ends off corridors, 20 m x 14 m"),
+    "paper-fig8": Bundled("paper-fig8.svg", "figure 8: the cyclic 7 m x 7 m environment with corners A, B and C"),
+    "paper-fig9": Bundled(
+        "paper-fig9.svg", "figure 9: 12 m x 9 m around a big obstacle, corners A and B farthest apart"
+    ),
+    "rooms": Bundled("rooms.svg", "an apartment of 9 m x 8 m with doors and furniture"),
+    "hall": Bundled("hall.svg", "a hall of 16 m x 12 m, larger than the sensor's range, with free-standing obstacles"),
+}
+
+READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
+    ".json": lambda path, scale: read_json_map(read_bytes(path), scale),
+    ".geojson": lambda path, scale: read_json_map(read_bytes(path), scale),
+    ".svg": lambda path, scale: read_svg(read_bytes(path), scale),
+}
+"""Reader by file name extension; each takes the path and the scale that the caller states, or None."""
+
+
+def load(
+    name_or_path: str | Path,
+    start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
+    scale: float | None = None,
+) -> World:
+    """Return a bundled world or one drawn in a file.
+
+    `start` (x m, y m, heading rad; heading may be left out) overrides the drawing's own. `scale` is metres per pixel
+    of a bare image (0.05 where not given) or metres per user unit of an SVG file. Raises WorldError, in one line.
+    """
+    pose = None if start is None else as_pose(numbers(list(start), (2, 3), "start", "(x, y, heading)"))
+    text = str(name_or_path)
+    if text in WORLDS:
+        return build(text, read_svg((HERE / WORLDS[text].file).read_bytes()), pose)
+    path = Path(text)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise WorldError(
+            f"expected one of {', '.join(WORLDS)} or a file ending in {', '.join(READERS)}, found {shorten(text)}:"
+            " choose one of these"
+        )
+    if scale is not None and not 0 < scale < np.inf:
+        raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
+    return build(path.stem, reader(path, scale), pose)

@@ -1,0 +1,141 @@
+"""From a drawing to a world: lines become thick walls, slits are sealed, the free space around the start is kept."""
+
+import numpy as np
+import shapely
+from jaxtyping import Float
+from shapely.geometry.polygon import orient
+
+from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError
+from .world import ROBOT_RADIUS_M, World
+
+WALL_M = 0.1
+SLIT_M = 0.06
+"""Free gaps narrower than this are artefacts of drawing: no beam should pass."""
+MITRE = 10.0
+OUTSIDE_RATIO = 8.0
+"""A picture's margin is taken for the outside unless it is this much larger than all that the drawing encloses."""
+
+
+def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = None) -> World:
+    """Return the world of a drawing, `start` overriding its own; raise WorldError where no robot could drive in it."""
+    solid = solid_of(drawing)
+    _check_extent(solid)
+    enclosed, open_parts = _free_parts(solid, drawing.sheet)
+    wanted = start if start is not None else drawing.start
+    if wanted is None:
+        part, pose = _choose(enclosed, open_parts)
+    else:
+        part, pose = _part_with(wanted, solid, enclosed + open_parts), wanted
+    free = orient(_straighten(part, drawing.simplify_m), 1.0)
+    _check_clearance(free, pose)
+    return World(name, free, pose, dict(drawing.labels))
+
+
+def solid_of(drawing: Drawing) -> shapely.MultiPolygon | shapely.Polygon:
+    """Return all that is solid: walls 0.1 m thick around the lines, filled polygons mended where they cross themselves."""
+    if not drawing.lines and not drawing.solids:
+        raise WorldError("expected walls, found nothing drawn: draw dark lines or filled shapes")
+    merged = shapely.line_merge(shapely.union_all(np.array(drawing.lines))) if drawing.lines else shapely.LineString()
+    thick = merged.buffer(0.5 * WALL_M, cap_style="square", join_style="mitre", mitre_limit=MITRE)
+    mended = [shapely.make_valid(polygon) for polygon in drawing.solids]
+    return shapely.union_all([thick, *(part for shape in mended for part in _areas(shape))])
+
+
+def _areas(shape: shapely.Geometry) -> list[shapely.Polygon]:
+    """Return the polygons of a geometry, dropping points and lines."""
+    return [
+        part for part in shapely.get_parts(shapely.get_parts(shape)) if part.geom_type == "Polygon" and part.area > 0
+    ]
+
+
+def _check_extent(solid: shapely.Geometry) -> None:
+    x0, y0, x1, y1 = solid.bounds
+    extent = max(x1 - x0, y1 - y0)
+    if not SMALLEST_M <= extent <= LARGEST_M:
+        raise WorldError(
+            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m: correct the scale of the drawing"
+        )
+
+
+def _free_parts(
+    solid: shapely.Geometry, sheet: shapely.Polygon | None
+) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
+    """Return the free parts that walls enclose, and those that end at the border of a picture."""
+    page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
+    parts = _areas(page.difference(solid))
+    edge = page.exterior
+    touching = [shapely.distance(part, edge) < 1e-9 for part in parts]
+    enclosed = [opened for part, out in zip(parts, touching, strict=True) if not out for opened in _unslit(part)]
+    if sheet is None:
+        return enclosed, []
+    return enclosed, [opened for part, out in zip(parts, touching, strict=True) if out for opened in _unslit(part)]
+
+
+def _unslit(part: shapely.Polygon) -> list[shapely.Polygon]:
+    """Return the pieces of a free part without its slits; mitres keep all corners where they were drawn."""
+    inner = part.buffer(-0.5 * SLIT_M, join_style="mitre", mitre_limit=MITRE)
+    return _areas(inner.buffer(0.5 * SLIT_M, join_style="mitre", mitre_limit=MITRE))
+
+
+def _choose(
+    enclosed: list[shapely.Polygon], open_parts: list[shapely.Polygon]
+) -> tuple[shapely.Polygon, Float[np.ndarray, "3"]]:
+    """Return the part where a robot has most room to drive, and its place farthest from all walls."""
+    roomy = [max((p for p in parts), key=_drivable, default=shapely.Polygon()) for parts in (enclosed, open_parts)]
+    part = roomy[0] if OUTSIDE_RATIO * _drivable(roomy[0]) >= _drivable(roomy[1]) else roomy[1]
+    if _drivable(part) == 0:
+        raise WorldError(
+            "expected a free space that walls enclose and that a robot of 0.2 m radius fits into, found none:"
+            " draw a closed wall around the building"
+        )
+    middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(part, tolerance=0.02))[0]
+    return part, np.array([round(middle[0], 3), round(middle[1], 3), 0.0])
+
+
+def _drivable(part: shapely.Polygon) -> float:
+    """Return the area m2 of the largest piece that the robot's centre can roam."""
+    return max((piece.area for piece in _areas(part.buffer(-ROBOT_RADIUS_M))), default=0.0)
+
+
+def _part_with(start: Float[np.ndarray, "3"], solid: shapely.Geometry, parts: list[shapely.Polygon]) -> shapely.Polygon:
+    at = shapely.Point(start[:2])
+    for part in parts:
+        if part.contains(at):
+            return part
+    if solid.distance(at) < ROBOT_RADIUS_M:
+        found = "inside a wall" if solid.contains(at) else "too near a wall"
+    else:
+        found = "outside all that walls enclose"
+    raise WorldError(
+        f"expected a start in the free space, found ({start[0]:.3f}, {start[1]:.3f}) {found}:"
+        " move the start, or close the outer wall around it"
+    )
+
+
+def _check_clearance(free: shapely.Polygon, start: Float[np.ndarray, "3"]) -> None:
+    at = shapely.Point(start[:2])
+    clearance = shapely.distance(free.boundary, at) if free.contains(at) else 0.0
+    if clearance < ROBOT_RADIUS_M:
+        raise WorldError(
+            f"expected a start {ROBOT_RADIUS_M} m or more from all walls, found {clearance:.3f} m at"
+            f" ({start[0]:.3f}, {start[1]:.3f}): move the start"
+        )
+
+
+def _straighten(part: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
+    """Return a free part whose faces are straight: each ring simplified, and no vertex left on a straight wall."""
+    simple = part.simplify(tolerance_m)
+    if simple.geom_type != "Polygon" or not simple.is_valid or simple.is_empty:
+        simple = part
+    rings = [_drop_collinear(shapely.get_coordinates(ring)[:-1]) for ring in (simple.exterior, *simple.interiors)]
+    straight = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) > 2])
+    return straight if straight.is_valid else simple
+
+
+def _drop_collinear(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+    """Return a ring without vertices that lie within 1 micrometre of the chord of their neighbours."""
+    before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
+    chord, off = after - before, ring - before
+    length = np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-12)
+    bent = np.abs(chord[:, 0] * off[:, 1] - chord[:, 1] * off[:, 0]) / length > 1e-6
+    return ring[bent]

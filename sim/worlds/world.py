@@ -1,0 +1,52 @@
+"""A drawn building: its free space, its faces, what a robot can reach and see of it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from jaxtyping import Float, Int
+
+from .contour import Contour, visible_contour
+
+ROBOT_RADIUS_M = 0.2
+SENSOR_RANGE_M = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """A building as it truly is; walls are solid."""
+
+    name: str
+    free: shapely.Polygon
+    """The connected free region that holds the start, free side on the left of every directed edge."""
+    start: Float[np.ndarray, "3"]
+    """Pose (x m, y m, heading rad) in the world frame."""
+    labels: dict[str, tuple[float, float]]
+    """Named points, m, world frame."""
+
+    @cached_property
+    def faces(self) -> Float[np.ndarray, "n 2 2"]:
+        """All wall faces as directed edges, m, world frame, ring by ring (the exterior first), in ring order."""
+        rings = [shapely.get_coordinates(ring) for ring in self._rings]
+        return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+
+    @cached_property
+    def face_rings(self) -> Int[np.ndarray, " n"]:
+        """The ring of each face; 0 is the exterior."""
+        counts = [len(ring.coords) - 1 for ring in self._rings]
+        return np.repeat(np.arange(len(counts)), counts)
+
+    @property
+    def _rings(self) -> list[shapely.LinearRing]:
+        return [self.free.exterior, *self.free.interiors]
+
+    def reachable(self, radius_m: float = ROBOT_RADIUS_M) -> shapely.Polygon:
+        """Return where the centre of a disc of this radius can be driven from the start."""
+        inner = shapely.get_parts(self.free.buffer(-radius_m, quad_segs=16))
+        at = shapely.Point(self.start[:2])
+        return inner[int(np.argmin(shapely.distance(inner, at)))] if len(inner) else shapely.Polygon()
+
+    def reachable_contour(self, radius_m: float = ROBOT_RADIUS_M, range_m: float = SENSOR_RANGE_M) -> Contour:
+        """Return the parts of the faces in line of sight within range of some place that the disc can reach."""
+        return visible_contour(self.faces, self.face_rings, self.reachable(radius_m), radius_m, range_m)
