@@ -1,0 +1,136 @@
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve
+from scipy.stats import kstest
+
+from slam.backend import Joint
+from slam.consistency import (
+    _to_invariant,
+    anees,
+    chi2_band,
+    joint_error,
+    nees,
+    nis,
+    pose_covariances,
+    pose_errors,
+    share_in_band,
+)
+from slam.geometry.lines import normals
+from slam.geometry.poses import compose
+
+RNG = np.random.default_rng(4)
+
+
+def random_covs(n, d):
+    roots = RNG.normal(size=(n, d, d))
+    return roots @ np.swapaxes(roots, 1, 2) + 0.1 * np.eye(d)
+
+
+def exp_of(xi):
+    """The group's exponential by the matrix exponential, an independent slow truth."""
+    return expm(np.array([[0.0, -xi[2], xi[0]], [xi[2], 0.0, xi[1]], [0.0, 0.0, 0.0]]))
+
+
+def matrix(pose):
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+
+
+def pose_of(transform):
+    return np.array([transform[0, 2], transform[1, 2], np.arctan2(transform[1, 0], transform[0, 0])])
+
+
+def test_nees_equals_the_quadratic_form_of_scipy():
+    errors, covs = RNG.normal(size=(7, 4)), random_covs(7, 4)
+    expected = [e @ solve(cov, e) for e, cov in zip(errors, covs, strict=True)]
+    np.testing.assert_allclose(nees(errors, covs), expected, rtol=1e-10)
+    np.testing.assert_allclose(nis(errors, covs), expected, rtol=1e-10)
+
+
+def test_nees_of_the_exact_model_is_chi_square():
+    cov = random_covs(1, 3)
+    errors = RNG.normal(size=(5000, 3)) @ np.linalg.cholesky(cov[0]).T
+    values = nees(errors, np.repeat(cov, 5000, axis=0))
+    assert kstest(values, "chi2", args=(3,)).pvalue > 1e-3
+    assert anees(values, 3) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / 5000))
+    assert share_in_band(values, 3) == pytest.approx(0.95, abs=4 * np.sqrt(0.05 * 0.95 / 5000))
+
+
+def test_a_covariance_that_is_not_positive_definite_is_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        nees(np.ones((1, 2)), np.array([[[1.0, 2.0], [2.0, 1.0]]]))
+
+
+def test_the_band_is_the_tables():
+    assert chi2_band(3) == pytest.approx((0.2158, 9.3484), abs=1e-4)
+    low, high = chi2_band(3, runs=50)
+    assert low < 3 < high
+    assert high - low < 2.0
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 1e-3, 0.4, -2.5])
+def test_the_pose_error_is_the_logarithm_on_the_left(turn):
+    xi, true = np.array([0.3, -0.8, turn]), np.array([4.0, -7.0, 2.9])
+    estimated = pose_of(exp_of(xi) @ matrix(true))
+    np.testing.assert_allclose(pose_errors(estimated[None], true[None])[0], xi, atol=1e-12)
+
+
+def test_the_pose_error_does_not_depend_on_where_the_robot_stands():
+    xi = np.array([0.1, 0.2, -0.3])
+    true = RNG.normal(size=(20, 3)) * 10
+    estimated = np.stack([pose_of(exp_of(xi) @ matrix(pose)) for pose in true])
+    np.testing.assert_allclose(pose_errors(estimated, true), np.tile(xi, (20, 1)), atol=1e-10)
+
+
+def test_the_pose_covariance_moves_with_the_jacobian_of_the_error():
+    pose, step = np.array([3.0, -2.0, 0.7]), 1e-6
+    jacobian = np.stack([(pose_errors((pose + d)[None], pose[None])[0]) / step for d in step * np.eye(3)], axis=-1)
+    cov = random_covs(1, 3)
+    np.testing.assert_allclose(pose_covariances(pose[None], cov)[0], jacobian @ cov[0] @ jacobian.T, atol=1e-4)
+
+
+def random_truth(lines=4):
+    pose = np.array([5.0, -3.0, 0.4])
+    anchors = pose[:2] + RNG.normal(size=(lines, 2)) * 3
+    alpha = RNG.uniform(-3, 3, lines)
+    r = np.sum(normals(alpha) * anchors, axis=-1) + 0.01 * RNG.normal(size=lines)
+    return pose, anchors, np.stack([alpha, r], axis=-1)
+
+
+def state_of(pose, anchors, lines):
+    d = lines[:, 1] - np.sum(normals(lines[:, 0]) * anchors, axis=-1)
+    return np.concatenate([pose, np.stack([lines[:, 0], d], axis=-1).ravel()])
+
+
+def test_the_joint_error_has_the_stated_jacobian():
+    pose, anchors, lines = random_truth()
+    truth, step = state_of(pose, anchors, lines), 1e-6
+    eye = np.eye(len(truth))
+
+    def error(state):
+        return joint_error(Joint(state, eye, anchors), pose, lines)[0]
+
+    columns = [(error(truth + step * d) - error(truth - step * d)) / (2 * step) for d in eye]
+    np.testing.assert_allclose(np.stack(columns, axis=-1), _to_invariant(pose, lines[:, 0], anchors), atol=1e-8)
+    np.testing.assert_allclose(error(truth), 0.0, atol=1e-12)
+
+
+def test_turning_and_shifting_the_estimated_world_shows_in_the_pose_error_alone():
+    pose, anchors, lines = random_truth()
+    motion = np.array([0.4, -0.2, 0.3])
+    moved_pose, moved_anchors = compose(motion, pose), anchors @ matrix(motion)[:2, :2].T + motion[:2]
+    alpha = lines[:, 0] + motion[2]
+    moved_lines = np.stack([alpha, lines[:, 1] + normals(alpha) @ motion[:2]], axis=-1)
+    state = state_of(moved_pose, moved_anchors, moved_lines)
+    error, _ = joint_error(Joint(state, np.eye(len(state)), moved_anchors), pose, lines)
+    np.testing.assert_allclose(error[3:], 0.0, atol=1e-12)
+    assert np.abs(error[:3]).max() > 0.1
+
+
+def test_the_joint_covariance_stays_positive_definite_and_a_robot_alone_is_its_special_case():
+    pose, anchors, lines = random_truth()
+    truth = state_of(pose, anchors, lines)
+    cov = random_covs(1, len(truth))[0]
+    _, moved = joint_error(Joint(truth, cov, anchors), pose, lines)
+    assert np.linalg.eigvalsh(moved).min() > 0
+    np.testing.assert_allclose(moved[:3, :3], pose_covariances(pose[None], cov[None, :3, :3])[0], atol=1e-12)
