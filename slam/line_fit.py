@@ -1,0 +1,110 @@
+"""Straight lines in inverse range: 1/rho = a cos(theta) + b sin(theta), linear in (a, b).
+
+Bearings are exact and the noise is radial, so this fit is right at any incidence; orthogonal least squares is not.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+class Beams(NamedTuple):
+    """The returns of a scan in counter-clockwise order, all of shape (m,)."""
+
+    cos: Float[np.ndarray, " m"]
+    """Cosine of the bearing."""
+    sin: Float[np.ndarray, " m"]
+    """Sine of the bearing."""
+    rho: Float[np.ndarray, " m"]
+    """Range m."""
+
+
+class Fit(NamedTuple):
+    """Lines in inverse range with their information, all of shape (n,)."""
+
+    a: Float[np.ndarray, " n"]
+    """cos(alpha) / r, 1/m."""
+    b: Float[np.ndarray, " n"]
+    """sin(alpha) / r, 1/m."""
+    cc: Float[np.ndarray, " n"]
+    """Information of a."""
+    cs: Float[np.ndarray, " n"]
+    """Information shared by a and b."""
+    ss: Float[np.ndarray, " n"]
+    """Information of b."""
+
+
+def prefix_sums(beams: Beams, sigma_m: float) -> Float[np.ndarray, "6 m1"]:
+    """Return running sums, from 0, of the weighted normal equations, so that any run of beams is fitted in O(1)."""
+    rho2 = np.square(beams.rho / sigma_m)
+    x, y = beams.rho * beams.cos, beams.rho * beams.sin
+    sums = np.zeros((6, len(rho2) + 1))
+    terms = np.empty((6, len(rho2)))
+    terms[0], terms[1], terms[2] = x * x, x * y, y * y
+    terms[3], terms[4], terms[5] = x, y, 1.0
+    terms *= rho2
+    np.cumsum(terms, axis=1, out=sums[:, 1:])
+    return sums
+
+
+def fit_runs(
+    sums: Float[np.ndarray, "6 m1"], start: Int[np.ndarray, " n"], stop: Int[np.ndarray, " n"]
+) -> tuple[Fit, Float[np.ndarray, " n"]]:
+    """Return the lines through the beams [start, stop) and their chi-squares; infinite below 3 beams."""
+    cc, cs, ss, xc, xs, qq = sums[:, stop] - sums[:, start]
+    det = cc * ss - cs * cs
+    a = (ss * xc - cs * xs) / det
+    b = (cc * xs - cs * xc) / det
+    chi2 = qq - a * xc - b * xs
+    chi2[stop - start < 3] = np.inf
+    return Fit(a, b, cc, cs, ss), chi2
+
+
+def refit(
+    fit: Fit, beams: Beams, line: Int[np.ndarray, " m"], offsets: Int[np.ndarray, " n"], keep: Float[np.ndarray, " m"]
+) -> tuple[Fit, Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    """Return the maximum-likelihood lines near `fit` (one Gauss-Newton step in range), residuals m and leverages.
+
+    `beams` are grouped by `line`, each group starting at `offsets`; `keep` is 1/sigma^2 for beams to use, else 0.
+    The derivative of the range p = 1/(a c + b s) is -p^2 (c, s), taken at the prediction: weighting by the measured
+    range instead would bias the line towards the robot.
+    """
+    c, s = beams.cos, beams.sin
+    p = 1.0 / (fit.a[line] * c + fit.b[line] * s)
+    e = p - beams.rho
+    p2 = p * p
+    gc, gs = p2 * c, p2 * s
+    terms = np.empty((5, len(p)))
+    terms[0], terms[1], terms[2], terms[3], terms[4] = gc * gc, gc * gs, gs * gs, gc * e, gs * e
+    terms *= keep
+    cc, cs, ss, xc, xs = np.add.reduceat(terms, offsets, axis=1)
+    det = cc * ss - cs * cs
+    da = (ss * xc - cs * xs) / det
+    db = (cc * xs - cs * xc) / det
+    residual = e - gc * da[line] - gs * db[line]
+    leverage = (ss[line] * gc * gc - 2.0 * cs[line] * gc * gs + cc[line] * gs * gs) * (keep / det[line])
+    return Fit(fit.a + da, fit.b + db, cc, cs, ss), residual, leverage
+
+
+def polar(fit: Fit) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 2"]]:
+    """Return (alpha rad, r m), r > 0, and their first-order covariance J C_ab J' with C_ab the inverse information."""
+    a, b = fit.a, fit.b
+    h2 = a * a + b * b
+    r = 1.0 / np.sqrt(h2)
+    jacobian = np.empty((len(a), 2, 2))
+    jacobian[:, 0, 0], jacobian[:, 0, 1] = -b / h2, a / h2
+    jacobian[:, 1, 0], jacobian[:, 1, 1] = -a * r / h2, -b * r / h2
+    cov_ab = np.empty((len(a), 2, 2))
+    det = fit.cc * fit.ss - fit.cs * fit.cs
+    cov_ab[:, 0, 0], cov_ab[:, 1, 1] = fit.ss / det, fit.cc / det
+    cov_ab[:, 0, 1] = cov_ab[:, 1, 0] = -fit.cs / det
+    return np.stack([np.arctan2(b, a), r], axis=-1), jacobian @ cov_ab @ jacobian.transpose(0, 2, 1)
+
+
+def crossing(
+    a: Float[np.ndarray, " n"], b: Float[np.ndarray, " n"], cos: Float[np.ndarray, " n"], sin: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return how far past the bearing (cos, sin) two lines that differ by (a, b) cross, rad within a quarter turn."""
+    past: np.ndarray = np.arctan((cos * a + sin * b) / (sin * a - cos * b))
+    return past
