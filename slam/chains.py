@@ -1,12 +1,29 @@
 """Segments joined end to end: chains, their open ends, closed contours (paper, sections 2 and 2.2)."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
+from scipy.spatial import cKDTree
+
+from .geometry.lines import intersect
+from .stochastic_map import StochasticMap
 
 TAIL, HEAD = 0, 1
 """The two ends of a wall: walking from tail to head, the free side is on the left."""
+
+
+@dataclass(frozen=True)
+class ChainConfig:
+    """When the head of one wall and the tail of another are one corner."""
+
+    reach_m: float = 0.1
+    """Largest distance between two ends that are joined while the robot still explores them."""
+    set_aside_reach_m: float = 0.35
+    """The same for two ends that exploration looked at closely and set aside."""
+    corner_reach_m: float = 0.3
+    """A corner is the intersection of the two lines where that lies this near to both ends, else their middle."""
 
 
 @dataclass(frozen=True)
@@ -36,3 +53,99 @@ class Chain:
     def is_closed(self) -> bool:
         """Whether the chain surrounds a contour."""
         return not self.open_ends
+
+
+def connect(
+    walls: StochasticMap,
+    set_aside: Collection[tuple[int, int]] = (),
+    config: ChainConfig = ChainConfig(),
+) -> tuple[Chain, ...]:
+    """Join heads to tails, nearest first, and return the chains in the order of their oldest wall.
+
+    Free side on the left throughout, so a head joins only a tail. `set_aside` holds (wall id, side) of ends that
+    were looked at closely: two of these may join across a wider gap (a missed short face).
+    """
+    rows = np.flatnonzero(~walls.tentative)
+    if not len(rows):
+        return ()
+    ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
+    successor = _links(ends, ids, set_aside, config)
+    return tuple(_chain(run, closed, ends, lines, ids, config) for run, closed in _runs(successor))
+
+
+def _links(
+    ends: Float[np.ndarray, "n 2 2"],
+    ids: Int[np.ndarray, " n"],
+    set_aside: Collection[tuple[int, int]],
+    config: ChainConfig,
+) -> Int[np.ndarray, " n"]:
+    """Return the row of each wall's successor, -1 for none: greedily, nearest ends first."""
+    near = cKDTree(ends[:, HEAD]).sparse_distance_matrix(
+        cKDTree(ends[:, TAIL]), max(config.reach_m, config.set_aside_reach_m), output_type="ndarray"
+    )
+    head, tail, gap = near["i"], near["j"], near["v"]
+    aside = np.array([[(int(i), side) in set_aside for side in (TAIL, HEAD)] for i in ids]).reshape(-1, 2)
+    both_aside = aside[head, HEAD] & aside[tail, TAIL]
+    allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
+    order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
+    successor = np.full(len(ids), -1)
+    taken = np.zeros(len(ids), dtype=bool)
+    for k in order:
+        if successor[head[k]] < 0 and not taken[tail[k]]:
+            successor[head[k]] = tail[k]
+            taken[tail[k]] = True
+    return successor
+
+
+def _runs(successor: Int[np.ndarray, " n"]) -> list[tuple[list[int], bool]]:
+    """Follow the links: rows of each chain in order, and whether it is closed."""
+    has_predecessor = np.zeros(len(successor), dtype=bool)
+    has_predecessor[successor[successor >= 0]] = True
+    following = successor.tolist()
+    done = [False] * len(following)
+    runs: list[tuple[list[int], bool]] = []
+    for start in [*np.flatnonzero(~has_predecessor).tolist(), *range(len(following))]:
+        if done[start]:
+            continue
+        run, row = [], start
+        while row >= 0 and not done[row]:
+            done[row] = True
+            run.append(row)
+            row = following[row]
+        runs.append((run, row == start))
+    return sorted(runs, key=lambda item: min(item[0]))
+
+
+def _chain(
+    run: list[int],
+    closed: bool,
+    ends: Float[np.ndarray, "n 2 2"],
+    lines: Float[np.ndarray, "n 2"],
+    ids: Int[np.ndarray, " n"],
+    config: ChainConfig,
+) -> Chain:
+    before = np.array(run if closed else run[:-1], dtype=np.int64)
+    after = np.array(run[1:] + run[:1] if closed else run[1:], dtype=np.int64)
+    corners = corner_points(lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], config.corner_reach_m)
+    open_ends = (
+        ()
+        if closed
+        else (
+            OpenEnd(int(ids[run[0]]), TAIL, ends[run[0], TAIL]),
+            OpenEnd(int(ids[run[-1]]), HEAD, ends[run[-1], HEAD]),
+        )
+    )
+    return Chain(tuple(int(ids[row]) for row in run), corners, open_ends)
+
+
+def corner_points(
+    lines_before: Float[np.ndarray, "n 2"],
+    lines_after: Float[np.ndarray, "n 2"],
+    heads: Float[np.ndarray, "n 2"],
+    tails: Float[np.ndarray, "n 2"],
+    reach_m: float,
+) -> Float[np.ndarray, "n 2"]:
+    """Return where neighbouring walls meet: the intersection of their lines if it lies near both ends."""
+    crossing, parallel = intersect(lines_before, lines_after)
+    far = np.maximum(np.hypot(*(crossing - heads).T), np.hypot(*(crossing - tails).T)) > reach_m
+    return np.where((parallel | far)[:, None], 0.5 * (heads + tails), crossing)

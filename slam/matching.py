@@ -1,9 +1,38 @@
-"""Which wall of the map each segment of a scan belongs to (paper, section 2.1)."""
+"""Which wall of the map each segment of a scan belongs to (paper, section 2.1).
+
+A chi-square gate on the joint covariance of the pose and the lines, an overlap along the line (so that the two walls
+beside a door stay two), and the side from which each was seen (so that two faces of a thin wall stay two).
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
+from scipy.stats import chi2
+
+from .backend import Joint, Observations
+from .geometry.lines import directions, normals
+from .geometry.poses import to_world
+from .models import Innovations, innovations
+from .segments import Segments
+
+
+@dataclass(frozen=True)
+class MatchingConfig:
+    """When a segment and a wall are one."""
+
+    gate: float = 0.99
+    """Probability level of the chi-square gate."""
+    doubt: float = 0.999999
+    """A segment beyond the gate but within this level of a wall that it overlaps is neither fused nor made a wall."""
+    angle_rad: float = 0.35
+    """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
+    offset_m: float = 0.5
+    """Nor are lines that stand further apart than this at the seen piece."""
+    gap_m: float = 0.2
+    """Largest gap along the line between a segment and the known extent of its wall."""
+    clear_ratio: float = 9.0
+    """A first match is clear when the second-best wall is this many times farther (squared Mahalanobis distance)."""
 
 
 @dataclass(frozen=True)
@@ -12,7 +41,211 @@ class Matches:
 
     pairs: Int[np.ndarray, "m 2"]
     """Rows (index of the segment, id of the wall)."""
+    distances: Float[np.ndarray, " m"]
+    """Squared Mahalanobis distance of each pair."""
+    bridges: Int[np.ndarray, "b 2"]
+    """Pairs of walls that one segment lies on, overlapping both: perhaps one wall entered twice."""
     unmatched: Int[np.ndarray, " u"]
     """Indices of the segments that belong to no wall."""
+    doubtful: Int[np.ndarray, " d"]
+    """Those of the unmatched that lie too near a wall to be a new one."""
     refusals: dict[int, str]
-    """For each unmatched segment, why its nearest wall was refused."""
+    """For each unmatched segment with a wall near it, why that wall was refused."""
+
+    def observations(self, segments: Segments) -> Observations:
+        """Return the matched segments as observations of their walls."""
+        rows = self.pairs[:, 0]
+        return Observations(self.pairs[:, 1], segments.lines[rows], segments.cov[rows])
+
+
+NO_MATCHES = Matches(
+    np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros((0, 2), dtype=np.int64),
+    np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), {},
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Pairs of segment and line that may be one, with what the filter says of each."""
+
+    segment: Int[np.ndarray, " c"]
+    line: Int[np.ndarray, " c"]
+    model: Innovations
+    d2: Float[np.ndarray, " c"]
+    gap: Float[np.ndarray, " c"]
+
+
+def match(
+    segments: Segments,
+    ids: Int[np.ndarray, " n"],
+    extents: Float[np.ndarray, "n 2"],
+    joint: Joint,
+    config: MatchingConfig = MatchingConfig(),
+    *,
+    clear_only: bool = False,
+) -> Matches:
+    """Match segments to the lines of `joint`, whose ids and extents are given in the same order.
+
+    With `clear_only`, keep only segments with one candidate that stands out, and of these only a jointly
+    compatible set: what is safe enough to relocate the robot by.
+    """
+    count = len(segments)
+    if not len(ids) or not count:
+        return Matches(
+            NO_MATCHES.pairs, NO_MATCHES.distances, NO_MATCHES.bridges,
+            np.arange(count), NO_MATCHES.doubtful, {},
+        )  # fmt: skip
+    found = _candidates(segments, extents, joint, config)
+    level = chi2.ppf(config.gate, 2)
+    fits = (found.d2 <= level) & (found.gap <= config.gap_m)
+    best = np.full(count, -1)
+    order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
+    best[found.segment[order]] = order
+    chosen = best[best >= 0]
+    if clear_only:
+        chosen = _compatible(_clear(found, chosen, fits, config), found, joint, config)
+    matched = np.zeros(count, dtype=bool)
+    matched[found.segment[chosen]] = True
+    doubt = (found.d2 <= chi2.ppf(config.doubt, 2)) & (found.gap <= 0.0)
+    doubtful = np.zeros(count, dtype=bool)
+    doubtful[found.segment[doubt]] = True
+    return Matches(
+        np.stack([found.segment[chosen], ids[found.line[chosen]]], axis=-1),
+        found.d2[chosen],
+        ids[_bridges(found, chosen, fits)],
+        np.flatnonzero(~matched),
+        np.flatnonzero(~matched & doubtful),
+        _refusals(found, ids, ~matched, level, config),
+    )
+
+
+def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
+    """Condition the joint Gaussian on observations of some of its lines (paper, step 3), as a pure function."""
+    if not len(observed.ids):
+        return joint
+    rows = np.searchsorted(ids, observed.ids)
+    model = innovations(
+        joint.mean[:3], joint.anchors[rows], joint.mean[3:].reshape(-1, 2)[rows], observed.lines, observed.cov
+    )
+    H, R = _stack(model, rows, len(joint.mean))
+    PHt = joint.cov @ H.T
+    gain = np.linalg.solve(H @ PHt + R, PHt.T).T
+    return Joint(joint.mean + gain @ model.e.ravel(), joint.cov - gain @ PHt.T, joint.anchors)
+
+
+def _candidates(
+    segments: Segments, extents: Float[np.ndarray, "n 2"], joint: Joint, config: MatchingConfig
+) -> _Candidates:
+    pose, means = joint.mean[:3], joint.mean[3:].reshape(-1, 2)
+    alpha_world = segments.lines[:, 0] + pose[2]
+    turned = alpha_world[:, None] - means[:, 0]
+    segment, line = np.nonzero(np.cos(turned) > np.cos(config.angle_rad))
+    model = innovations(pose, joint.anchors[line], means[line], segments.lines[segment], segments.cov[segment])
+    near = np.abs(model.e[:, 1]) < config.offset_m
+    segment, line = segment[near], line[near]
+    model = Innovations(model.e[near], model.H_pose[near], model.H_line[near], model.R[near])
+    ends_world = to_world(segments.ends[segment], pose)
+    along = np.sum((ends_world - joint.anchors[line][:, None]) * directions(means[line, 0])[:, None], axis=-1)
+    gap = np.maximum(along.min(axis=1) - extents[line, 1], extents[line, 0] - along.max(axis=1))
+    return _Candidates(segment, line, model, _distances(model, line, joint), gap)
+
+
+def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) -> Float[np.ndarray, " c"]:
+    """Squared Mahalanobis distance of each pair, from the joint covariance of pose and line."""
+    columns = 3 + 2 * line[:, None] + np.arange(2)
+    pose_line = joint.cov[:3][:, columns].transpose(1, 0, 2)
+    line_line = joint.cov[columns[:, :, None], columns[:, None, :]]
+    cross = model.H_pose @ pose_line @ model.H_line.swapaxes(1, 2)
+    S = model.H_pose @ joint.cov[:3, :3] @ model.H_pose.swapaxes(1, 2) + cross + cross.swapaxes(1, 2)
+    S += model.H_line @ line_line @ model.H_line.swapaxes(1, 2) + model.R
+    det = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] * S[:, 1, 0]
+    e0, e1 = model.e[:, 0], model.e[:, 1]
+    return (S[:, 1, 1] * e0**2 - 2 * S[:, 0, 1] * e0 * e1 + S[:, 0, 0] * e1**2) / det
+
+
+def _clear(
+    found: _Candidates, chosen: Int[np.ndarray, " m"], fits: np.ndarray, config: MatchingConfig
+) -> Int[np.ndarray, " k"]:
+    """Keep the pairs whose segment has no other wall nearly as close."""
+    keep = []
+    for pair in chosen:
+        rivals = fits & (found.segment == found.segment[pair])
+        rivals[pair] = False
+        if not np.any(found.d2[rivals] < config.clear_ratio * max(found.d2[pair], 1.0)):
+            keep.append(pair)
+    return np.array(keep, dtype=np.int64)
+
+
+def _compatible(
+    chosen: Int[np.ndarray, " m"], found: _Candidates, joint: Joint, config: MatchingConfig
+) -> Int[np.ndarray, " k"]:
+    """Drop pairs, the worst first, until the whole set passes the gate on its joint innovation."""
+    while len(chosen) > 1:
+        model = Innovations(
+            found.model.e[chosen], found.model.H_pose[chosen], found.model.H_line[chosen], found.model.R[chosen]
+        )
+        H, R = _stack(model, found.line[chosen], len(joint.mean))
+        S = H @ joint.cov @ H.T + R
+        weighted = np.linalg.solve(S, model.e.ravel())
+        if model.e.ravel() @ weighted <= chi2.ppf(config.gate, 2 * len(chosen)):
+            break
+        # What the sum of squares loses when one pair is left out: e' S^-1 of its block of the inverse.
+        inverse = np.linalg.inv(S)
+        losses = [
+            weighted[2 * i : 2 * i + 2]
+            @ np.linalg.solve(inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2], weighted[2 * i : 2 * i + 2])
+            for i in range(len(chosen))
+        ]
+        chosen = np.delete(chosen, int(np.argmax(losses)))
+    return chosen
+
+
+def _stack(
+    model: Innovations, rows: Int[np.ndarray, " m"], size: int
+) -> tuple[Float[np.ndarray, "k s"], Float[np.ndarray, "k k"]]:
+    """Return the dense Jacobian and noise of a few innovations."""
+    m = len(rows)
+    H, R = np.zeros((m, 2, size)), np.zeros((m, 2, m, 2))
+    H[:, :, :3] = model.H_pose
+    each = np.arange(m)
+    for k in range(2):
+        H[each, :, 3 + 2 * rows + k] = model.H_line[:, :, k]
+    R[each, :, each, :] = model.R
+    return H.reshape(2 * m, size), R.reshape(2 * m, 2 * m)
+
+
+def _bridges(found: _Candidates, chosen: Int[np.ndarray, " m"], fits: np.ndarray) -> Int[np.ndarray, "b 2"]:
+    """Rows of line pairs that one matched segment overlaps both."""
+    pairs = []
+    for pair in chosen:
+        others = np.flatnonzero(fits & (found.segment == found.segment[pair]) & (found.gap < -0.05))
+        pairs += [(found.line[pair], found.line[k]) for k in others if k != pair and found.gap[pair] < -0.05]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _refusals(
+    found: _Candidates, ids: Int[np.ndarray, " n"], unmatched: np.ndarray, level: float, config: MatchingConfig
+) -> dict[int, str]:
+    reasons: dict[int, str] = {}
+    order = np.argsort(-found.d2, kind="stable")
+    for pair in order[unmatched[found.segment[order]]]:
+        wall, d2, gap = ids[found.line[pair]], found.d2[pair], found.gap[pair]
+        if gap > config.gap_m:
+            why = f"{gap:.2f} m beyond the end of wall {wall} (limit {config.gap_m:.2f} m)"
+        elif d2 > level:
+            why = f"squared distance {d2:.1f} from wall {wall} (gate {level:.1f})"
+        else:
+            why = f"wall {wall} is not the only one that fits"
+        reasons[int(found.segment[pair])] = why
+    return reasons
+
+
+def same_line(joint: Joint, gate: float) -> bool:
+    """Whether the two lines of a joint Gaussian may be one, by the chi-square gate on their difference."""
+    (alpha_a, d_a), (alpha_b, d_b) = joint.mean[3:].reshape(2, 2)
+    shift = joint.anchors[1] - joint.anchors[0]
+    lever = directions(alpha_b) @ shift
+    e = np.array([np.sin(alpha_b - alpha_a), d_b + normals(alpha_b) @ shift - d_a])
+    D = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, lever, 1.0]])
+    S = D @ joint.cov[3:, 3:] @ D.T + 1e-12 * np.eye(2)
+    return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= chi2.ppf(gate, 2))

@@ -1,0 +1,134 @@
+"""From a path to one safe motion command; safe by the raw scan, also where the map is wrong."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.geometry.poses import arc, to_robot, wrap
+from slam.robot import MotionCommand, Scan
+
+from .free_space import FreeSpace
+from .paths import Path, Planner
+
+
+@dataclass(frozen=True)
+class DrivingConfig:
+    """How fast one step goes, and how near to a return it may bring the disc."""
+
+    step_m: float = 0.15
+    """Longest step."""
+    turn_rad: float = float(np.deg2rad(10.0))
+    """Widest turn of one step."""
+    spin_rad: float = float(np.deg2rad(30.0))
+    """With more than this to turn, the robot turns on the spot first."""
+    lookahead_m: float = 0.6
+    """How far ahead on its path the robot aims."""
+    radius_m: float = 0.2
+    """The robot's disc."""
+    margin_m: float = 0.015
+    """Least distance kept between disc and returns, unless the step leads away from them."""
+    careful_m: float = 0.05
+    """Longest step onto floor that was not seen yet."""
+    arrived_m: float = 0.08
+    """The end of the path counts as reached within this."""
+
+
+class Pilot:
+    """Drives along one path."""
+
+    def __init__(self, path: Path, planner: Planner, config: DrivingConfig) -> None:
+        self._points = path.points_world
+        self._planner, self._config = planner, config
+        self._at = 0
+
+    @property
+    def remaining_m(self) -> float:
+        """Length of the path from the nearest point on it to its end."""
+        ahead = np.diff(self._points[self._at :], axis=0)
+        return float(np.sum(np.hypot(ahead[:, 0], ahead[:, 1])))
+
+    @property
+    def destination_world(self) -> Float[np.ndarray, "2"]:
+        """Where the path ends, m."""
+        return self._points[-1]
+
+    def arrived(self, pose_world: Float[np.ndarray, "3"]) -> bool:
+        """Return whether the robot stands at the end of the path."""
+        return float(np.hypot(*(self._points[-1] - pose_world[:2]))) < self._config.arrived_m
+
+    def is_obstructed(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> bool:
+        """Return whether a return of this scan lies on the next metre of the path."""
+        ahead = self._points[self._at : self._at + 20]
+        gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
+        return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.radius_m
+
+    def command(
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, free_space: FreeSpace
+    ) -> MotionCommand | None:
+        """Return the next step along the path, or None where no safe one leads on."""
+        aim = to_robot(self._aim(pose_world[:2])[None], pose_world)[0]
+        error, distance = float(np.arctan2(aim[1], aim[0])), float(np.hypot(aim[0], aim[1]))
+        turn = float(np.clip(error, -self._config.turn_rad, self._config.turn_rad))
+        if abs(error) > self._config.spin_rad:
+            return MotionCommand(0.0, turn)
+        forward = min(self._config.step_m * (1.0 - 0.8 * abs(error) / self._config.spin_rad), distance)
+        points = returns(scan)
+        for share in (1.0, 0.5, 0.25):
+            command = MotionCommand(share * forward, turn)
+            if _is_safe(command, points, self._config):
+                return self._careful(command, pose_world, free_space)
+        return MotionCommand(0.0, turn) if abs(turn) > 0.02 else None
+
+    def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """The farthest point of the path within the lookahead to which the straight way is clear."""
+        gaps = np.hypot(*(self._points[self._at : self._at + 40] - position_world).T)
+        self._at += int(np.argmin(gaps))
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._points[self._at :], axis=0).T))])
+        last = int(np.searchsorted(along, self._config.lookahead_m, side="right")) - 1
+        for row in range(last, 0, -1):
+            if self._planner.clear_ahead(position_world, self._points[self._at + row]):
+                return self._points[self._at + row]
+        return self._points[min(self._at + 2, len(self._points) - 1)]
+
+    def _careful(
+        self, command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace
+    ) -> MotionCommand:
+        """Shorten a step whose end would cover floor that was not seen yet."""
+        x, y, _ = arc(command.forward_m, command.turn_rad)
+        c, s = np.cos(pose_world[2]), np.sin(pose_world[2])
+        end = pose_world[:2] + np.array([c * x - s * y, s * x + c * y])
+        if np.any(free_space.unknown_at(end + self._config.radius_m * _RIM)):
+            return MotionCommand(min(command.forward_m, self._config.careful_m), command.turn_rad)
+        return command
+
+
+_RIM = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=-1)
+
+
+def returns(scan: Scan) -> Float[np.ndarray, "m 2"]:
+    """Return the points that the scan hit, robot frame, m."""
+    hit = np.isfinite(scan.ranges_m)
+    bearing, distance = scan.bearings_rad[hit], scan.ranges_m[hit]
+    return np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
+
+
+def _is_safe(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> bool:
+    """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
+    if not len(points_robot):
+        return True
+    near = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.step_m + 0.1]
+    if not len(near):
+        return True
+    places = np.stack([arc(share * command.forward_m, share * command.turn_rad)[:2] for share in (0.25, 0.5, 0.75, 1)])
+    gap = near - places[:, None]
+    least = float(np.hypot(gap[..., 0], gap[..., 1]).min())
+    now = float(np.hypot(near[:, 0], near[:, 1]).min())
+    limit = config.radius_m + config.margin_m
+    return least >= limit or (least >= now and least > config.radius_m)
+
+
+def heading_to(pose_world: Float[np.ndarray, "3"], target_world: Float[np.ndarray, "2"]) -> float:
+    """Return how far the robot has to turn to face a place, rad."""
+    way = target_world - pose_world[:2]
+    return float(wrap(np.arctan2(way[1], way[0]) - pose_world[2]))

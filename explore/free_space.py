@@ -1,0 +1,184 @@
+"""What the scans have seen free and what they have hit, on a grid at the estimated poses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt
+
+from slam.geometry.poses import to_world
+from slam.robot import Scan
+
+_Box = tuple[int, int, int, int]
+"""First and end row, first and end column."""
+
+
+@dataclass(frozen=True)
+class FreeSpaceConfig:
+    """The grid and how evidence gathers in it."""
+
+    cell_m: float = 0.05
+    hit: int = 3
+    """What one hit adds to a cell; a beam that passes takes one away."""
+    limit: int = 6
+    """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
+    body_m: float = 0.2
+    """Floor this near to the robot is free: it stands there."""
+    clearance_limit_m: float = 1.0
+    """Clearances are exact up to here; beyond, they are at least this."""
+
+
+class FreeSpace:
+    """Evidence per cell: negative is free, positive is occupied, zero is unknown. Row is y, column is x."""
+
+    def __init__(self, config: FreeSpaceConfig = FreeSpaceConfig()) -> None:
+        self.config = config
+        self._evidence = np.zeros((0, 0), dtype=np.int8)
+        self._clearance = np.zeros((0, 0), dtype=np.float32)
+        self._first = np.zeros(2, dtype=np.int64)
+        self._dirty: _Box | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the grid."""
+        return self._evidence.shape[0], self._evidence.shape[1]
+
+    @property
+    def evidence(self) -> Int[np.ndarray, "h w"]:
+        """The grid itself, to be read only: negative is free, positive is occupied, zero is unknown."""
+        return self._evidence
+
+    def is_free(self, box: tuple[slice, slice]) -> Bool[np.ndarray, "h w"]:
+        """Return which cells of a part of the grid were seen free."""
+        return self._evidence[box] < 0
+
+    @property
+    def origin_world(self) -> Float[np.ndarray, "2"]:
+        """The lower left corner of the grid, m."""
+        return self._first * self.config.cell_m
+
+    def cells(self, points_world: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
+        """Return (row, column) of points; cells outside the grid have indices outside it."""
+        index = np.floor(points_world / self.config.cell_m).astype(np.int64) - self._first
+        return index[..., ::-1]
+
+    def points(self, cells: Int[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Return the centres of cells (row, column), world frame, m."""
+        return (cells[..., ::-1] + self._first + 0.5) * self.config.cell_m
+
+    def inside(self, cells: Int[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
+        """Return which cells lie on the grid."""
+        return np.all((cells >= 0) & (cells < self._evidence.shape), axis=-1)
+
+    def unknown_at(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return which points lie on floor that was never seen."""
+        cells = self.cells(points_world)
+        on_grid = self.inside(cells)
+        unknown = np.ones(len(cells), dtype=bool)
+        unknown[on_grid] = self._evidence[tuple(cells[on_grid].T)] == 0
+        return unknown
+
+    def clearance(self) -> Float[np.ndarray, "h w"]:
+        """Return the distance from each cell to the nearest occupied one, m, up to the configured limit."""
+        if self._dirty is not None:
+            limit = self.config.clearance_limit_m
+            pad = int(np.ceil(limit / self.config.cell_m)) + 1
+            inner, outer = (_grown(self._dirty, k * pad, self._evidence.shape) for k in (1, 2))
+            occupied = self._evidence[_slices(outer)] > 0
+            distance = np.full(occupied.shape, limit, dtype=np.float32)
+            if occupied.any():
+                distance = np.minimum(distance_transform_edt(~occupied, sampling=self.config.cell_m), limit)
+            self._clearance[_slices(inner)] = distance[_slices(inner, outer)]
+            self._dirty = None
+        return self._clearance
+
+    def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
+        """Take in one scan at an estimated pose."""
+        cell = self.config.cell_m
+        self._reserve(pose_world[:2], scan.range_max_m + 2 * cell)
+        half = int(np.ceil(scan.range_max_m / cell)) + 1
+        here = self.cells(pose_world[None, :2])[0]
+        rows, columns = slice(here[0] - half, here[0] + half + 1), slice(here[1] - half, here[1] + half + 1)
+        free = self._seen_free(pose_world, scan, here, half)
+        window = self._evidence[rows, columns]
+        returned = np.isfinite(scan.ranges_m)
+        directions = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)[returned]
+        hits = self.cells(to_world(directions * scan.ranges_m[returned, None], pose_world)) - here + half
+        hits = hits[np.all((hits >= 0) & (hits < window.shape), axis=-1)]
+        free[tuple(hits.T)] = False
+        change = -free.astype(np.int8)
+        change[tuple(hits.T)] = self.config.hit
+        before = window > 0
+        np.clip(window + change, -self.config.limit, self.config.limit, out=window)
+        changed = np.nonzero((window > 0) != before)
+        if len(changed[0]):
+            self._mark(
+                rows.start + changed[0].min(), rows.start + changed[0].max() + 1,
+                columns.start + changed[1].min(), columns.start + changed[1].max() + 1,
+            )  # fmt: skip
+
+    def _seen_free(
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, here: Int[np.ndarray, "2"], half: int
+    ) -> Bool[np.ndarray, "w w"]:
+        """Cells of the window around `here` that lie before the nearer of the two beams beside them."""
+        offset = self.points(here[None])[0] - pose_world[:2]
+        axis = np.arange(-half, half + 1) * self.config.cell_m
+        x, y = (axis + offset[0]).astype(np.float32), (axis + offset[1]).astype(np.float32)
+        distance = np.hypot(x[None, :], y[:, None])
+        k = len(scan.bearings_rad)
+        step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (k - 1)
+        bearing = np.arctan2(y[:, None], x[None, :]) - np.float32(pose_world[2] + scan.bearings_rad[0])
+        beam = np.floor(np.mod(bearing, np.float32(2 * np.pi)) / np.float32(step)).astype(np.int64)
+        reach = self._reach(scan) - 0.71 * self.config.cell_m
+        between = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1.0, dtype=np.float32)
+        between[: k - 1] = np.minimum(reach[:-1], reach[1:])
+        if scan.is_full_turn:
+            between[k - 1 :] = min(reach[-1], reach[0])
+        return (distance < between[beam]) | (distance < self.config.body_m)
+
+    @staticmethod
+    def _reach(scan: Scan) -> Float[np.ndarray, " k"]:
+        """How far each beam shows free floor; a lone missing return may be a fault, so its neighbours speak for it."""
+        ranges = np.where(np.isfinite(scan.ranges_m), scan.ranges_m, scan.range_max_m)
+        missing = ~np.isfinite(scan.ranges_m)
+        alone = missing & ~np.roll(missing, 1) & ~np.roll(missing, -1)
+        neighbours = np.minimum(np.roll(ranges, 1), np.roll(ranges, -1))
+        return np.where(alone, neighbours, ranges)
+
+    def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
+        """Grow the grid, with room to spare, until it holds everything within reach."""
+        reach = int(np.ceil(reach_m / self.config.cell_m)) + 1
+        at = np.floor(centre_world / self.config.cell_m).astype(np.int64)
+        low, high = at - reach, at + reach + 1
+        old_first, old_end = self._first, self._first + self._evidence.shape[::-1]
+        if self._evidence.size == 0:
+            old_first = old_end = at
+        if np.all(low >= old_first) and np.all(high <= old_end):
+            return
+        spare = reach
+        first = np.where(low < old_first, low - spare, old_first)
+        end = np.where(high > old_end, high + spare, old_end)
+        shape = tuple((end - first)[::-1])
+        evidence = np.zeros(shape, dtype=np.int8)
+        clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
+        if self._evidence.size:
+            c, r = self._first - first
+            place = (slice(r, r + self._evidence.shape[0]), slice(c, c + self._evidence.shape[1]))
+            evidence[place], clearance[place] = self._evidence, self._clearance
+            if self._dirty is not None:
+                r0, r1, c0, c1 = self._dirty
+                self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
+        self._evidence, self._clearance, self._first = evidence, clearance, first
+
+    def _mark(self, r0: int, r1: int, c0: int, c1: int) -> None:
+        """Remember where occupied cells changed since the clearances were computed."""
+        old = self._dirty or (r0, r1, c0, c1)
+        self._dirty = min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1)
+
+
+def _grown(box: _Box, pad: int, shape: tuple[int, ...]) -> _Box:
+    return max(box[0] - pad, 0), min(box[1] + pad, shape[0]), max(box[2] - pad, 0), min(box[3] + pad, shape[1])
+
+
+def _slices(box: _Box, within: _Box = (0, 0, 0, 0)) -> tuple[slice, slice]:
+    return slice(box[0] - within[0], box[1] - within[0]), slice(box[2] - within[2], box[3] - within[2])

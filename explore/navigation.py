@@ -1,0 +1,16 @@
+"""From a goal wall to the sequence of walls that leads there (paper, section 3.2)."""
+
+import networkx as nx
+
+
+def route(graph: nx.DiGraph, here: int | None, goal: int) -> tuple[int, ...]:
+    """Return the walls to follow from the present one to the goal, both included, by the fewest changes of wall.
+
+    Where no way is known the goal stands alone: the robot then looks for one over the free floor.
+    """
+    if here is None or here == goal or here not in graph or goal not in graph:
+        return (goal,)
+    try:
+        return tuple(nx.shortest_path(graph, here, goal))
+    except nx.NetworkXNoPath:
+        return (goal,)

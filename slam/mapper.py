@@ -1,0 +1,154 @@
+"""The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .backend import Backend, Observations
+from .chains import Chain, ChainConfig, connect
+from .extraction import extract
+from .geometry.lines import distance_to_segments
+from .matching import Matches, MatchingConfig, match, relocate, same_line
+from .robot import Odometry, Scan
+from .segments import Segments
+from .stochastic_map import StochasticMap
+from .walls import Walls, WallsConfig
+
+
+@dataclass(frozen=True)
+class MapperConfig:
+    """The rules of the seven steps."""
+
+    matching: MatchingConfig = field(default_factory=MatchingConfig)
+    chains: ChainConfig = field(default_factory=ChainConfig)
+    walls: WallsConfig = field(default_factory=WallsConfig)
+
+
+@dataclass(frozen=True)
+class MapUpdate:
+    """What one scan did to the map."""
+
+    segments: Segments
+    matches: Matches
+    walls_of_segments: Int[np.ndarray, " s"]
+    """For each segment the id of the wall that it was fused into or began; -1 where it was not used."""
+    map: StochasticMap
+    chains: tuple[Chain, ...]
+
+
+Matcher = Callable[..., Matches]
+
+
+class Mapper:
+    """Drives one back end through the seven steps; extractor and matcher may be replaced by oracles."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        config: MapperConfig = MapperConfig(),
+        extractor: Callable[[Scan], Segments] = extract,
+        matcher: Matcher = match,
+    ) -> None:
+        self.backend = backend
+        self.config = config
+        self._extract = extractor
+        self._match = matcher
+        self._walls = Walls(config.walls)
+
+    def predict(self, odometry: Odometry) -> None:
+        """Move the robot's estimate by what the wheels report."""
+        self.backend.predict(odometry)
+
+    def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
+        """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
+        # 1. Extract features from the sensory input.
+        segments = self._extract(scan)
+        # 2. Match observed features to the best fitting equivalents in the map.
+        near = self._nearby(scan)
+        joint = self.backend.belief.joint(near)
+        extents = self._walls.extents(near)
+        clear = self._match(segments, near, extents, joint, self.config.matching, clear_only=True)
+        first = _firm(clear, segments)
+        # 3. Localise the robot with matched features (here as a pure function, to match again).
+        relocated = relocate(joint, near, first)
+        # 4. Match the remaining features with their re-prediction from the new robot pose.
+        matches = _both(clear, segments, self._match, near, extents, relocated, self.config.matching)
+        # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
+        self.backend.update(first, _firm(matches, segments))
+        owners = self._store(scan, segments, matches)
+        self._merge(matches, owners)
+        # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
+        walls = self._walls.map(self.backend.belief)
+        return MapUpdate(segments, matches, owners, walls, connect(walls, set_aside, self.config.chains))
+
+    def _nearby(self, scan: Scan) -> Int[np.ndarray, " n"]:
+        """Ids of the walls that this scan can show."""
+        walls = self._walls.map(self.backend.belief)
+        if not len(walls):
+            return walls.ids
+        distance = distance_to_segments(walls.belief.pose_world[None, :2], walls.ends_world)[0]
+        return walls.ids[distance < scan.range_max_m + self.config.matching.offset_m]
+
+    def _store(self, scan: Scan, segments: Segments, matches: Matches) -> Int[np.ndarray, " s"]:
+        """Grow the map by the segments that belong to no wall, and note how far each wall was seen."""
+        owners = np.full(len(segments), -1, dtype=np.int64)
+        owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
+        owners[segments.is_tentative] = -1
+        fresh = np.setdiff1d(matches.unmatched, matches.doubtful)
+        fresh = fresh[~segments.is_tentative[fresh]]
+        if len(fresh):
+            centres = _seen_centres(segments, fresh)
+            owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
+        forgotten = self._walls.see(self.backend.belief, scan, segments, owners)
+        if len(forgotten):
+            self.backend.remove(forgotten)
+            owners[np.isin(owners, forgotten)] = -1
+        return owners
+
+    def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> None:
+        """Make one of two walls that one segment lies on, if the joint covariance agrees."""
+        for pair in {tuple(sorted(map(int, bridge))) for bridge in matches.bridges}:
+            keep, drop = pair
+            belief = self.backend.belief
+            if np.all(np.isin(pair, belief.ids)) and same_line(belief.joint(pair), self.config.matching.gate):
+                self._walls.merge(belief, keep, drop)
+                self.backend.merge(keep, drop)
+                owners[owners == drop] = keep
+
+
+def _firm(matches: Matches, segments: Segments) -> Observations:
+    """Return the matches that may move the estimate: those of segments that are not tentative."""
+    observed = matches.observations(segments)
+    firm = ~segments.is_tentative[matches.pairs[:, 0]]
+    return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
+
+
+def _both(
+    clear: Matches,
+    segments: Segments,
+    matcher: Matcher,
+    ids: Int[np.ndarray, " n"],
+    extents: Float[np.ndarray, "n 2"],
+    relocated: object,
+    config: MatchingConfig,
+) -> Matches:
+    """Keep the clear matches and match the rest against the relocated prediction."""
+    rest = clear.unmatched
+    again = matcher(segments.take(rest), ids, extents, relocated, config)
+    more = again.pairs.copy()
+    more[:, 0] = rest[more[:, 0]]
+    return Matches(
+        np.concatenate([clear.pairs, more]),
+        np.concatenate([clear.distances, again.distances]),
+        np.concatenate([clear.bridges, again.bridges]),
+        rest[again.unmatched],
+        rest[again.doubtful],
+        {int(rest[k]): why for k, why in again.refusals.items()},
+    )
+
+
+def _seen_centres(segments: Segments, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
+    """Return the middle of each seen piece, robot frame, m."""
+    return 0.5 * (segments.ends[rows, 0] + segments.ends[rows, 1])

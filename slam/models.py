@@ -1,0 +1,141 @@
+"""Motion and line-measurement models with their Jacobians, shared by every back end.
+
+A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world frame; a pose is (p, theta). J is the
+90-degree rotation and n' = J n.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from .geometry.lines import directions, normals
+from .geometry.poses import J, compose, rotation, wrap
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A predicted pose and how it depends on the pose before and on the odometry."""
+
+    pose_world: Float[np.ndarray, "3"]
+    F: Float[np.ndarray, "3 3"]
+    """Derivative by the pose before."""
+    W: Float[np.ndarray, "3 3"]
+    """Derivative by the odometry's motion."""
+
+
+def move(pose_world: Float[np.ndarray, "3"], motion: Float[np.ndarray, "3"]) -> Motion:
+    """Predict the pose after `motion` (robot frame)."""
+    R = rotation(pose_world[2])
+    F, W = np.eye(3), np.eye(3)
+    F[:2, 2] = J @ R @ motion[:2]
+    W[:2, :2] = R
+    return Motion(compose(pose_world, motion), F, W)
+
+
+def lines_robot(
+    pose_world: Float[np.ndarray, "3"], anchors: Float[np.ndarray, "m 2"], means: Float[np.ndarray, "m 2"]
+) -> Float[np.ndarray, "m 2"]:
+    """Predict map lines as (alpha, r) in the robot frame."""
+    alpha = means[:, 0]
+    r = means[:, 1] + np.sum(normals(alpha) * (anchors - pose_world[:2]), axis=-1)
+    return np.stack([wrap(alpha - pose_world[2]), r], axis=-1)
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """How m seen lines differ from m map lines, along and across each line at its own seen piece."""
+
+    e: Float[np.ndarray, "m 2"]
+    """(angle rad, distance of the seen piece's centre from the predicted line m)."""
+    H_pose: Float[np.ndarray, "m 2 3"]
+    """Minus the derivative of e by the pose."""
+    H_line: Float[np.ndarray, "m 2 2"]
+    """Minus the derivative of e by the line."""
+    R: Float[np.ndarray, "m 2 2"]
+    """Covariance of e that comes from the measurement."""
+
+
+def innovations(
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "m 2"],
+    means: Float[np.ndarray, "m 2"],
+    lines: Float[np.ndarray, "m 2"],
+    cov: Float[np.ndarray, "m 2 2"],
+) -> Innovations:
+    """Compare seen lines (alpha, r) with their covariance, robot frame, to map lines, row by row.
+
+    With epsilon the angle between the two and t0 = C_alpha_r / C_alpha_alpha the place of the piece's centre along
+    the seen line, e = (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_predicted): linear in r however far off to one
+    side the piece lies, where the difference in (alpha, r) is not.
+    """
+    alpha = means[:, 0]
+    n, t = normals(alpha), directions(alpha)
+    to_anchor = anchors - pose_world[:2]
+    r_predicted = means[:, 1] + np.sum(n * to_anchor, axis=-1)
+    epsilon = wrap(lines[:, 0] - (alpha - pose_world[2]))
+    t0 = cov[:, 0, 1] / cov[:, 0, 0]
+    cosine, sine = np.cos(epsilon), np.sin(epsilon)
+    along = lines[:, 1] * sine + t0 * cosine
+
+    m = len(lines)
+    e = np.stack([epsilon, lines[:, 1] * cosine - t0 * sine - r_predicted], axis=-1)
+    H_pose = np.zeros((m, 2, 3))
+    H_pose[:, 0, 2] = -1.0
+    H_pose[:, 1, :2] = -n
+    H_pose[:, 1, 2] = along
+    H_line = np.zeros((m, 2, 2))
+    H_line[:, 0, 0] = 1.0
+    H_line[:, 1, 0] = np.sum(t * to_anchor, axis=-1) - along
+    H_line[:, 1, 1] = 1.0
+    M = np.zeros((m, 2, 2))
+    M[:, 0, 0] = 1.0
+    M[:, 1, 0] = -along
+    M[:, 1, 1] = cosine
+    return Innovations(e, H_pose, H_line, M @ cov @ M.swapaxes(1, 2))
+
+
+@dataclass(frozen=True)
+class Growth:
+    """New map lines and how they depend on the pose and on the measurement."""
+
+    anchors: Float[np.ndarray, "m 2"]
+    means: Float[np.ndarray, "m 2"]
+    G_pose: Float[np.ndarray, "m 2 3"]
+    G_line: Float[np.ndarray, "m 2 2"]
+
+
+def grow(
+    pose_world: Float[np.ndarray, "3"],
+    lines: Float[np.ndarray, "m 2"],
+    centres: Float[np.ndarray, "m 2"],
+    at_wall: bool = True,
+) -> Growth:
+    """Turn seen lines (alpha, r), robot frame, into map lines, anchored at their seen centres or at the world's origin.
+
+    Centres are points of the lines in the robot frame, m; the anchors that come of them are constants.
+    """
+    alpha = wrap(lines[:, 0] + pose_world[2])
+    n, t = normals(alpha), directions(alpha)
+    anchors = centres @ rotation(pose_world[2]).T + pose_world[:2] if at_wall else np.zeros_like(centres)
+    to_robot = pose_world[:2] - anchors
+    means = np.stack([alpha, lines[:, 1] + np.sum(n * to_robot, axis=-1)], axis=-1)
+    lever = np.sum(t * to_robot, axis=-1)
+    m = len(lines)
+    G_pose, G_line = np.zeros((m, 2, 3)), np.zeros((m, 2, 2))
+    G_pose[:, 0, 2] = 1.0
+    G_pose[:, 1, :2] = n
+    G_pose[:, 1, 2] = lever
+    G_line[:, 0, 0] = 1.0
+    G_line[:, 1, 0] = lever
+    G_line[:, 1, 1] = 1.0
+    return Growth(anchors, means, G_pose, G_line)
+
+
+def reanchor(
+    mean: Float[np.ndarray, "2"], anchor: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]
+) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"]]:
+    """Express a line about another anchor and return it with the derivative of the change."""
+    shift = anchor - other
+    n, t = normals(mean[0]), directions(mean[0])
+    return np.array([mean[0], mean[1] + n @ shift]), np.array([[1.0, 0.0], [t @ shift, 1.0]])
