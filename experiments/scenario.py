@@ -1,0 +1,114 @@
+"""From the names in a command to a world, a robot, a back end and a strategy."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.mission import MissionConfig
+from explore.strategies import STRATEGIES, Strategy
+from sim.chance import SEED_MAX, Channel, standard_normals
+from sim.robot import RobotConfig, SimulatedRobot
+from sim.worlds import World, WorldError, load
+from slam.backend import Backend
+from slam.backends import BACKENDS
+
+P0 = Literal["zero", "small", "large"]
+P0_SIGMAS: dict[str, tuple[float, float]] = {
+    "zero": (1e-4, 1e-5),
+    "small": (0.01, float(np.deg2rad(0.1))),
+    "large": (0.1, float(np.deg2rad(2.0))),
+}
+"""Standard deviations of the start: position m (each axis), heading rad."""
+
+
+class UsageError(ValueError):
+    """Bad usage or bad input, told in one line: what was expected, what was found, what to do."""
+
+
+@dataclass(frozen=True)
+class TrialConfig:
+    """All that decides a trial: the same values give the same bytes."""
+
+    world: str
+    backend: str = "full-ekf"
+    strategy: str = "nearest-robot"
+    seed: int = 1
+    p0: P0 = "small"
+    errorless: bool = False
+    max_steps: int = 5000
+    start: tuple[float, ...] | None = None
+    """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
+    scale: float | None = None
+    """Metres per pixel or drawing unit, for files that do not state it."""
+    robot: RobotConfig = field(default_factory=RobotConfig)
+    mission: MissionConfig = field(default_factory=MissionConfig)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that a trial needs, built."""
+
+    config: TrialConfig
+    world: World
+    robot: SimulatedRobot
+    backend: Backend
+    strategy: Strategy
+    start_estimate: Float[np.ndarray, "3"]
+    """Where the back end believes to start, world frame, m m rad."""
+    start_cov: Float[np.ndarray, "3 3"]
+
+
+def load_world(name: str, start: tuple[float, ...] | None = None, scale: float | None = None) -> World:
+    """Return a bundled world or one from a file; raises UsageError, in one line, for anything unusable."""
+    try:
+        return load(name, start, scale)
+    except WorldError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise UsageError(
+            f"expected a readable world, found {Path(name).name} ({reason}): name a bundled world or a file"
+        ) from error
+
+
+def choose(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return `name` if it is known; raises UsageError otherwise."""
+    names = list(known)
+    if name not in names:
+        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}: choose one of these")
+    return name
+
+
+def check(config: TrialConfig) -> None:
+    """Raise UsageError for names that are in no registry and numbers out of range, before anything is computed."""
+    choose("back end", config.backend, BACKENDS)
+    choose("strategy", config.strategy, STRATEGIES)
+    choose("start covariance (--p0)", config.p0, P0_SIGMAS)
+    if not 0 <= config.seed <= SEED_MAX:
+        raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")
+    if config.max_steps < 1:
+        raise UsageError(f"expected at least 1 step, found --max-steps {config.max_steps}: raise it")
+
+
+def build(config: TrialConfig, world: World | None = None) -> Scenario:
+    """Build a scenario; `world` saves loading it again. Raises UsageError for bad names and unusable worlds."""
+    check(config)
+    world = world or load_world(config.world, config.start, config.scale)
+    position_m, heading_rad = P0_SIGMAS[config.p0]
+    sigmas = np.array([position_m, position_m, heading_rad])
+    draw = np.zeros(3) if config.errorless else standard_normals(config.seed, Channel.START, 0, 3)
+    start = np.asarray(world.start, dtype=np.float64) + sigmas * draw
+    cov = np.diag(sigmas**2)
+    return Scenario(
+        config,
+        world,
+        SimulatedRobot(world, config.seed, config.errorless, config.robot),
+        BACKENDS[config.backend].make(start.copy(), cov.copy()),
+        STRATEGIES[config.strategy].make(),
+        start,
+        cov,
+    )

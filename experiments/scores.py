@@ -1,0 +1,159 @@
+"""The keys of summary.json, as DESIGN.md section 6 defines them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from explore.step import Step
+from slam.backend import Joint
+from slam.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
+from slam.geometry.poses import compose, to_world, wrap
+
+from .association import Votes, duplicate_lines
+from .corners import corners, label_distances
+from .coverage import NEAR_M, NEAR_NOISY_M, alignment, closed_contours, coverage, sample
+from .records import Log
+from .scenario import Scenario
+from .swept import swept
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended."""
+
+    status: str
+    """`complete`, `stopped` or `failed`."""
+    reason: str
+    exit_status: int
+    traceback: str = ""
+
+
+def pose_nees(log: Log) -> Float[np.ndarray, " s"]:
+    """Return the NEES of the invariant pose error at each step; NaN where a covariance is not positive definite."""
+    errors = pose_errors(log.estimated_world, log.true_world)
+    covs = pose_covariances(log.estimated_world, log.estimated_cov)
+    values = np.full(len(log), np.nan)
+    for i, (error, cov) in enumerate(zip(errors, covs, strict=True)):
+        try:
+            values[i] = nees(error[None], cov[None])[0]
+        except np.linalg.LinAlgError:
+            continue
+    return values
+
+
+def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
+    """Return where the wheels alone, from the true start on, say the robot was."""
+    poses = [log.true_world[0]]
+    for motion in log.odometry[1:]:
+        poses.append(compose(poses[-1], motion))
+    return np.array(poses)
+
+
+def summarise(
+    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, ending: Ending
+) -> dict[str, Any]:
+    """Return every key of summary.json; null where there is nothing to measure."""
+    config = scenario.config
+    return {
+        "world": scenario.world.name,
+        "backend": config.backend,
+        "strategy": config.strategy,
+        "seed": config.seed,
+        "p0": config.p0,
+        "errorless": config.errorless,
+        "status": ending.status,
+        "reason": ending.reason,
+        "steps": len(log),
+        "path_length_m": float(log.path_length_m[-1]),
+        "path_length_true_m": scenario.robot.record.path_length_m,
+        "drive_time_s": scenario.robot.record.drive_time_s,
+        "collisions": scenario.robot.record.collisions,
+        "open_ends": int(log.open_ends[-1]),
+        "set_aside": [
+            {"wall": int(end.wall), "side": int(end.side), "position_m": end.position_world.tolist(), "why": end.reason}
+            for end in step.set_aside
+        ],
+        **_map_scores(scenario, log, votes, step, joint),
+        **_pose_scores(log, config.errorless),
+        "step_ms": _step_ms(log),
+    }
+
+
+def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:
+    off = log.estimated_world - log.true_world
+    wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)
+    scores: dict[str, Any] = {
+        "pose_rmse_m": float(np.sqrt(np.mean(np.sum(off[:, :2] ** 2, axis=1)))),
+        "heading_rmse_rad": float(np.sqrt(np.mean(wrap(off[:, 2]) ** 2))),
+        "odometry_rmse_m": float(np.sqrt(np.mean(wheels**2))),
+        "odometry_max_m": float(wheels.max()),
+        "odometry_end_m": float(wheels[-1]),
+        "pose_anees": None,
+        "pose_nees_in_band": None,
+    }
+    values = pose_nees(log)
+    if not errorless and np.all(np.isfinite(values)):
+        scores |= {"pose_anees": anees(values, 3), "pose_nees_in_band": share_in_band(values, 3)}
+    return scores
+
+
+def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None) -> dict[str, Any]:
+    truth, walls = votes.truth, step.map
+    errorless = scenario.config.errorless
+    near = NEAR_M if errorless else NEAR_NOISY_M
+    to_true = alignment(scenario.start_estimate, log.true_world[0])
+    samples = sample(truth)
+    aligned = to_world(walls.ends_world, to_true)
+    labels = votes.walls_of(walls.ids)
+    firm = ~walls.tentative
+    return {
+        "lines": len(walls),
+        "lines_tentative": int(np.count_nonzero(~firm)),
+        "lines_unlabelled": int(np.count_nonzero(firm & (labels < 0))),
+        "contours_closed": len(closed_contours(samples, walls, step.chains, votes, to_true, near)),
+        "contours_reachable": truth.contour.contours,
+        "chains_closed": int(log.closed_chains[-1]),
+        "chains_open": len(step.chains) - int(log.closed_chains[-1]),
+        "coverage": coverage(samples, aligned[firm], near),
+        "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
+        "map_anees": None if errorless else map_anees(votes, step, joint, log.true_world[-1], firm & (labels >= 0)),
+        "duplicate_lines": duplicate_lines(walls, labels, firm),
+        "false_matches": votes.false_matches(),
+        "distances": label_distances(corners(walls, step.chains), scenario.world.labels, to_true, joint),
+    }
+
+
+def map_anees(
+    votes: Votes,
+    step: Step,
+    joint: Joint | None,
+    true_pose_world: Float[np.ndarray, "3"],
+    among: Bool[np.ndarray, " n"],
+) -> float | None:
+    """Return the joint NEES of the chosen walls over its dimension, in the invariant error; null where it has none.
+
+    Each wall is held against the true face from which most of its beams came; duplicates stay, and a covariance
+    that is not positive definite gives null instead of a pseudo-inverse.
+    """
+    rows = np.flatnonzero(among)
+    if joint is None or not len(rows):
+        return None
+    lines = votes.truth.lines[np.maximum(votes.faces_of(step.map.ids), 0)]
+    error, cov = joint_error(joint, true_pose_world, lines)
+    index = (3 + 2 * rows[:, None] + np.arange(2)).ravel()
+    try:
+        return float(nees(error[None, index], cov[None][:, index[:, None], index])[0]) / len(index)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _step_ms(log: Log) -> dict[str, float]:
+    ms = 1e3 * log.seconds
+    return {
+        "mean": float(ms.mean()),
+        "p50": float(np.percentile(ms, 50)),
+        "p95": float(np.percentile(ms, 95)),
+        "max": float(ms.max()),
+    }

@@ -1,0 +1,95 @@
+"""How much of the floor that can be seen the range finder has seen, on a grid at true poses."""
+
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from jaxtyping import Bool, Float
+
+from sim.lidar import LidarConfig, RangeFinder
+from sim.robot import RobotConfig
+from sim.worlds import World
+
+CELL_M = 0.05
+LOOKOUT_M = 0.25
+LOOKOUT_BEAMS = 720
+
+
+class Floor:
+    """The cells of a building's free floor, and which of them were seen."""
+
+    def __init__(self, free: shapely.Polygon) -> None:
+        low = np.array(free.bounds[:2])
+        count = np.ceil((np.array(free.bounds[2:]) - low) / CELL_M).astype(int)
+        self._x = low[0] + (np.arange(count[0]) + 0.5) * CELL_M
+        self._y = low[1] + (np.arange(count[1]) + 0.5) * CELL_M
+        grid_x, grid_y = np.meshgrid(self._x, self._y)
+        shapely.prepare(free)
+        self.free: Bool[np.ndarray, "h w"] = np.asarray(shapely.contains_xy(free, grid_x, grid_y))
+        self.seen: Bool[np.ndarray, "h w"] = np.zeros_like(self.free)
+
+    def cover(self, region: shapely.Geometry) -> None:
+        """Mark the cells inside a region as seen."""
+        grid_x, grid_y = np.meshgrid(self._x, self._y)
+        shapely.prepare(region)
+        self.seen |= self.free & shapely.contains_xy(region, grid_x, grid_y)
+
+    def look(
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        bearings_rad: Float[np.ndarray, " k"],
+        ranges_m: Float[np.ndarray, " k"],
+        range_max_m: float,
+    ) -> None:
+        """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor."""
+        columns = slice(*np.searchsorted(self._x, [pose_world[0] - range_max_m, pose_world[0] + range_max_m]))
+        rows = slice(*np.searchsorted(self._y, [pose_world[1] - range_max_m, pose_world[1] + range_max_m]))
+        row, column = np.nonzero(self.free[rows, columns] & ~self.seen[rows, columns])
+        row, column = row + rows.start, column + columns.start
+        dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
+        step = (bearings_rad[-1] - bearings_rad[0]) / (len(bearings_rad) - 1)
+        turn = np.mod(np.arctan2(dy, dx) - pose_world[2] - bearings_rad[0] + 0.5 * step, 2 * np.pi)
+        beam = np.floor(turn / step).astype(np.int64)
+        reach = np.where(np.isnan(ranges_m), range_max_m, ranges_m)
+        # Beyond the last beam of less than a full turn nothing is seen.
+        reach = np.append(reach, np.full(max(int(beam.max(initial=0)) + 1 - len(reach), 0), -1.0))
+        visible = np.hypot(dx, dy) <= reach[beam]
+        self.seen[row[visible], column[visible]] = True
+
+
+@lru_cache(maxsize=4)
+def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
+    """Return the cells that the disc can cover or see within range from some place that it can reach.
+
+    What the reachable region sees beyond itself, its boundary sees, so looking out from the boundary is enough.
+    """
+    floor = Floor(world.free)
+    region = world.reachable(config.radius_m)
+    if region.is_empty:
+        return floor.seen
+    floor.cover(region.buffer(config.radius_m))
+    finder = RangeFinder(world.faces, LidarConfig(LOOKOUT_BEAMS, range_max_m=config.lidar.range_max_m))
+    for ring in (region.exterior, *region.interiors):
+        places = shapely.get_coordinates(ring.segmentize(LOOKOUT_M))
+        # Arcs of the boundary have many vertices; one place in every LOOKOUT_M is enough.
+        way = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
+        keep = np.append(True, np.diff(np.floor(way / LOOKOUT_M)) > 0)
+        for x, y in places[keep]:
+            pose = np.array([x, y, 0.0])
+            floor.look(pose, finder.bearings_rad, finder.cast(pose)[0], config.lidar.range_max_m)
+    return floor.seen
+
+
+def swept(
+    world: World,
+    config: RobotConfig,
+    poses_world: Float[np.ndarray, "s 3"],
+    bearings_rad: Float[np.ndarray, " k"],
+    ranges_m: Float[np.ndarray, "s k"],
+) -> float:
+    """Return the share of the visible floor that scans at these true poses have seen."""
+    target = visible_floor(world, config)
+    floor = Floor(world.free)
+    for pose, ranges in zip(poses_world, ranges_m, strict=True):
+        floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
+    return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)

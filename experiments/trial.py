@@ -1,0 +1,105 @@
+"""One trial: a robot explores a world once, and truth meets estimate in the scores."""
+
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from explore.mission import explore_mission
+from explore.step import Step
+from sim.worlds import World
+from slam.backend import Joint
+
+from .association import Votes
+from .records import Log, Recorder
+from .scenario import Scenario, TrialConfig, build
+from .scores import Ending, summarise
+from .truth import truth_of
+
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """What a trial leaves; everything but the ending is None where it ended before its first step."""
+
+    scenario: Scenario
+    ending: Ending
+    log: Log | None
+    votes: Votes
+    last: Step | None
+    joint: Joint | None
+    """Pose and all lines at the last step."""
+    summary: dict[str, Any]
+
+
+Mission = Callable[[Scenario], Iterator[Step]]
+
+
+def default_mission(scenario: Scenario) -> Iterator[Step]:
+    """Return the closed loop over the simulated robot."""
+    return explore_mission(scenario.robot, scenario.backend, scenario.strategy, scenario.config.mission)
+
+
+def run_trial(
+    config: TrialConfig,
+    watch: Callable[[Step], None] = lambda step: None,
+    world: World | None = None,
+    mission: Mission = default_mission,
+) -> TrialResult:
+    """Run one trial to its end, whatever that is, and return all that was computed.
+
+    `watch` sees every step. A failure or Ctrl-C in the mission becomes the ending; raises UsageError for bad names
+    and unusable worlds before anything is computed.
+    """
+    scenario = build(config, world)
+    truth = truth_of(scenario.world, config.robot)
+    recorder = Recorder(scenario.robot, Votes(truth))
+    ending = _run(scenario, recorder, watch, mission)
+    recorder.close()
+    if recorder.last is None:
+        summary = _bare_summary(scenario, ending)
+        return TrialResult(scenario, ending, None, recorder.votes, None, None, summary)
+    log = recorder.log()
+    summary = summarise(scenario, log, recorder.votes, recorder.last, recorder.joint, ending)
+    return TrialResult(scenario, ending, log, recorder.votes, recorder.last, recorder.joint, summary)
+
+
+def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
+    limit = scenario.config.max_steps
+    try:
+        for step in mission(scenario):
+            recorder.add(step)
+            watch(step)
+            if step.ended is not None:
+                return Ending(step.ended, step.reason, 1 if step.ended == "failed" else 0)
+            if len(recorder) >= limit:
+                return Ending("stopped", f"the limit of {limit} steps (--max-steps)", 0)
+    except KeyboardInterrupt:
+        return Ending("stopped", "interrupted by Ctrl-C", INTERRUPTED)
+    except Exception as error:  # a run that fails keeps what it has computed; the trace goes beside the results
+        words = " ".join(str(error).split())
+        return Ending("failed", f"{type(error).__name__}: {words}", 1, traceback.format_exc())
+    return Ending("stopped", "the mission ended without saying why", 0)
+
+
+def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
+    """Return the summary of a run without a single step: null for all that was not measured."""
+    keys = (
+        "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage swept pose_rmse_m"
+        " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches step_ms"
+    )
+    config = scenario.config
+    return {
+        "world": scenario.world.name,
+        "backend": config.backend,
+        "strategy": config.strategy,
+        "seed": config.seed,
+        "p0": config.p0,
+        "errorless": config.errorless,
+        "status": ending.status,
+        "reason": ending.reason,
+        "steps": 0,
+        "collisions": scenario.robot.record.collisions,
+        **dict.fromkeys(keys.split()),
+    }
