@@ -6,11 +6,12 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
 
-PITCH_M = 0.02
+PITCH_M = 0.03
 """Spacing of the points at which faces are tested; the ends of what is seen are then refined."""
 HALVINGS = 6
-FAN_RAD = np.deg2rad(0.5)
-REACH_M = 0.001
+FAN_RAD = np.deg2rad(1.0)
+BESIDE_RAD = 1e-6
+REACH_M = 0.002
 """Arcs of the reachable region are polygons: a point this much farther than the radius is still touched."""
 
 
@@ -86,9 +87,10 @@ def visible_contour(
 
 
 def _scene(faces: Float[np.ndarray, "n 2 2"], reachable: shapely.Polygon, radius_m: float, range_m: float) -> _Scene:
-    rings = [shapely.get_coordinates(ring) for ring in (reachable.exterior, *reachable.interiors)]
+    coarse = reachable.simplify(0.5 * REACH_M)
+    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(coarse)]
     lookouts = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
-    trees = [shapely.STRtree(shapely.linestrings(edges)) for edges in (faces, lookouts)]
+    trees = [shapely.STRtree(np.array(shapely.linestrings(edges))) for edges in (faces, lookouts)]
     return _Scene(faces, lookouts, trees[0], trees[1], radius_m, range_m)
 
 
@@ -119,16 +121,29 @@ def _fan_sees(scene: _Scene, face: int, points: Float[np.ndarray, "p 2"]) -> Boo
         return np.zeros(len(points), dtype=bool)
     base = np.arctan2(along[1], along[0])
     fan = base + np.arange(0.5 * FAN_RAD, np.pi, FAN_RAD)
-    seen = np.zeros(len(points), dtype=bool)
-    for i, point in enumerate(points):
-        # A gap narrower than the fan's step lies between corners, so rays just beside each corner find it.
-        corner = walls.reshape(-1, 2) - point
-        near = np.arctan2(corner[:, 1], corner[:, 0])
-        bearings = np.concatenate([fan, near - 1e-6, near + 1e-6])
-        bearings = bearings[(bearings - base) % (2 * np.pi) < np.pi]
-        rays = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-        seen[i] = np.any(_reach(point, rays, lookouts, scene.range_m) < _reach(point, rays, walls, np.inf))
-    return seen
+    return np.array([_sees(point, base, fan, walls, lookouts, scene.range_m) for point in points])
+
+
+def _sees(
+    point: Float[np.ndarray, "2"],
+    base: float,
+    fan: Float[np.ndarray, " r"],
+    walls: Float[np.ndarray, "n 2 2"],
+    lookouts: Float[np.ndarray, "l 2 2"],
+    range_m: float,
+) -> bool:
+    """Return whether some ray from a face point, bearings in (base, base + pi), meets the region before a wall."""
+    depth = _reach(point, fan, walls, np.inf)
+    if np.any(_reach(point, fan, lookouts, range_m) < depth):
+        return True
+    # A gap narrower than the fan's step lies between corners, so rays just beside each corner in sight find it.
+    corner = walls.reshape(-1, 2) - point
+    bearing = (np.arctan2(corner[:, 1], corner[:, 0]) - base) % (2 * np.pi)
+    slot = np.clip((bearing / FAN_RAD - 0.5).astype(int), 0, len(fan) - 2)
+    in_sight = np.hypot(corner[:, 0], corner[:, 1]) <= 0.1 + 1.1 * np.maximum(depth[slot], depth[slot + 1])
+    near = np.concatenate([bearing[in_sight] - BESIDE_RAD, bearing[in_sight] + BESIDE_RAD])
+    near = base + near[(near > 0) & (near < np.pi)]
+    return bool(np.any(_reach(point, near, lookouts, range_m) < _reach(point, near, walls, np.inf)))
 
 
 def _in_front(
@@ -139,17 +154,17 @@ def _in_front(
 
 
 def _reach(
-    point: Float[np.ndarray, "2"], rays: Float[np.ndarray, "r 2"], edges: Float[np.ndarray, "n 2 2"], limit_m: float
+    point: Float[np.ndarray, "2"], bearings: Float[np.ndarray, " r"], edges: Float[np.ndarray, "n 2 2"], limit_m: float
 ) -> Float[np.ndarray, " r"]:
-    """Return how far each unit ray runs from `point` before it meets an edge; infinite beyond `limit_m`."""
-    origin, along = edges[:, 0] - point, edges[:, 1] - edges[:, 0]
-    cross = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (origin[:, 0] * along[:, 1] - origin[:, 1] * along[:, 0]) / cross
-        share = (origin[:, 0] * rays[:, 1:] - origin[:, 1] * rays[:, :1]) / cross
-    hit = (distance > 1e-9) & (share >= 0) & (share <= 1)
-    nearest = np.min(np.where(hit, distance, np.inf), axis=1, initial=np.inf)
-    return np.where(nearest <= limit_m, nearest, np.inf)
+    """Return how far each ray runs from `point` before it meets an edge; infinite beyond `limit_m`."""
+    ray_x, ray_y = np.cos(bearings)[:, None], np.sin(bearings)[:, None]
+    (x, y), (along_x, along_y) = (edges[:, 0] - point).T, (edges[:, 1] - edges[:, 0]).T
+    cross = ray_x * along_y - ray_y * along_x
+    share = (x * ray_y - y * ray_x) / np.where(cross == 0, np.nan, cross)
+    distance = (x * along_y - y * along_x) / np.where((share >= 0) & (share <= 1), cross, np.nan)
+    distance = np.where((distance > 1e-9) & (distance <= limit_m), distance, np.inf)
+    nearest: Float[np.ndarray, " r"] = np.min(distance, axis=1, initial=np.inf)
+    return nearest
 
 
 def _refine(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from .drawing import Drawing, WorldError, shorten
+from .geojson import from_geojson
 from .plan_json import from_json
 
 FILE_MAX = 64 * 2**20
@@ -34,8 +35,6 @@ def read_json_map(data: bytes, scale: float | None = None) -> Drawing:
     if isinstance(document, dict) and "walls" in document:
         return from_json(document)
     if isinstance(document, dict) and isinstance(document.get("type"), str):
-        from .geojson import from_geojson
-
         return from_geojson(document)
     raise WorldError(
         f'expected a plan with "walls" or GeoJSON with a "type", found {shorten(document)}: see docs on world files'

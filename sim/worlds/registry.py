@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
 from .files import read_bytes, read_json_map
+from .raster import read_image, read_ros_map
 from .solid import build
 from .svg import read_svg
 from .world import World
@@ -28,17 +29,17 @@ WORLDS: dict[str, Bundled] = {
     "paper-fig4": Bundled("paper-fig4.svg", "figure 4: one cycle with a dead end, 16 numbered walls"),
     "paper-fig5": Bundled("paper-fig5.svg", "figures 5 and 6: rooms and dead ends off corridors, 20 m x 14 m"),
     "paper-fig8": Bundled("paper-fig8.svg", "figure 8: the cyclic 7 m x 7 m environment with corners A, B and C"),
-    "paper-fig9": Bundled(
-        "paper-fig9.svg", "figure 9: 12 m x 9 m around a big obstacle, corners A and B farthest apart"
-    ),
+    "paper-fig9": Bundled("paper-fig9.svg", "figure 9: 12 m x 9 m around a big obstacle, far corners A and B"),
     "rooms": Bundled("rooms.svg", "an apartment of 9 m x 8 m with doors and furniture"),
-    "hall": Bundled("hall.svg", "a hall of 16 m x 12 m, larger than the sensor's range, with free-standing obstacles"),
+    "hall": Bundled("hall.svg", "a hall of 16 m x 12 m, larger than the sensor's range, with pillars"),
 }
 
 READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
     ".json": lambda path, scale: read_json_map(read_bytes(path), scale),
     ".geojson": lambda path, scale: read_json_map(read_bytes(path), scale),
     ".svg": lambda path, scale: read_svg(read_bytes(path), scale),
+    **dict.fromkeys((".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"), read_image),
+    **dict.fromkeys((".yaml", ".yml"), read_ros_map),
 }
 """Reader by file name extension; each takes the path and the scale that the caller states, or None."""
 

@@ -3,6 +3,7 @@
 import numpy as np
 import shapely
 from jaxtyping import Float
+from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError
@@ -31,8 +32,8 @@ def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = No
     return World(name, free, pose, dict(drawing.labels))
 
 
-def solid_of(drawing: Drawing) -> shapely.MultiPolygon | shapely.Polygon:
-    """Return all that is solid: walls 0.1 m thick around the lines, filled polygons mended where they cross themselves."""
+def solid_of(drawing: Drawing) -> BaseGeometry:
+    """Return all that is solid: walls 0.1 m thick around the lines, and filled polygons, mended where they cross."""
     if not drawing.lines and not drawing.solids:
         raise WorldError("expected walls, found nothing drawn: draw dark lines or filled shapes")
     merged = shapely.line_merge(shapely.union_all(np.array(drawing.lines))) if drawing.lines else shapely.LineString()
@@ -41,30 +42,30 @@ def solid_of(drawing: Drawing) -> shapely.MultiPolygon | shapely.Polygon:
     return shapely.union_all([thick, *(part for shape in mended for part in _areas(shape))])
 
 
-def _areas(shape: shapely.Geometry) -> list[shapely.Polygon]:
+def _areas(shape: BaseGeometry) -> list[shapely.Polygon]:
     """Return the polygons of a geometry, dropping points and lines."""
     return [
         part for part in shapely.get_parts(shapely.get_parts(shape)) if part.geom_type == "Polygon" and part.area > 0
     ]
 
 
-def _check_extent(solid: shapely.Geometry) -> None:
+def _check_extent(solid: BaseGeometry) -> None:
     x0, y0, x1, y1 = solid.bounds
     extent = max(x1 - x0, y1 - y0)
     if not SMALLEST_M <= extent <= LARGEST_M:
         raise WorldError(
-            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m: correct the scale of the drawing"
+            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m: correct the scale"
         )
 
 
 def _free_parts(
-    solid: shapely.Geometry, sheet: shapely.Polygon | None
+    solid: BaseGeometry, sheet: shapely.Polygon | None
 ) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
     """Return the free parts that walls enclose, and those that end at the border of a picture."""
     page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
     parts = _areas(page.difference(solid))
     edge = page.exterior
-    touching = [shapely.distance(part, edge) < 1e-9 for part in parts]
+    touching = [shapely.distance(part, edge) < 1e-6 for part in parts]
     enclosed = [opened for part, out in zip(parts, touching, strict=True) if not out for opened in _unslit(part)]
     if sheet is None:
         return enclosed, []
@@ -97,7 +98,7 @@ def _drivable(part: shapely.Polygon) -> float:
     return max((piece.area for piece in _areas(part.buffer(-ROBOT_RADIUS_M))), default=0.0)
 
 
-def _part_with(start: Float[np.ndarray, "3"], solid: shapely.Geometry, parts: list[shapely.Polygon]) -> shapely.Polygon:
+def _part_with(start: Float[np.ndarray, "3"], solid: BaseGeometry, parts: list[shapely.Polygon]) -> shapely.Polygon:
     at = shapely.Point(start[:2])
     for part in parts:
         if part.contains(at):
@@ -125,7 +126,7 @@ def _check_clearance(free: shapely.Polygon, start: Float[np.ndarray, "3"]) -> No
 def _straighten(part: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
     """Return a free part whose faces are straight: each ring simplified, and no vertex left on a straight wall."""
     simple = part.simplify(tolerance_m)
-    if simple.geom_type != "Polygon" or not simple.is_valid or simple.is_empty:
+    if not isinstance(simple, shapely.Polygon) or not simple.is_valid or simple.is_empty:
         simple = part
     rings = [_drop_collinear(shapely.get_coordinates(ring)[:-1]) for ring in (simple.exterior, *simple.interiors)]
     straight = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) > 2])
@@ -137,5 +138,5 @@ def _drop_collinear(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
     before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
     chord, off = after - before, ring - before
     length = np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-12)
-    bent = np.abs(chord[:, 0] * off[:, 1] - chord[:, 1] * off[:, 0]) / length > 1e-6
-    return ring[bent]
+    kept: Float[np.ndarray, "m 2"] = ring[np.abs(chord[:, 0] * off[:, 1] - chord[:, 1] * off[:, 0]) > 1e-6 * length]
+    return kept

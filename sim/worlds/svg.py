@@ -27,8 +27,7 @@ from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError, shorten
 from .winding import filled
 
 DARK = 0.7
-CURVE_STEPS = 48
-CURVE_M = 0.002
+CURVE_STEPS = 24
 SHAPES = 200_000
 UNITLESS_MAX = 200.0
 PHYSICAL = ("mm", "cm", "in", "pt", "pc", "Q")
@@ -52,9 +51,9 @@ def read_svg(data: bytes, scale: float | None = None) -> Drawing:
     for rings, rule in shapes:
         world = [(ring * [1, -1] + [0, height]) * metres for ring in rings]
         if rule is None:
-            lines += [shapely.LineString(ring).simplify(CURVE_M) for ring in world]
+            lines += [shapely.LineString(ring) for ring in world]
         else:
-            solids += [polygon.simplify(CURVE_M) for polygon in filled(world, even_odd=rule == "evenodd")]
+            solids += filled(world, even_odd=rule == "evenodd")
     points = {name: (x * metres, (height - y) * metres, heading) for name, (x, y, heading) in marks.items()}
     start = points.pop("start", None)
     labels = {name.removeprefix("label-"): (x, y) for name, (x, y, _) in points.items()}

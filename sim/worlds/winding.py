@@ -27,4 +27,5 @@ def _turns(ring: Float[np.ndarray, "n 2"], points: Float[np.ndarray, "m 2"]) -> 
     x, y = points[:, :1], points[:, 1:]
     left = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
     up, down = (y0 <= y) & (y1 > y) & (left > 0), (y0 > y) & (y1 <= y) & (left < 0)
-    return (np.sum(up, axis=1) - np.sum(down, axis=1)).astype(float)
+    turns: Float[np.ndarray, " m"] = np.sum(up, axis=1, dtype=float) - np.sum(down, axis=1, dtype=float)
+    return turns
