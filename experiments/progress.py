@@ -1,0 +1,88 @@
+"""What a person sees of a run: a progress line while it goes on, one table at its end."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from explore.step import Step
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[Step], None]]:
+    """Show steps on standard error while the block runs; quiet where that is not a terminal.
+
+    The bar is the share of walls in closed chains: it may fall when something new comes into sight.
+    """
+    console = Console(stderr=True)
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.fields[words]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(title, total=1.0, words="")
+
+        def watch(step: Step) -> None:
+            open_ends = sum(len(chain.open_ends) for chain in step.chains)
+            closed = sum(len(chain.walls) for chain in step.chains if chain.is_closed)
+            words = (
+                f"step {step.index + 1}  {step.path_length_m:.1f} m  {len(step.map)} walls, {closed} in closed chains"
+                f"  {open_ends} open ends"
+            )
+            bar.update(task, completed=closed / max(len(step.map), 1), words=words)
+
+        yield watch
+
+
+def print_summary(summary: dict[str, Any]) -> None:
+    """Print the one table of a run on standard output."""
+    noise = "errorless" if summary["errorless"] else f"seed {summary['seed']}, P0 {summary['p0']}"
+    table = Table(
+        title=f"{summary['world']}: {summary['backend']}, {summary['strategy']}, {noise}", title_justify="left"
+    )
+    table.add_column("measure")
+    table.add_column("value", justify="right", overflow="fold")
+    for name, value in _rows(summary):
+        table.add_row(name, value)
+    Console().print(table)
+
+
+def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = [("status", f"{summary['status']} ({summary['reason']})"), ("steps", str(summary["steps"]))]
+    if not summary["steps"]:
+        return rows
+    ms = summary["step_ms"]
+    rows += [
+        ("path", f"{summary['path_length_m']:.1f} m in {summary['drive_time_s']:.0f} s"),
+        ("contours closed", f"{summary['contours_closed']} of {summary['contours_reachable']}"),
+        ("coverage", f"{100 * summary['coverage']:.2f} %"),
+        ("floor swept", f"{100 * summary['swept']:.2f} %"),
+        ("open ends left, set aside", f"{summary['open_ends']}, {len(summary['set_aside'])}"),
+        ("collisions", str(summary["collisions"])),
+        ("lines (tentative, duplicate)", _counts(summary)),
+        ("false matches", str(summary["false_matches"])),
+        ("pose error, rms", f"{100 * summary['pose_rmse_m']:.2f} cm, {57.29578 * summary['heading_rmse_rad']:.3f} deg"),
+        ("wheels alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
+        ("pose ANEES (1 is ideal)", _number(summary["pose_anees"])),
+        ("pose NEES in the 95 % band", _number(summary["pose_nees_in_band"])),
+        ("map ANEES (1 is ideal)", _number(summary["map_anees"])),
+    ]
+    rows += [
+        (f"distance {pair}", f"{_number(d['mapped_m'])} m (true {d['true_m']:.2f} m)")
+        for pair, d in list(summary["distances"].items())[:6]
+    ]
+    return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
+
+
+def _counts(summary: dict[str, Any]) -> str:
+    return f"{summary['lines']} ({summary['lines_tentative']}, {summary['duplicate_lines']})"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"

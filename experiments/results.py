@@ -1,0 +1,188 @@
+"""The folder that a trial leaves: all that is needed to look at it, score it again, replay it and run it again."""
+
+import platform
+import subprocess
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.consistency import pose_errors
+from slam.geometry.poses import wrap
+
+from .files import csv_bytes, json_bytes, npz_bytes, write
+from .geojson import map_geojson
+from .picture import picture_of
+from .records import Log
+from .scenario import TrialConfig
+from .scores import odometry_path, pose_nees
+from .trial import TrialResult
+
+PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
+STEP_COLUMNS = [
+    "step",
+    "time_s",
+    "path_length_m",
+    "pose_nees",
+    "pose_trace",
+    "open_ends",
+    "lines",
+    "lines_tentative",
+    "closed_chains",
+    "set_aside",
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "true_x_m",
+    "true_y_m",
+    "true_heading_rad",
+    "error_x_m",
+    "error_y_m",
+    "error_heading_rad",
+    "sigma_x_m",
+    "sigma_y_m",
+    "sigma_heading_rad",
+    "odometry_error_m",
+    "reason",
+    "step_ms",
+]
+
+
+def write_results(result: TrialResult, folder: Path) -> list[str]:
+    """Write every file of a trial into `folder`, and return, in words, what could not be written.
+
+    One file that fails does not cost the others.
+    """
+    problems = []
+    for name, make in _files(result).items():
+        try:
+            write(folder / name, make())
+        except Exception as error:  # nothing that was computed may be lost to one bad file
+            problems.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
+    if not result.ending.traceback:
+        (folder / "failure.txt").unlink(missing_ok=True)
+    return problems
+
+
+def _files(result: TrialResult) -> dict[str, Callable[[], bytes]]:
+    files: dict[str, Callable[[], bytes]] = {
+        "config.json": lambda: json_bytes(config_record(result.scenario.config)),
+        "summary.json": lambda: json_bytes(result.summary),
+    }
+    if result.ending.traceback:
+        files["failure.txt"] = lambda: result.ending.traceback.encode()
+    log, last = result.log, result.last
+    if log is None or last is None:
+        return files
+    return files | {
+        "log.npz": lambda: npz_bytes(log_arrays(result, log)),
+        "map.npz": lambda: npz_bytes(map_arrays(result)),
+        "map.geojson": lambda: json_bytes(map_geojson(last, result.joint)),
+        "steps.csv": lambda: steps_csv(log),
+        "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
+        "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
+        "map.png": lambda: picture_of(result),
+    }
+
+
+def config_record(config: TrialConfig) -> dict[str, Any]:
+    """Return all that is needed to run a trial again, with the versions that ran it."""
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return {"trial": asdict(config), "versions": versions, "commit": _commit()}
+
+
+def _commit() -> str | None:
+    """Return the commit of the sources, with a plus sign where files have changed since; None outside git."""
+    here = Path(__file__).parent
+    try:
+        words = [
+            subprocess.run(
+                ["git", "-C", str(here), *args], capture_output=True, text=True, timeout=10, check=True
+            ).stdout
+            for args in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
+        ]
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return words[0].strip() + ("+" if words[1].strip() else "")
+
+
+def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
+    """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
+    return {
+        "time_s": log.time_s,
+        "bearings_rad": log.bearings_rad,
+        "ranges_m": log.ranges_m,
+        "sigma_m": log.sigma_m,
+        "range_max_m": log.range_max_m,
+        "odometry": log.odometry,
+        "odometry_cov": log.odometry_cov,
+        "start_pose": result.scenario.start_estimate,
+        "start_cov": result.scenario.start_cov,
+        "true_poses": log.true_world,
+        "true_faces": result.votes.truth.faces,
+        "true_face_of_beam": log.face_of_beam,
+        "true_wall_of_face": result.votes.truth.walls,
+        "true_ring_of_face": result.votes.truth.rings,
+    }
+
+
+def map_arrays(result: TrialResult) -> dict[str, Any]:
+    """Return the map at the last step: lines are (alpha rad, d m) about their anchors, NaN for a lost covariance."""
+    if result.last is None:
+        raise ValueError("expected a run of at least one step, found none: there is no map")
+    walls, joint = result.last.map, result.joint
+    size = 3 + 2 * len(walls)
+    return {
+        "pose": walls.belief.pose_world,
+        "ids": walls.ids,
+        "lines": walls.belief.means,
+        "lines_world": walls.belief.lines_world,
+        "anchors": walls.belief.anchors,
+        "extents": walls.extents,
+        "sightings": walls.sightings,
+        "tentative": walls.tentative,
+        "cov": np.full((size, size), np.nan) if joint is None else joint.cov,
+        "true_faces_of_lines": result.votes.faces_of(walls.ids),
+    }
+
+
+def steps_csv(log: Log) -> bytes:
+    """Return a row for each step; the errors are the invariant ones that the NEES is made of."""
+    sigmas = np.sqrt(np.diagonal(log.estimated_cov, axis1=1, axis2=2))
+    wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)
+    columns = [
+        np.arange(len(log)),
+        log.time_s,
+        log.path_length_m,
+        pose_nees(log),
+        np.trace(log.estimated_cov, axis1=1, axis2=2),
+        log.open_ends,
+        log.lines,
+        log.tentative,
+        log.closed_chains,
+        log.set_aside,
+        *log.estimated_world.T,
+        *log.true_world.T,
+        *pose_errors(log.estimated_world, log.true_world).T,
+        *sigmas.T,
+        wheels,
+        log.reasons,
+        1e3 * log.seconds,
+    ]
+    return csv_bytes(STEP_COLUMNS, zip(*columns, strict=True))
+
+
+def tum(time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"]) -> bytes:
+    """Return poses in the TUM format: t x y z qx qy qz qw."""
+    half = 0.5 * wrap(poses_world[:, 2])
+    rows = zip(time_s, poses_world[:, 0], poses_world[:, 1], np.sin(half), np.cos(half), strict=True)
+    return "".join(f"{t:.6f} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}\n" for t, x, y, qz, qw in rows).encode()

@@ -1,0 +1,17 @@
+"""Colours, one meaning each; told apart with any colour vision (Okabe and Ito's set)."""
+
+CLOSED = ("#0072B2", "#009E73", "#56B4E9", "#7B4FA3", "#1B7F8C", "#4C5FD5", "#6B8E23", "#A0527F")
+"""Closed chains, in turn."""
+OPEN = "#E69F00"
+"""Chains with open ends."""
+ALARM = "#D55E00"
+"""Open ends."""
+TENTATIVE = "#9A9A9A"
+PAGE = "#FFFFFF"
+SOLID = "#D9D7D2"
+"""True walls."""
+FLOOR = "#FBFAF7"
+GRID = "#E4E2DC"
+INK = "#2B2B2B"
+PATH_ESTIMATED = "#333A56"
+PATH_TRUE = "#CC79A7"
