@@ -49,15 +49,15 @@ def prefix_sums(beams: Beams, sigma_m: float) -> Float[np.ndarray, "6 m1"]:
 
 
 def fit_runs(
-    sums: Float[np.ndarray, "6 m1"], start: Int[np.ndarray, " n"], stop: Int[np.ndarray, " n"]
-) -> tuple[Fit, Float[np.ndarray, " n"]]:
-    """Return the lines through the beams [start, stop) and their chi-squares; infinite below 3 beams."""
-    cc, cs, ss, xc, xs, qq = sums[:, stop] - sums[:, start]
+    sums: Float[np.ndarray, "6 m1"], start: Int[np.ndarray, "*n"], stop: Int[np.ndarray, "*n"]
+) -> tuple[Fit, Float[np.ndarray, "*n"]]:
+    """Return the lines through the beams [start, stop) and their chi-squares; 0 below 3 beams, where the line has no meaning."""
+    cc, cs, ss, xc, xs, qq = sums.take(stop, axis=1) - sums.take(start, axis=1)
     det = cc * ss - cs * cs
     a = (ss * xc - cs * xs) / det
     b = (cc * xs - cs * xc) / det
     chi2 = qq - a * xc - b * xs
-    chi2[stop - start < 3] = np.inf
+    chi2[stop - start < 3] = 0.0
     return Fit(a, b, cc, cs, ss), chi2
 
 
@@ -88,18 +88,33 @@ def refit(
 
 
 def polar(fit: Fit) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 2"]]:
-    """Return (alpha rad, r m), r > 0, and their first-order covariance J C_ab J' with C_ab the inverse information."""
+    """Return (alpha rad, r m), r > 0, and their first-order covariance.
+
+    alpha = atan2(b, a), r = 1/h, h^2 = a^2 + b^2; J_alpha = (-b, a)/h^2, J_r = -(a, b)/h^3, C = J C_ab J'.
+    """
     a, b = fit.a, fit.b
-    h2 = a * a + b * b
-    r = 1.0 / np.sqrt(h2)
-    jacobian = np.empty((len(a), 2, 2))
-    jacobian[:, 0, 0], jacobian[:, 0, 1] = -b / h2, a / h2
-    jacobian[:, 1, 0], jacobian[:, 1, 1] = -a * r / h2, -b * r / h2
-    cov_ab = np.empty((len(a), 2, 2))
     det = fit.cc * fit.ss - fit.cs * fit.cs
-    cov_ab[:, 0, 0], cov_ab[:, 1, 1] = fit.ss / det, fit.cc / det
-    cov_ab[:, 0, 1] = cov_ab[:, 1, 0] = -fit.cs / det
-    return np.stack([np.arctan2(b, a), r], axis=-1), jacobian @ cov_ab @ jacobian.transpose(0, 2, 1)
+    caa, cab, cbb = fit.ss / det, -fit.cs / det, fit.cc / det
+    a2, ab, b2 = a * a, a * b, b * b
+    r2 = 1.0 / (a2 + b2)
+    r = np.sqrt(r2)
+    r4 = r2 * r2
+    lines, cov = np.empty((len(a), 2)), np.empty((len(a), 2, 2))
+    lines[:, 0], lines[:, 1] = np.arctan2(b, a), r
+    cov[:, 0, 0] = (b2 * caa - 2.0 * ab * cab + a2 * cbb) * r4
+    cov[:, 1, 1] = (a2 * caa + 2.0 * ab * cab + b2 * cbb) * (r4 * r2)
+    cov[:, 0, 1] = cov[:, 1, 0] = (ab * (caa - cbb) + (b2 - a2) * cab) * (r4 * r)
+    return lines, cov
+
+
+def prediction(
+    fit: Fit, cos: Float[np.ndarray, "*n"], sin: Float[np.ndarray, "*n"]
+) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    """Return the range m at which beams meet their lines, and the variance m^2 that the lines' own error gives it."""
+    p = 1.0 / (fit.a * cos + fit.b * sin)
+    det = fit.cc * fit.ss - fit.cs * fit.cs
+    variance = (fit.ss * cos * cos - 2.0 * fit.cs * cos * sin + fit.cc * sin * sin) / det
+    return p, np.square(p * p) * variance
 
 
 def crossing(
