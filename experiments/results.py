@@ -23,33 +23,12 @@ from .scores import odometry_path, pose_nees
 from .trial import TrialResult
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
-STEP_COLUMNS = [
-    "step",
-    "time_s",
-    "path_length_m",
-    "pose_nees",
-    "pose_trace",
-    "open_ends",
-    "lines",
-    "lines_tentative",
-    "closed_chains",
-    "set_aside",
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "true_x_m",
-    "true_y_m",
-    "true_heading_rad",
-    "error_x_m",
-    "error_y_m",
-    "error_heading_rad",
-    "sigma_x_m",
-    "sigma_y_m",
-    "sigma_heading_rad",
-    "odometry_error_m",
-    "reason",
-    "step_ms",
-]
+STEP_COLUMNS = (
+    *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
+    *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
+    *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
+    *("odometry_error_m", "reason", "step_ms"),
+)
 
 
 def write_results(result: TrialResult, folder: Path) -> list[str]:

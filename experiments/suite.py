@@ -45,7 +45,7 @@ class Suite:
     """Covariance of the start."""
     errorless: bool = False
     """Exact ranges and wheels."""
-    max_steps: int = 5000
+    max_steps: int = 2500
     """A trial is stopped after this many scans."""
     jobs: int = 2
     """Number of processes."""
@@ -123,7 +123,8 @@ def table(rows: list[dict[str, Any]], by_world: bool) -> Table:
     """Return a row for each world, or one for all trials together, and the total."""
     shown = Table(title=f"{len(rows)} trials", title_justify="left")
     shown.add_column("world", overflow="fold")
-    columns = "complete|coverage min|mean|closed|false|duplicates|collisions|path m|pose ANEES|in band|map ANEES|wheels m|step ms"
+    columns = "complete|coverage min|mean|closed|false|duplicates|collisions|path m"
+    columns += "|pose ANEES|in band|map ANEES|wheels m|step ms"
     for column in columns.split("|"):
         shown.add_column(column, justify="right")
     if by_world:

@@ -1,0 +1,29 @@
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: setup demo test check bench docs
+
+setup: .venv/made
+
+.venv/made: requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps -e . && touch $@
+
+demo: setup
+	$(BIN)/chainslam explore paper-fig9 --seed 1
+
+test: setup
+	$(BIN)/python -m pytest -n 2 --quiet tests
+
+check: setup
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: setup
+	$(BIN)/python -m pytest benchmarks --benchmark-only
+
+docs: setup
+	$(BIN)/chainslam explore paper-fig9 --seed 1 --out results/docs
+	mkdir -p docs/pictures && cp results/docs/map.png docs/pictures/fig9.png
