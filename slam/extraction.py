@@ -3,7 +3,7 @@
 The paper takes its extraction from elsewhere (section 2.1); here a line is linear in inverse range (`line_fit`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,14 +11,14 @@ from jaxtyping import Bool, Float, Int
 from .line_fit import Beams, Fit, crossing, fit_runs, polar, prediction, prefix_sums, refit
 from .robot import Scan
 from .segments import EndKind, Segments
-from .splitting import MIN_FIT, Pieces, Returns, SplitConfig, candidates, choose, returns_of
+from .splitting import MIN_FIT, Pieces, Returns, SplitConfig, candidates, choose, returns_of, rolled, split_gains
 
 
 @dataclass(frozen=True)
 class ExtractionConfig:
     """How the straight pieces of a scan become segments."""
 
-    split: SplitConfig = SplitConfig()
+    split: SplitConfig = field(default_factory=SplitConfig)
     """What counts as one straight piece."""
     joint_beams: float = 4.0
     """A boundary moves at most this many beams to where its two lines cross."""
@@ -47,7 +47,12 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
         if returns is None:
             return _none()
         sums = prefix_sums(returns.beams, returns.sigma_m)
-        pieces = choose(sums, candidates(returns, sums, config.split), returns.breaks, config.split)
+        gains = split_gains(returns, sums, config.split)
+        if returns.is_ring:  # the seam must lie at a corner, else it cuts a wall in two; the surest cut is one
+            returns = rolled(returns, int(gains.max(axis=0).argmax()))
+            sums = prefix_sums(returns.beams, returns.sigma_m)
+            gains = split_gains(returns, sums, config.split)
+        pieces = choose(sums, candidates(gains, returns.breaks, config.split), returns.breaks, config.split)
         if len(pieces.start) == 0:
             return _none()
         fit, pieces, is_corner, in_doubt = _sharpen(pieces, sums, returns, config)

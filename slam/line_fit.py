@@ -51,7 +51,7 @@ def prefix_sums(beams: Beams, sigma_m: float) -> Float[np.ndarray, "6 m1"]:
 def fit_runs(
     sums: Float[np.ndarray, "6 m1"], start: Int[np.ndarray, "*n"], stop: Int[np.ndarray, "*n"]
 ) -> tuple[Fit, Float[np.ndarray, "*n"]]:
-    """Return the lines through the beams [start, stop) and their chi-squares; 0 below 3 beams, where the line has no meaning."""
+    """Return the lines through the beams [start, stop) and their chi-squares, which are 0 below 3 beams."""
     cc, cs, ss, xc, xs, qq = sums.take(stop, axis=1) - sums.take(start, axis=1)
     det = cc * ss - cs * cs
     a = (ss * xc - cs * xs) / det

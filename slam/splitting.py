@@ -106,11 +106,8 @@ def returns_of(scan: Scan, config: SplitConfig) -> Returns | None:
     return Returns(Beams(np.cos(theta), np.sin(theta), rho), beam, turn, breaks, len(found) == 0, period, step, sigma)
 
 
-def candidates(returns: Returns, sums: Float[np.ndarray, "6 m1"], config: SplitConfig) -> Int[np.ndarray, " c"]:
-    """Return sorted positions, breaks included, where a segment may begin or end.
-
-    There two lines explain the beams on either side better than one line does, at one of several scales.
-    """
+def split_gains(returns: Returns, sums: Float[np.ndarray, "6 m1"], config: SplitConfig) -> Float[np.ndarray, "s m1"]:
+    """Return the chi-square that two lines save over one at each position and scale; 0 at breaks."""
     m, breaks = len(returns.beam), returns.breaks
     sizes = breaks[1:] - breaks[:-1]
     at = np.arange(1, m)
@@ -121,18 +118,33 @@ def candidates(returns: Returns, sums: Float[np.ndarray, "6 m1"], config: SplitC
     start[1], stop[0] = at, at
     start[2], stop[2] = start[0], stop[1]
     chi2 = fit_runs(sums, start, stop)[1]
-    gain = np.zeros((len(reach), m + 1))
-    inner = gain[:, 1:-1]
-    inner[:] = chi2[2] - chi2[0] - chi2[1]
-    gain[:, breaks] = 0.0
-    peak = (inner > config.candidate_gain) & (inner >= gain[:, :-2]) & (inner >= gain[:, 2:])
+    gains = np.zeros((len(reach), m + 1))
+    gains[:, 1:-1] = chi2[2] - chi2[0] - chi2[1]
+    gains[:, breaks] = 0.0
+    return gains
+
+
+def candidates(
+    gains: Float[np.ndarray, "s m1"], breaks: Int[np.ndarray, " b"], config: SplitConfig
+) -> Int[np.ndarray, " c"]:
+    """Return sorted positions where a segment may begin or end: the breaks, and the peaks of the gain at any scale."""
+    inner = gains[:, 1:-1]
+    peak = (inner > config.candidate_gain) & (inner >= gains[:, :-2]) & (inner >= gains[:, 2:])
     sure = (peak & (inner > config.sure_gain)).any(axis=0)
-    is_cut = np.zeros(m + 1, bool)
+    is_cut = np.zeros(gains.shape[1], bool)
     is_cut[1:-1] = peak.any(axis=0)
     is_cut[2:] |= sure
     is_cut[:-2] |= sure
     is_cut[breaks] = True
     return is_cut.nonzero()[0]
+
+
+def rolled(returns: Returns, first: int) -> Returns:
+    """Return the returns of a ring, beginning with the one at position `first`."""
+    beams = Beams(*(np.concatenate((x[first:], x[:first])) for x in returns.beams))
+    beam = np.concatenate((returns.beam[first:], returns.beam[:first]))
+    turn = np.concatenate((returns.turn[first:], returns.turn[:first] + returns.period))
+    return returns._replace(beams=beams, beam=beam, turn=turn)
 
 
 def choose(

@@ -1,0 +1,281 @@
+"""Extraction: its algebra against slow truths, its covariance against Monte Carlo, its symmetries."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from sim.lidar import LidarConfig, RangeFinder, noisy
+from slam.extraction import extract
+from slam.geometry.lines import directions, normals
+from slam.geometry.poses import wrap
+from slam.line_fit import Beams, Fit, fit_runs, polar, prefix_sums, refit
+from slam.robot import Scan
+from slam.segments import EndKind
+from slam.splitting import _least
+
+SIGMA = 0.01
+
+
+def loop(*corners):
+    """Return the faces of a closed loop of corners, free side on the left."""
+    points = np.array(corners, dtype=float)
+    return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+
+
+HALL = np.concatenate(
+    [
+        loop((0, 0), (3, 0), (3, -2.5), (4.2, -2.5), (4.2, 0), (6, 0), (6, 3.1), (2.5, 3.1), (2.5, 4.4), (0, 4.4)),
+        loop((1.0, 1.0), (1.0, 1.5), (1.6, 1.5), (1.6, 1.0)),
+        loop((4.4, 1.6), (4.1, 2.2), (4.7, 2.4)),
+    ]
+)
+CLOSED = loop((0, 0), (3.2, 0), (3.2, 2.4), (0, 2.4))
+PLACES = np.array([[2.1, 2.0], [3.5, 1.0], [0.6, 3.0], [5.4, 0.6], [3.6, -1.0]])
+
+
+def scan_of(faces, pose, rng=None, config=None):
+    """Return a scan; exact without a generator."""
+    finder = RangeFinder(faces, config or LidarConfig())
+    ranges, _ = finder.cast(np.asarray(pose, dtype=float))
+    noise = np.zeros_like(ranges) if rng is None else rng.standard_normal(len(ranges))
+    return Scan(finder.bearings_rad, noisy(ranges, SIGMA, noise), SIGMA, 4.0, 0.0)
+
+
+def room_scan(seed):
+    """Return a noisy scan from a random place in a random one of two worlds."""
+    rng = np.random.default_rng(seed)
+    faces, place = (CLOSED, rng.uniform(0.4, 2.0, 2)) if rng.random() < 0.4 else (HALL, PLACES[rng.integers(5)])
+    return scan_of(faces, [*(place + rng.uniform(-0.1, 0.1, 2)), rng.uniform(-4.0, 4.0)], rng)
+
+
+seeds = st.integers(0, 2**32)
+
+
+def wall(offset, half_length=0.7, distance=1.5):
+    """Return one wall ahead whose middle is `offset` to the left of the perpendicular's foot."""
+    return np.array([[[distance, offset - half_length], [distance, offset + half_length]]])
+
+
+# ---- the algebra of one line
+
+
+@given(seed=seeds)
+@settings(max_examples=30, deadline=None)
+def test_prefix_sums_fit_every_run_as_weighted_least_squares_does(seed):
+    scan = room_scan(seed)
+    seen = np.isfinite(scan.ranges_m)
+    theta, rho = scan.bearings_rad[seen], scan.ranges_m[seen]
+    rng = np.random.default_rng(seed)
+    start = rng.integers(0, len(rho) - 12, 5)
+    stop = start + rng.integers(4, 12, 5)
+    fit, values = fit_runs(prefix_sums(Beams(np.cos(theta), np.sin(theta), rho), SIGMA), start, stop)
+    for i in range(5):
+        run = slice(start[i], stop[i])
+        rows = np.column_stack([np.cos(theta[run]), np.sin(theta[run])]) * (rho[run, None] ** 2 / SIGMA)
+        target = rho[run] / SIGMA
+        solution, *_ = np.linalg.lstsq(rows, target)
+        np.testing.assert_allclose([fit.a[i], fit.b[i]], solution, rtol=1e-5, atol=1e-6)
+        assert values[i] == pytest.approx(np.sum((rows @ solution - target) ** 2), rel=1e-5, abs=1e-5)
+
+
+def test_refitting_converges_to_the_maximum_likelihood_line():
+    rng = np.random.default_rng(0)
+    theta = np.deg2rad(np.arange(-20.0, 50.0, 2.0))
+    rho = 1.4 / np.cos(theta - 0.3) + SIGMA * rng.standard_normal(len(theta))
+    beams, zeros = Beams(np.cos(theta), np.sin(theta), rho), np.zeros(len(theta), int)
+    fit = Fit(*(np.array([x]) for x in (0.7, 0.2, 1.0, 0.0, 1.0)))
+    for _ in range(6):
+        fit, _, _ = refit(fit, beams, zeros, np.array([0]), np.full(len(theta), SIGMA**-2))
+    best = least_squares(lambda x: (x[1] / np.cos(theta - x[0]) - rho) / SIGMA, [0.3, 1.4], xtol=1e-14, ftol=1e-14)
+    line, cov = polar(fit)
+    np.testing.assert_allclose(line[0], best.x, atol=1e-6)
+    np.testing.assert_allclose(cov[0], np.linalg.inv(best.jac.T @ best.jac), rtol=1e-4)
+
+
+@given(seed=seeds, cuts=st.integers(2, 7))
+@settings(max_examples=50, deadline=None)
+def test_the_dynamic_program_finds_the_cheapest_of_all_divisions(seed, cuts):
+    rng = np.random.default_rng(seed)
+    at = np.concatenate([[0], np.cumsum(rng.integers(1, 4, cuts))])
+    cost = {(i, j): float(rng.uniform(0.0, 30.0)) for j in range(1, cuts + 1) for i in range(j)}
+    pieces = _least(list(cost.values()), [0] * cuts, at, 7.0)
+    position = {int(x): i for i, x in enumerate(at)}
+    chosen = [(position[int(i)], position[int(j)]) for i, j in zip(*pieces, strict=True)]
+
+    def price(segments):
+        covered = sum(int(at[j] - at[i]) for i, j in segments)
+        return sum(cost[s] for s in segments) + 7.0 * (int(at[-1]) - covered)
+
+    inner = range(1, cuts)
+    divisions = (
+        [pair for pair, used in zip(itertools.pairwise((0, *marks, cuts)), use, strict=True) if used]
+        for size in range(cuts)
+        for marks in itertools.combinations(inner, size)
+        for use in itertools.product((False, True), repeat=size + 1)
+    )
+    assert price(chosen) == pytest.approx(min(map(price, divisions)))
+
+
+# ---- the covariance
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.4, -2.2])
+def test_covariance_equals_finite_differences_through_the_whole_extraction(offset):
+    scan = scan_of(wall(offset), np.zeros(3))
+    seen = np.flatnonzero(np.isfinite(scan.ranges_m))
+    exact = extract(scan)
+    assert len(exact) == 1
+    columns = []
+    for beam in seen:
+        shifted = [np.where(np.arange(180) == beam, scan.ranges_m + h, scan.ranges_m) for h in (1e-5, -1e-5)]
+        plus, minus = (extract(replace(scan, ranges_m=ranges)).lines[0] for ranges in shifted)
+        columns.append((plus - minus) / 2e-5)
+    jacobian = np.array(columns).T
+    np.testing.assert_allclose(exact.cov[0], SIGMA**2 * jacobian @ jacobian.T, rtol=1e-4, atol=1e-12)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.2, -1.8], ids=["centred", "left", "far right"])
+def test_one_wall_is_calibrated_centred_and_off_to_one_side_alike(offset):
+    rng = np.random.default_rng(4)
+    exact = scan_of(wall(offset), np.zeros(3))
+    errors, covs, pieces = [], [], 0
+    for _ in range(1500):
+        segments = extract(replace(exact, ranges_m=exact.ranges_m + SIGMA * rng.standard_normal(180)))
+        best = int(np.argmax(segments.beam_counts))
+        pieces += len(segments)
+        errors.append(segments.lines[best] - np.array([0.0, 1.5]))
+        covs.append(segments.cov[best])
+    assert pieces <= 1510
+    e, c = np.array(errors), np.array(covs)
+    values = np.einsum("ni,nij,nj->n", e, np.linalg.inv(c), e)
+    assert np.median(values) == pytest.approx(chi2.median(2), rel=0.1)
+    assert np.percentile(values, 95) == pytest.approx(chi2.ppf(0.95, 2), rel=0.1)
+    np.testing.assert_allclose(np.var(e, axis=0), c.mean(axis=0).diagonal(), rtol=0.2)
+
+
+def test_covariance_grows_with_the_square_of_the_stated_noise():
+    scan = scan_of(CLOSED, [1.0, 1.0, 0.3])
+    once, twice = extract(scan), extract(replace(scan, sigma_m=0.5 * SIGMA))
+    assert len(once) == len(twice) == 4
+    np.testing.assert_allclose(once.cov, 4.0 * twice.cov, rtol=0.3)
+
+
+# ---- the contract
+
+
+@given(seed=seeds)
+@settings(max_examples=100, deadline=None)
+def test_segments_keep_their_contract(seed):
+    scan = room_scan(seed)
+    segments = extract(scan)
+    assert len(segments) >= 3
+    assert np.all(segments.lines[:, 1] > 0)
+    assert np.all(np.linalg.eigvalsh(segments.cov) > 0)
+    n, t = normals(segments.lines[:, 0]), directions(segments.lines[:, 0])
+    np.testing.assert_allclose(np.einsum("nej,nj->ne", segments.ends, n), segments.lines[:, 1:].repeat(2, 1), atol=1e-9)
+    along = np.einsum("nej,nj->ne", segments.ends, t)
+    assert np.all(along[:, 1] > along[:, 0])
+    k = len(scan.ranges_m)
+    runs = [np.arange(f, f + (last - f) % k + 1) % k for f, last in segments.beams]
+    assert all(len(run) >= count >= 3 for run, count in zip(runs, segments.beam_counts, strict=True))
+    used = np.concatenate(runs)
+    assert len(np.unique(used)) == len(used)
+    assert np.sum(np.diff(segments.beams[:, 0]) < 0) <= 1
+    assert np.all(np.isfinite(scan.ranges_m[segments.beams]))
+    first = segments.end_kinds[:, 0] == EndKind.CORNER
+    last = np.roll(segments.end_kinds[:, 1] == EndKind.CORNER, 1)
+    assert np.array_equal(first, last)
+    np.testing.assert_allclose(segments.ends[first, 0], np.roll(segments.ends[:, 1], 1, axis=0)[first], atol=1e-9)
+
+
+@given(seed=seeds, steps=st.integers(1, 179))
+@settings(max_examples=100, deadline=None)
+def test_turning_the_robot_by_whole_beams_turns_the_lines_and_changes_nothing_else(seed, steps):
+    scan = room_scan(seed)
+    here, turned = extract(scan), extract(replace(scan, ranges_m=np.roll(scan.ranges_m, steps)))
+    assert len(here) == len(turned)
+    shift = steps * (scan.bearings_rad[1] - scan.bearings_rad[0])
+    order = np.argsort((turned.beams[:, 0] - steps) % 180)
+    turned, here = turned.take(order), here.take(np.argsort(here.beams[:, 0]))
+    np.testing.assert_allclose(wrap(turned.lines[:, 0] - here.lines[:, 0] - shift), 0.0, atol=1e-9)
+    np.testing.assert_allclose(turned.lines[:, 1], here.lines[:, 1], atol=1e-9)
+    np.testing.assert_allclose(turned.cov, here.cov, rtol=1e-7, atol=1e-15)
+    assert np.array_equal((turned.beams - steps) % 180, here.beams)
+    assert np.array_equal(turned.end_kinds, here.end_kinds)
+    assert np.array_equal(turned.beam_counts, here.beam_counts)
+
+
+@given(seed=seeds)
+@settings(max_examples=60, deadline=None)
+def test_a_mirrored_scan_gives_mirrored_lines(seed):
+    scan = room_scan(seed)
+    here = extract(scan)
+    there = extract(replace(scan, ranges_m=np.roll(scan.ranges_m[::-1], 1)))
+    assert len(here) == len(there)
+    there = there.take(np.argsort(wrap(-there.lines[:, 0])))
+    here = here.take(np.argsort(wrap(here.lines[:, 0])))
+    np.testing.assert_allclose(wrap(there.lines[:, 0] + here.lines[:, 0]), 0.0, atol=1e-8)
+    np.testing.assert_allclose(there.lines[:, 1], here.lines[:, 1], atol=1e-8)
+    assert np.array_equal(there.end_kinds[:, ::-1], here.end_kinds)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, 3.1])
+def test_an_errorless_room_is_four_walls_with_exact_corners(heading):
+    segments = extract(scan_of(CLOSED, [1.0, 1.1, heading]))
+    assert len(segments) == 4
+    assert np.all(segments.end_kinds == EndKind.CORNER)
+    np.testing.assert_allclose(np.sort(segments.lines[:, 1]), [1.0, 1.1, 1.3, 2.2], atol=1e-9)
+    corners = np.hypot(*segments.ends[:, 0].T)
+    np.testing.assert_allclose(np.sort(corners), np.sort(np.hypot(*(CLOSED[:, 0] - [1.0, 1.1]).T)), atol=1e-9)
+
+
+def test_what_a_pillar_hides_is_occluded_and_what_runs_out_of_range_is_open():
+    faces = np.concatenate([loop((-0.2, 1.0), (-0.2, 1.2), (0.2, 1.2), (0.2, 1.0)), [[[9.0, 2.0], [-9.0, 2.0]]]])
+    segments = extract(scan_of(faces, np.zeros(3)))
+    kinds = [[EndKind(kind).name for kind in ends] for ends in segments.end_kinds]
+    assert kinds == [["OPEN", "OCCLUDED"], ["OPEN", "OPEN"], ["OCCLUDED", "OPEN"]]
+
+
+def test_a_half_turn_scanner_sees_the_same_walls_and_ends_with_its_view():
+    pose = [1.0, 1.1, 0.0]
+    half = extract(scan_of(CLOSED, pose, config=LidarConfig(beams=181, fov_rad=np.pi)))
+    np.testing.assert_allclose(half.lines, [[-np.pi / 2, 1.1], [0.0, 2.2], [np.pi / 2, 1.3]], atol=1e-9)
+    assert half.end_kinds[0, 0] == half.end_kinds[-1, 1] == EndKind.OPEN
+
+
+def test_a_gap_of_more_than_three_beams_parts_a_wall_and_a_single_missing_beam_does_not():
+    scan = scan_of(wall(0.0, half_length=1.5), np.zeros(3))
+    for missing, pieces in ((1, 1), (2, 1), (4, 2)):
+        ranges = scan.ranges_m.copy()
+        ranges[90 : 90 + missing] = np.nan
+        assert len(extract(replace(scan, ranges_m=ranges))) == pieces
+
+
+@given(
+    ranges=st.lists(
+        st.one_of(st.floats(0.0, 5.0), st.just(float("nan")), st.floats(allow_nan=True, allow_infinity=True)),
+        min_size=2,
+        max_size=40,
+    ),
+    half=st.booleans(),
+    sigma=st.sampled_from([0.0, 1e-3, 0.01, 0.3]),
+)
+@settings(max_examples=300, deadline=None)
+def test_no_scan_raises_and_what_comes_is_finite(ranges, half, sigma):
+    k = len(ranges)
+    bearings = np.linspace(-np.pi / 2, np.pi / 2, k) if half else np.linspace(-np.pi, np.pi, k, endpoint=False)
+    segments = extract(Scan(bearings, np.array(ranges), sigma, 4.0, 0.0))
+    assert np.all(np.isfinite(segments.cov))
+    assert np.all(np.isfinite(segments.ends))
+    assert np.all(segments.lines[:, 1] > 0)
+
+
+@pytest.mark.parametrize("ranges", [np.full(180, np.nan), np.full(180, 2.0), np.zeros(180), np.full(2, 1.0)])
+def test_degenerate_scans_are_answered(ranges):
+    extract(Scan(np.linspace(-np.pi, np.pi, len(ranges), endpoint=False), ranges, SIGMA, 4.0, 0.0))
