@@ -179,7 +179,8 @@ def _refine(
         middle = 0.5 * (low + high)
         same = _seen(scene, face, middle) == low_seen
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return 0.5 * (low + high)
+    turning: Float[np.ndarray, " t"] = 0.5 * (low + high)
+    return turning
 
 
 def _intervals(

@@ -63,19 +63,32 @@ def _free_parts(
 ) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
     """Return the free parts that walls enclose, and those that end at the border of a picture."""
     page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
-    parts = _areas(page.difference(solid))
-    edge = page.exterior
-    touching = [shapely.distance(part, edge) < 1e-6 for part in parts]
-    enclosed = [opened for part, out in zip(parts, touching, strict=True) if not out for opened in _unslit(part)]
-    if sheet is None:
-        return enclosed, []
-    return enclosed, [opened for part, out in zip(parts, touching, strict=True) if out for opened in _unslit(part)]
+    # Slits are sealed first: two walls that all but touch keep the outside out.
+    parts = [piece for part in _areas(page.difference(solid)) for piece in _opened(part, SLIT_M)]
+    touching = shapely.distance(np.array(parts, dtype=object), page.exterior) < 1e-6
+    enclosed = [part for part, out in zip(parts, touching, strict=True) if not out]
+    outer = [part for part, out in zip(parts, touching, strict=True) if out]
+    if sheet is not None:
+        return enclosed, outer
+    return enclosed + [piece for part in outer for piece in _behind_leaks(part, page)], []
 
 
-def _unslit(part: shapely.Polygon) -> list[shapely.Polygon]:
-    """Return the pieces of a free part without its slits; mitres keep all corners where they were drawn."""
-    inner = part.buffer(-0.5 * SLIT_M, join_style="mitre", mitre_limit=MITRE)
-    return _areas(inner.buffer(0.5 * SLIT_M, join_style="mitre", mitre_limit=MITRE))
+def _behind_leaks(part: shapely.Polygon, page: shapely.Polygon) -> list[shapely.Polygon]:
+    """Return what is cut off from the outside if the gaps of the outer wall that no robot can pass are closed."""
+    roomy = _opened(part, 2 * ROBOT_RADIUS_M)
+    outside = [piece for piece in roomy if shapely.distance(piece, page.exterior) < 1e-6]
+    if len(outside) == len(roomy):
+        return []
+    rest = part.difference(shapely.union_all(outside))
+    return [piece for inner in _areas(rest) for piece in _opened(inner, SLIT_M)]
+
+
+def _opened(part: shapely.Polygon, width_m: float) -> list[shapely.Polygon]:
+    """Return the pieces of a free part without what is narrower; mitres keep all corners where they were drawn."""
+    pieces = _areas(part.buffer(-0.5 * width_m, join_style="mitre", mitre_limit=MITRE))
+    # One by one and clipped, lest the mitres of two pieces meet again in the slit between them.
+    grown = [piece.buffer(0.5 * width_m, join_style="mitre", mitre_limit=MITRE) for piece in pieces]
+    return [area for piece in grown for area in _areas(piece.intersection(part))]
 
 
 def _choose(
