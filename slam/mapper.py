@@ -10,11 +10,11 @@ from .backend import Backend, Observations
 from .chains import Chain, ChainConfig, connect
 from .extraction import extract
 from .geometry.lines import distance_to_segments
-from .matching import Matches, MatchingConfig, match, relocate, same_line
+from .matching import KnownWalls, Matches, MatchingConfig, match, relocate, same_line
 from .robot import Odometry, Scan
 from .segments import Segments
 from .stochastic_map import StochasticMap
-from .walls import Walls, WallsConfig
+from .walls import Walls, WallsConfig, end_reach, sure_pieces
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,19 @@ class Mapper:
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
-        segments = self._extract(scan)
+        segments = sure_pieces(self._extract(scan), scan, self.config.walls)
+        reach = end_reach(segments, scan, self.config.walls)
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan)
-        joint = self.backend.belief.joint(near)
-        extents = self._walls.extents(near)
-        clear = self._match(segments, near, extents, joint, self.config.matching, clear_only=True)
+        joint = self.backend.belief.joint(near.ids)
+        clear = self._match(segments, reach, near, joint, self.config.matching, clear_only=True)
         first = _firm(clear, segments)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
-        relocated = relocate(joint, near, first)
+        relocated = relocate(joint, near.ids, first)
         # 4. Match the remaining features with their re-prediction from the new robot pose.
-        matches = _both(clear, segments, self._match, near, extents, relocated, self.config.matching)
+        rest = clear.unmatched
+        again = self._match(segments.take(rest), reach[rest], near, relocated, self.config.matching)
+        matches = _both(clear, again)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, _firm(matches, segments))
         owners = self._store(scan, segments, matches)
@@ -83,13 +85,11 @@ class Mapper:
         walls = self._walls.map(self.backend.belief)
         return MapUpdate(segments, matches, owners, walls, connect(walls, set_aside, self.config.chains))
 
-    def _nearby(self, scan: Scan) -> Int[np.ndarray, " n"]:
-        """Ids of the walls that this scan can show."""
+    def _nearby(self, scan: Scan) -> KnownWalls:
+        """The walls that this scan can show."""
         walls = self._walls.map(self.backend.belief)
-        if not len(walls):
-            return walls.ids
         distance = distance_to_segments(walls.belief.pose_world[None, :2], walls.ends_world)[0]
-        return walls.ids[distance < scan.range_max_m + self.config.matching.offset_m]
+        return self._walls.known(walls.ids[distance < scan.range_max_m + self.config.matching.offset_m])
 
     def _store(self, scan: Scan, segments: Segments, matches: Matches) -> Int[np.ndarray, " s"]:
         """Grow the map by the segments that belong to no wall, and note how far each wall was seen."""
@@ -125,18 +125,9 @@ def _firm(matches: Matches, segments: Segments) -> Observations:
     return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
 
 
-def _both(
-    clear: Matches,
-    segments: Segments,
-    matcher: Matcher,
-    ids: Int[np.ndarray, " n"],
-    extents: Float[np.ndarray, "n 2"],
-    relocated: object,
-    config: MatchingConfig,
-) -> Matches:
-    """Keep the clear matches and match the rest against the relocated prediction."""
+def _both(clear: Matches, again: Matches) -> Matches:
+    """Join the clear matches with those of the remaining segments."""
     rest = clear.unmatched
-    again = matcher(segments.take(rest), ids, extents, relocated, config)
     more = again.pairs.copy()
     more[:, 0] = rest[more[:, 0]]
     return Matches(

@@ -29,8 +29,10 @@ class MatchingConfig:
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
     offset_m: float = 0.5
     """Nor are lines that stand further apart than this at the seen piece."""
-    gap_m: float = 0.2
-    """Largest gap along the line between a segment and the known extent of its wall."""
+    gap_m: float = 0.02
+    """Largest gap along the line between a segment and its wall, beyond how far either may really reach."""
+    overlap_m: float = 0.05
+    """A segment that overlaps two walls by this much shows that they may be one."""
     clear_ratio: float = 9.0
     """A first match is clear when the second-best wall is this many times farther (squared Mahalanobis distance)."""
 
@@ -65,6 +67,18 @@ NO_MATCHES = Matches(
 
 
 @dataclass(frozen=True)
+class KnownWalls:
+    """What matching needs of the walls near the robot, row by row."""
+
+    ids: Int[np.ndarray, " n"]
+    """Ascending."""
+    extents: Float[np.ndarray, "n 2"]
+    """From and to along the line, m from the anchor."""
+    reach: Float[np.ndarray, "n 2"]
+    """How much farther each end may really lie than it was seen, m: next to nothing at a corner."""
+
+
+@dataclass(frozen=True)
 class _Candidates:
     """Pairs of segment and line that may be one, with what the filter says of each."""
 
@@ -73,31 +87,37 @@ class _Candidates:
     model: Innovations
     d2: Float[np.ndarray, " c"]
     gap: Float[np.ndarray, " c"]
+    """Distance along the line between segment and wall, m; negative where they overlap by that much."""
+    excess: Float[np.ndarray, " c"]
+    """What is left of the gap when each end lies as far out as it may, m."""
 
 
 def match(
     segments: Segments,
-    ids: Int[np.ndarray, " n"],
-    extents: Float[np.ndarray, "n 2"],
+    reach: Float[np.ndarray, "s 2"],
+    walls: KnownWalls,
     joint: Joint,
     config: MatchingConfig = MatchingConfig(),
     *,
     clear_only: bool = False,
 ) -> Matches:
-    """Match segments to the lines of `joint`, whose ids and extents are given in the same order.
+    """Match segments to the lines of `joint`, which are those of `walls` in the same order.
+
+    `reach` says how much farther each end of each segment may really lie than it was seen, m.
 
     With `clear_only`, keep only segments with one candidate that stands out, and of these only a jointly
     compatible set: what is safe enough to relocate the robot by.
     """
     count = len(segments)
+    ids = walls.ids
     if not len(ids) or not count:
         return Matches(
             NO_MATCHES.pairs, NO_MATCHES.distances, NO_MATCHES.bridges,
             np.arange(count), NO_MATCHES.doubtful, {},
         )  # fmt: skip
-    found = _candidates(segments, extents, joint, config)
+    found = _candidates(segments, reach, walls, joint, config)
     level = chi2.ppf(config.gate, 2)
-    fits = (found.d2 <= level) & (found.gap <= config.gap_m)
+    fits = (found.d2 <= level) & (found.excess <= config.gap_m)
     best = np.full(count, -1)
     order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
     best[found.segment[order]] = order
@@ -106,13 +126,14 @@ def match(
         chosen = _compatible(_clear(found, chosen, fits, config), found, joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
+    firm = ~segments.is_tentative[found.segment]
     doubt = (found.d2 <= chi2.ppf(config.doubt, 2)) & (found.gap <= 0.0)
     doubtful = np.zeros(count, dtype=bool)
     doubtful[found.segment[doubt]] = True
     return Matches(
         np.stack([found.segment[chosen], ids[found.line[chosen]]], axis=-1),
         found.d2[chosen],
-        ids[_bridges(found, chosen, fits)],
+        ids[_bridges(found, chosen, fits & firm & (found.gap < -config.overlap_m))],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
         _refusals(found, ids, ~matched, level, config),
@@ -134,7 +155,7 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
 
 
 def _candidates(
-    segments: Segments, extents: Float[np.ndarray, "n 2"], joint: Joint, config: MatchingConfig
+    segments: Segments, reach: Float[np.ndarray, "s 2"], walls: KnownWalls, joint: Joint, config: MatchingConfig
 ) -> _Candidates:
     pose, means = joint.mean[:3], joint.mean[3:].reshape(-1, 2)
     alpha_world = segments.lines[:, 0] + pose[2]
@@ -146,8 +167,12 @@ def _candidates(
     model = Innovations(model.e[near], model.H_pose[near], model.H_line[near], model.R[near])
     ends_world = to_world(segments.ends[segment], pose)
     along = np.sum((ends_world - joint.anchors[line][:, None]) * directions(means[line, 0])[:, None], axis=-1)
-    gap = np.maximum(along.min(axis=1) - extents[line, 1], extents[line, 0] - along.max(axis=1))
-    return _Candidates(segment, line, model, _distances(model, line, joint), gap)
+    after = along[:, 0] - walls.extents[line, 1]
+    before = walls.extents[line, 0] - along[:, 1]
+    slack_after = reach[segment, 0] + walls.reach[line, 1]
+    slack_before = reach[segment, 1] + walls.reach[line, 0]
+    gap, excess = np.maximum(after, before), np.maximum(after - slack_after, before - slack_before)
+    return _Candidates(segment, line, model, _distances(model, line, joint), gap, excess)
 
 
 def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) -> Float[np.ndarray, " c"]:
@@ -214,12 +239,12 @@ def _stack(
     return H.reshape(2 * m, size), R.reshape(2 * m, 2 * m)
 
 
-def _bridges(found: _Candidates, chosen: Int[np.ndarray, " m"], fits: np.ndarray) -> Int[np.ndarray, "b 2"]:
-    """Rows of line pairs that one matched segment overlaps both."""
+def _bridges(found: _Candidates, chosen: Int[np.ndarray, " m"], overlaps: np.ndarray) -> Int[np.ndarray, "b 2"]:
+    """Rows of pairs of lines that one matched segment overlaps both."""
     pairs = []
-    for pair in chosen:
-        others = np.flatnonzero(fits & (found.segment == found.segment[pair]) & (found.gap < -0.05))
-        pairs += [(found.line[pair], found.line[k]) for k in others if k != pair and found.gap[pair] < -0.05]
+    for pair in chosen[overlaps[chosen]]:
+        others = np.flatnonzero(overlaps & (found.segment == found.segment[pair]))
+        pairs += [(found.line[pair], found.line[other]) for other in others if other != pair]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
@@ -230,8 +255,8 @@ def _refusals(
     order = np.argsort(-found.d2, kind="stable")
     for pair in order[unmatched[found.segment[order]]]:
         wall, d2, gap = ids[found.line[pair]], found.d2[pair], found.gap[pair]
-        if gap > config.gap_m:
-            why = f"{gap:.2f} m beyond the end of wall {wall} (limit {config.gap_m:.2f} m)"
+        if found.excess[pair] > config.gap_m:
+            why = f"{gap:.2f} m beyond the end of wall {wall}, which may reach {gap - found.excess[pair]:.2f} m farther"
         elif d2 > level:
             why = f"squared distance {d2:.1f} from wall {wall} (gate {level:.1f})"
         else:

@@ -1,16 +1,16 @@
 """How far along its line each wall has been seen, how often, and whether it deserves trust."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from .backend import Belief
-from .geometry.lines import directions
+from .geometry.lines import directions, normals
 from .geometry.poses import to_world
-from .models import reanchor
 from .robot import Scan
 from .segments import EndKind, Segments
+from .matching import KnownWalls
 from .stochastic_map import StochasticMap
 
 
@@ -22,6 +22,15 @@ class WallsConfig:
     """A wall is tentative until it was seen this often with enough beams."""
     patience_steps: int = 15
     """A tentative wall is forgotten after this many scans without a sighting."""
+    sure_gap_m: float = 0.35
+    """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
+    reach_m: float = 0.03
+    """A wall may go on unseen by one beam spacing beyond its last beam, but by no more than this: two rooms'
+    walls on one line stand a wall's thickness apart."""
+    corner_reach_m: float = 0.02
+    """And by this where a corner was seen."""
+    corner_leap_m: float = 0.15
+    """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 
 class Walls:
@@ -32,13 +41,16 @@ class Walls:
         self._ids = np.zeros(0, dtype=np.int64)
         self._extents = np.zeros((0, 2))
         self._spacing = np.zeros((0, 2))
+        self._is_corner = np.zeros((0, 2), dtype=bool)
         self._sightings = np.zeros(0, dtype=np.int64)
         self._last_seen = np.zeros(0, dtype=np.int64)
         self._scans = 0
 
-    def extents(self, ids: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
-        """Return from and to along the line, m from the anchor."""
-        return self._extents[np.searchsorted(self._ids, ids)]
+    def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
+        """Return what matching needs of some walls."""
+        rows = np.searchsorted(self._ids, ids)
+        reach = _reach(self._spacing[rows], self._is_corner[rows], self._config)
+        return KnownWalls(ids, self._extents[rows], reach)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with the extents."""
@@ -66,16 +78,13 @@ class Walls:
         row, other = np.searchsorted(self._ids, [keep, drop])
         belief_row, belief_other = belief.rows([keep, drop])
         t = directions(belief.means[belief_row, 0])
-        moved, _ = reanchor(
-            belief.means[belief_other], belief.anchors[belief_other], belief.anchors[belief_row]
-        )
-        del moved
         shift = t @ (belief.anchors[belief_other] - belief.anchors[belief_row])
         theirs = self._extents[other] + shift
         for side, outward in enumerate((-1.0, 1.0)):
             if outward * (theirs[side] - self._extents[row, side]) > 0:
                 self._extents[row, side] = theirs[side]
                 self._spacing[row, side] = self._spacing[other, side]
+                self._is_corner[row, side] = self._is_corner[other, side]
         self._sightings[row] += self._sightings[other]
         self._last_seen[row] = max(self._last_seen[row], self._last_seen[other])
         self._drop(np.array([drop]))
@@ -85,13 +94,15 @@ class Walls:
         self._ids = np.concatenate([self._ids, ids])
         self._extents = np.concatenate([self._extents, np.tile([np.inf, -np.inf], (m, 1))])
         self._spacing = np.concatenate([self._spacing, np.full((m, 2), np.inf)])
+        self._is_corner = np.concatenate([self._is_corner, np.zeros((m, 2), dtype=bool)])
         self._sightings = np.concatenate([self._sightings, np.zeros(m, dtype=np.int64)])
         self._last_seen = np.concatenate([self._last_seen, np.full(m, self._scans)])
 
     def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
-        self._sightings, self._last_seen = self._sightings[kept], self._last_seen[kept]
+        self._is_corner, self._sightings = self._is_corner[kept], self._sightings[kept]
+        self._last_seen = self._last_seen[kept]
 
     def _stretch(
         self,
@@ -114,11 +125,58 @@ class Walls:
                 if beyond > 0 or (sharper and -beyond < self._spacing[row, side]):
                     self._extents[row, side] = along[k, side]
                     self._spacing[row, side] = spacing[k, side]
+                    self._is_corner[row, side] = corner[k, side]
+
+
+def sure_pieces(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:
+    """Shorten each segment to where its beams stand close enough together that no door hides between them.
+
+    Beams dtheta apart meet a line at distance r, s beyond the foot of the perpendicular, (r^2 + s^2) dtheta / r
+    apart. A segment that lies beyond altogether keeps the end nearer to the foot. Corners far beyond the last
+    beam are not believed either.
+    """
+    segments = _without_leaps(segments, scan, config)
+    r = segments.lines[:, 1]
+    farthest = np.sqrt(np.maximum(r * config.sure_gap_m / beam_step(scan) - r**2, 0.0))
+    t, n = directions(segments.lines[:, 0]), normals(segments.lines[:, 0])
+    along = np.sum(segments.ends * t[:, None], axis=-1)
+    inner = np.where(np.sign(along[:, :1]) == np.sign(along[:, 1:]), np.abs(along).min(axis=1, keepdims=True), 0.0)
+    farthest = np.maximum(farthest[:, None], inner)
+    clipped = np.clip(along, -farthest, farthest)
+    cut = clipped != along
+    ends = np.where(cut[..., None], (r[:, None] * n)[:, None] + clipped[..., None] * t[:, None], segments.ends)
+    return replace(segments, ends=ends, end_kinds=np.where(cut, int(EndKind.OPEN), segments.end_kinds))
+
+
+def _without_leaps(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:
+    """Put ends that lie far beyond the last beam back to where that beam meets the line."""
+    off_normal = scan.bearings_rad[segments.beams] - segments.lines[:, :1]
+    distance = segments.lines[:, 1:] / np.maximum(np.cos(off_normal), 0.02)
+    bearing = scan.bearings_rad[segments.beams]
+    last = distance[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    leap = np.hypot(*np.moveaxis(segments.ends - last, -1, 0)) > config.corner_leap_m
+    kinds = np.where(leap, int(EndKind.OPEN), segments.end_kinds)
+    return replace(segments, ends=np.where(leap[..., None], last, segments.ends), end_kinds=kinds)
+
+
+def end_reach(segments: Segments, scan: Scan, config: WallsConfig) -> Float[np.ndarray, "n 2"]:
+    """Return how much farther each end of each segment may really lie than it was seen, m."""
+    return _reach(beam_spacing(scan, segments), segments.end_kinds == EndKind.CORNER, config)
+
+
+def _reach(
+    spacing: Float[np.ndarray, "n 2"], is_corner: Bool[np.ndarray, "n 2"], config: WallsConfig
+) -> Float[np.ndarray, "n 2"]:
+    return np.where(is_corner, config.corner_reach_m, np.minimum(spacing, config.reach_m))
+
+
+def beam_step(scan: Scan) -> float:
+    """Return the angle between neighbouring beams, rad."""
+    return float((scan.bearings_rad[-1] - scan.bearings_rad[0]) / max(len(scan.bearings_rad) - 1, 1))
 
 
 def beam_spacing(scan: Scan, segments: Segments) -> Float[np.ndarray, "n 2"]:
     """Return the distance between neighbouring beams on the wall at each end of each segment, m."""
-    step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / max(len(scan.bearings_rad) - 1, 1)
     distance = np.hypot(segments.ends[..., 0], segments.ends[..., 1])
     cosine = np.clip(segments.lines[:, 1, None] / np.maximum(distance, 1e-9), 0.05, 1.0)
-    return step * distance / cosine
+    return beam_step(scan) * distance / cosine
