@@ -145,13 +145,15 @@ def _fitted(
     place = np.arange(len(line)) + (start - offsets)[line]
     at = place % len(returns.beam)
     beams = Beams(returns.beams.cos[at], returns.beams.sin[at], returns.beams.rho[at])
-    keep = np.full(len(line), returns.sigma_m**-2)
-    fit, residual, leverage = refit(fit, beams, line, offsets, keep)
-    gate = np.full(len(line), (config.gate_sigmas * returns.sigma_m) ** 2)
+    sigma2 = returns.sigma_m**2
+    fit = refit(fit, beams, line, offsets, np.full(len(line), 1.0 / sigma2))
+    gate = np.full(len(line), config.gate_sigmas**2)
     free = np.concatenate((offsets[~is_corner[:, 0]], (offsets + size - 1)[~is_corner[:, 1]]))
-    gate[free] = (config.open_gate_sigmas * returns.sigma_m) ** 2
-    is_in = residual * residual <= gate * np.maximum(1.0 - leverage, 1e-9)
-    fit, _, _ = refit(fit, beams, line, offsets, keep * is_in)
+    gate[free] = config.open_gate_sigmas**2
+    predicted, variance = prediction(_take(fit, line), beams.cos, beams.sin)
+    # A residual varies by sigma^2 less what its own beam lent to the line; a beam that alone holds the line stays.
+    is_in = np.square(predicted - beams.rho) <= gate * np.maximum(sigma2 - variance, 1e-6 * sigma2)
+    fit = refit(fit, beams, line, offsets, is_in / sigma2)
     counts = np.add.reduceat(is_in, offsets, dtype=int)
     first = np.minimum.reduceat(np.where(is_in, place, place[-1] + 1), offsets)
     last = np.maximum.reduceat(np.where(is_in, place, place[0] - 1), offsets)

@@ -63,8 +63,8 @@ def fit_runs(
 
 def refit(
     fit: Fit, beams: Beams, line: Int[np.ndarray, " m"], offsets: Int[np.ndarray, " n"], keep: Float[np.ndarray, " m"]
-) -> tuple[Fit, Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-    """Return the maximum-likelihood lines near `fit` (one Gauss-Newton step in range), residuals m and leverages.
+) -> Fit:
+    """Return the maximum-likelihood lines near `fit`: one Gauss-Newton step on the ranges.
 
     `beams` are grouped by `line`, each group starting at `offsets`; `keep` is 1/sigma^2 for beams to use, else 0.
     The derivative of the range p = 1/(a c + b s) is -p^2 (c, s), taken at the prediction: weighting by the measured
@@ -73,18 +73,18 @@ def refit(
     c, s = beams.cos, beams.sin
     p = 1.0 / (fit.a[line] * c + fit.b[line] * s)
     e = p - beams.rho
-    p2 = p * p
-    gc, gs = p2 * c, p2 * s
+    p *= p
+    gc, gs = p * c, p * s
     terms = np.empty((5, len(p)))
-    terms[0], terms[1], terms[2], terms[3], terms[4] = gc * gc, gc * gs, gs * gs, gc * e, gs * e
+    np.multiply(gc, gc, out=terms[0])
+    np.multiply(gc, gs, out=terms[1])
+    np.multiply(gs, gs, out=terms[2])
+    np.multiply(gc, e, out=terms[3])
+    np.multiply(gs, e, out=terms[4])
     terms *= keep
     cc, cs, ss, xc, xs = np.add.reduceat(terms, offsets, axis=1)
     det = cc * ss - cs * cs
-    da = (ss * xc - cs * xs) / det
-    db = (cc * xs - cs * xc) / det
-    residual = e - gc * da[line] - gs * db[line]
-    leverage = (ss[line] * gc * gc - 2.0 * cs[line] * gc * gs + cc[line] * gs * gs) * (keep / det[line])
-    return Fit(fit.a + da, fit.b + db, cc, cs, ss), residual, leverage
+    return Fit(fit.a + (ss * xc - cs * xs) / det, fit.b + (cc * xs - cs * xc) / det, cc, cs, ss)
 
 
 def polar(fit: Fit) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 2"]]:
@@ -113,7 +113,7 @@ def prediction(
     """Return the range m at which beams meet their lines, and the variance m^2 that the lines' own error gives it."""
     p = 1.0 / (fit.a * cos + fit.b * sin)
     det = fit.cc * fit.ss - fit.cs * fit.cs
-    variance = (fit.ss * cos * cos - 2.0 * fit.cs * cos * sin + fit.cc * sin * sin) / det
+    variance = ((fit.ss * cos - 2.0 * fit.cs * sin) * cos + fit.cc * sin * sin) / det
     return p, np.square(p * p) * variance
 
 

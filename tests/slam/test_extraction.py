@@ -91,7 +91,7 @@ def test_refitting_converges_to_the_maximum_likelihood_line():
     beams, zeros = Beams(np.cos(theta), np.sin(theta), rho), np.zeros(len(theta), int)
     fit = Fit(*(np.array([x]) for x in (0.7, 0.2, 1.0, 0.0, 1.0)))
     for _ in range(6):
-        fit, _, _ = refit(fit, beams, zeros, np.array([0]), np.full(len(theta), SIGMA**-2))
+        fit = refit(fit, beams, zeros, np.array([0]), np.full(len(theta), SIGMA**-2))
     best = least_squares(lambda x: (x[1] / np.cos(theta - x[0]) - rho) / SIGMA, [0.3, 1.4], xtol=1e-14, ftol=1e-14)
     line, cov = polar(fit)
     np.testing.assert_allclose(line[0], best.x, atol=1e-6)
