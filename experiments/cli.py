@@ -5,7 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import tyro
 
@@ -16,6 +16,7 @@ from .scenario import UsageError
 BAD_USAGE, INTERRUPTED = 2, 130
 
 
+@runtime_checkable
 class Command(Protocol):
     """A subcommand: its fields are its arguments."""
 

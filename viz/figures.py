@@ -53,7 +53,7 @@ def draw_map(picture: Picture) -> Figure:
     axes = figure.add_axes(
         (0.5 / (width + 0.8), 1.05 / (height + 1.85), width / (width + 0.8), height / (height + 1.85))
     )
-    _prepare(axes, low, high, size[0] * inch_per_m < width)
+    _prepare(axes, low, high, narrow=bool(size[0] * inch_per_m < width))
     points_per_m = 72.0 * inch_per_m
     handles = [
         *_floor(axes, picture, points_per_m),
@@ -195,7 +195,7 @@ def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     return [_marker("o", "#D55E0033", palette.ALARM, 7, label)]
 
 
-def _marker(shape: str, face: str, edge: str, size: float, label: str) -> Line2D:
+def _marker(shape: str, face: str, edge: str, size: int, label: str) -> Line2D:
     return Line2D(
         [], [], linestyle="none", marker=shape, color=face, markeredgecolor=edge, markersize=size, label=label
     )

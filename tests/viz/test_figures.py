@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+
+from slam.backend import Belief, Joint
+from slam.chains import Chain, OpenEnd
+from slam.stochastic_map import StochasticMap
+from viz.figures import Picture, draw_map, png
+
+
+def picture(closed, size=2.0):
+    alpha = np.array([-np.pi / 2, 0.0, np.pi / 2, np.pi])
+    anchors = 0.5 * size * np.array([[1.0, 0.0], [2.0, 1.0], [1.0, 2.0], [0.0, 1.0]])
+    means = np.stack([alpha, np.zeros(4)], axis=-1)
+    belief = Belief(
+        np.array([0.5, 0.5, 0.3]), np.diag([1e-4, 4e-4, 1e-4]), np.arange(4), anchors, means,
+        lambda ids: Joint(np.zeros(3), np.eye(3), np.zeros((0, 2))),
+    )  # fmt: skip
+    extents = np.tile([-0.5 * size, 0.5 * size], (4, 1))
+    walls = StochasticMap(belief, extents, np.full(4, 3), np.zeros(4, dtype=bool))
+    corners = size * np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+    ends = () if closed else (OpenEnd(0, 0, corners[3]), OpenEnd(3, 1, corners[3]))
+    chain = Chain((0, 1, 2, 3), corners if closed else corners[:3], ends)
+    path = np.array([[0.4, 0.4, 0.0], [0.5, 0.5, 0.3]])
+    return Picture(walls, (chain,), path, "title", true_path_world=path, true_floor=(corners,))
+
+
+def labels(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_legend_names_what_is_drawn():
+    assert "closed chain, 4 walls" in labels(draw_map(picture(closed=True)))
+    open_labels = labels(draw_map(picture(closed=False)))
+    assert {"chain with open ends", "open end"} <= set(open_labels)
+
+
+@pytest.mark.parametrize("size", [2.0, 80.0])
+def test_the_picture_is_a_png_and_the_same_bytes_again(size):
+    one, two = (png(draw_map(picture(closed=True, size=size))) for _ in range(2))
+    assert one.startswith(b"\x89PNG")
+    assert one == two
