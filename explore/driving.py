@@ -63,9 +63,7 @@ class Pilot:
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
         return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.radius_m
 
-    def command(
-        self, pose_world: Float[np.ndarray, "3"], scan: Scan, free_space: FreeSpace
-    ) -> MotionCommand | None:
+    def command(self, pose_world: Float[np.ndarray, "3"], scan: Scan, free_space: FreeSpace) -> MotionCommand | None:
         """Return the next step along the path, or None where no safe one leads on."""
         aim = to_robot(self._aim(pose_world[:2])[None], pose_world)[0]
         error, distance = float(np.arctan2(aim[1], aim[0])), float(np.hypot(aim[0], aim[1]))

@@ -9,7 +9,6 @@ from jaxtyping import Float
 
 from slam.chains import Chain, OpenEnd
 from slam.robot import MotionCommand
-from slam.stochastic_map import StochasticMap
 
 from .goal import Goal, SetAside
 from .looks import ideal_places, places_near
@@ -43,9 +42,9 @@ class Explorer:
         self._strategy, self._start, self._config = strategy, start_world, config
         self._errand: Errand | None = None
         self._steps_on_goal = 0
-        self._attempts: list[Float[np.ndarray, "2"]] = []
+        self._attempts: list[Float[np.ndarray, 2]] = []
         self._unreached: dict[tuple[int, int], int] = {}
-        self._skipped_places: list[Float[np.ndarray, "2"]] = []
+        self._skipped_places: list[Float[np.ndarray, 2]] = []
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
@@ -55,9 +54,7 @@ class Explorer:
         """What the robot is about, in words."""
         return self._errand.doing if self._errand is not None else ""
 
-    def command(
-        self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph
-    ) -> MotionCommand | None:
+    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph) -> MotionCommand | None:
         """Return the next step, or None when there is nowhere left to go."""
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)

@@ -115,7 +115,7 @@ class EndErrand(Errand):
         self.end = end
         self.route = route
         self._on_route = False
-        self._visited: list[Float[np.ndarray, "2"]] = []
+        self._visited: list[Float[np.ndarray, 2]] = []
 
     def follow(self, end: OpenEnd) -> None:
         """Take note of where the end is now; one that has moved on is looked at afresh."""
@@ -136,14 +136,18 @@ class EndErrand(Errand):
         ideal = ideal_places(self.end, around.walls, self._config.looks)
         whole: Planner | None = None
         while self._stage < len(LOOKS):
-            places = self._fresh(places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.looks))
+            places = self._fresh(
+                places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.looks)
+            )
             self.doing = f"to look {LOOKS[self._stage]} the open end of wall {self.end.wall}"
             if self._drive(planner, places):
                 return self._note()
             if self._stage == 0 and self._follow_route(around, planner):
                 return True
             whole = whole or self._planner(around, None)
-            places = self._fresh(places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.looks))
+            places = self._fresh(
+                places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.looks)
+            )
             if self._drive(whole, places):
                 return self._note()
             self._stage += 1
@@ -193,6 +197,4 @@ class PlaceErrand(Errand):
     def _plan(self, around: Surroundings) -> bool:
         if self._stage > 0:
             return False
-        return any(
-            self._drive(self._planner(around, window), self._places) for window in (self._config.window_m, None)
-        )
+        return any(self._drive(self._planner(around, window), self._places) for window in (self._config.window_m, None))

@@ -104,7 +104,6 @@ class Mapper:
         forgotten = self._walls.see(self.backend.belief, scan, segments, owners)
         if len(forgotten):
             self.backend.remove(forgotten)
-            owners[np.isin(owners, forgotten)] = -1
         return owners
 
     def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> None:

@@ -33,6 +33,10 @@ class MatchingConfig:
     """Largest gap along the line between a segment and its wall, beyond how far either may really reach."""
     overlap_m: float = 0.05
     """A segment that overlaps two walls by this much shows that they may be one."""
+    short_m: float = 0.3
+    """Shorter segments are too poor in direction for the gate alone: one that lies within `beside_m` is in doubt too."""
+    beside_m: float = 0.08
+    """Distance from a wall, across it, within which a short segment that overlaps it is not a new wall."""
     clear_ratio: float = 9.0
     """A first match is clear when the second-best wall is this many times farther (squared Mahalanobis distance)."""
 
@@ -127,7 +131,9 @@ def match(
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     firm = ~segments.is_tentative[found.segment]
-    doubt = (found.d2 <= chi2.ppf(config.doubt, 2)) & (found.gap <= 0.0)
+    lengths = np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T)
+    beside = (lengths[found.segment] < config.short_m) & (np.abs(found.model.e[:, 1]) < config.beside_m)
+    doubt = (beside | (found.d2 <= chi2.ppf(config.doubt, 2))) & (found.gap <= 0.0)
     doubtful = np.zeros(count, dtype=bool)
     doubtful[found.segment[doubt]] = True
     return Matches(

@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .backend import Belief
-from .geometry.lines import directions, normals
+from .geometry.lines import directions, distance_to_segments, normals
 from .geometry.poses import to_world
+from .matching import KnownWalls
 from .robot import Scan
 from .segments import EndKind, Segments
-from .matching import KnownWalls
+from .sightlines import sightlines
 from .stochastic_map import StochasticMap
 
 
@@ -24,11 +25,17 @@ class WallsConfig:
     """A tentative wall is forgotten after this many scans without a sighting."""
     sure_gap_m: float = 0.35
     """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    reach_m: float = 0.03
+    reach_m: float = 0.02
     """A wall may go on unseen by one beam spacing beyond its last beam, but by no more than this: two rooms'
     walls on one line stand a wall's thickness apart."""
-    corner_reach_m: float = 0.02
+    corner_reach_m: float = 0.01
     """And by this where a corner was seen."""
+    pass_margin_m: float = 0.1
+    """A beam that goes on this far beyond a line has passed through it."""
+    contradictions: int = 2
+    """A wall is cut back once so many scans have shown beams passing through it."""
+    least_m: float = 0.05
+    """A wall cut back to less than this is forgotten."""
     corner_leap_m: float = 0.15
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
@@ -44,6 +51,7 @@ class Walls:
         self._is_corner = np.zeros((0, 2), dtype=bool)
         self._sightings = np.zeros(0, dtype=np.int64)
         self._last_seen = np.zeros(0, dtype=np.int64)
+        self._against = np.zeros(0, dtype=np.int64)
         self._scans = 0
 
     def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
@@ -68,10 +76,33 @@ class Walls:
         self._stretch(belief, scan, segments, used, rows)
         self._sightings[np.unique(rows)] += 1
         self._last_seen[rows] = self._scans
+        self._contradict(belief, scan)
         stale = self._scans - self._last_seen > self._config.patience_steps
-        forgotten = self._ids[stale & (self._sightings < self._config.trusted_sightings)]
+        shaky = stale & (self._sightings < self._config.trusted_sightings)
+        forgotten = self._ids[shaky | (self._extents[:, 1] - self._extents[:, 0] < self._config.least_m)]
         self._drop(forgotten)
+        owners[np.isin(owners, forgotten)] = -1
         return forgotten
+
+    def _contradict(self, belief: Belief, scan: Scan) -> None:
+        """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
+        ends = self.map(belief).ends_world
+        near = np.flatnonzero(distance_to_segments(belief.pose_world[None, :2], ends)[0] < scan.range_max_m)
+        lines = sightlines(
+            scan, belief.pose_world, belief.anchors[near], belief.means[near], self._config.pass_margin_m
+        )
+        inside = (lines.along > self._extents[near, :1] + 0.02) & (lines.along < self._extents[near, 1:] - 0.02)
+        passed = np.count_nonzero(lines.passes & inside, axis=1) >= 2
+        self._against[near] = np.where(passed, self._against[near] + 1, 0)
+        for k in np.flatnonzero(self._against[near] >= self._config.contradictions):
+            row = near[k]
+            through, on = lines.along[k, lines.passes[k] & inside[k]], lines.along[k, lines.hits[k] & inside[k]]
+            kept = _kept_piece(self._extents[row], through, on)
+            cut = kept != self._extents[row]
+            self._extents[row] = kept
+            self._spacing[row] = np.where(cut, self._config.reach_m, self._spacing[row])
+            self._is_corner[row] &= ~cut
+            self._against[row] = 0
 
     def merge(self, belief: Belief, keep: int, drop: int) -> None:
         """Give `keep` the extent of both; call it before the back end merges them."""
@@ -97,12 +128,13 @@ class Walls:
         self._is_corner = np.concatenate([self._is_corner, np.zeros((m, 2), dtype=bool)])
         self._sightings = np.concatenate([self._sightings, np.zeros(m, dtype=np.int64)])
         self._last_seen = np.concatenate([self._last_seen, np.full(m, self._scans)])
+        self._against = np.concatenate([self._against, np.zeros(m, dtype=np.int64)])
 
     def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
         self._is_corner, self._sightings = self._is_corner[kept], self._sightings[kept]
-        self._last_seen = self._last_seen[kept]
+        self._last_seen, self._against = self._last_seen[kept], self._against[kept]
 
     def _stretch(
         self,
@@ -126,6 +158,22 @@ class Walls:
                     self._extents[row, side] = along[k, side]
                     self._spacing[row, side] = spacing[k, side]
                     self._is_corner[row, side] = corner[k, side]
+
+
+def _kept_piece(
+    extent: Float[np.ndarray, "2"], through: Float[np.ndarray, " p"], on: Float[np.ndarray, " h"]
+) -> Float[np.ndarray, "2"]:
+    """Return the piece between passing beams that most beams end on (else the longest), cut back to the last of these."""
+    bounds = np.concatenate([extent[:1], np.sort(through), extent[1:]])
+    hits, length = np.histogram(on, bounds)[0], np.diff(bounds)
+    best = int(np.lexsort((length, hits))[-1])
+    low, high = bounds[best], bounds[best + 1]
+    inner = on[(on >= low) & (on <= high)]
+    if len(inner) and best > 0 and inner.min() - low < 0.5:
+        low = inner.min()
+    if len(inner) and best < len(length) - 1 and high - inner.max() < 0.5:
+        high = inner.max()
+    return np.array([low, high])
 
 
 def sure_pieces(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:

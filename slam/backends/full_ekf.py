@@ -47,9 +47,7 @@ class FullEkf:
             index = self._columns(rows)
             return Joint(x[index], P[np.ix_(index, index)], anchors[rows])
 
-        belief = Belief(
-            x[:POSE], P[:POSE, :POSE].copy(), ids, anchors, x[POSE:].reshape(-1, 2), query
-        )
+        belief = Belief(x[:POSE], P[:POSE, :POSE].copy(), ids, anchors, x[POSE:].reshape(-1, 2), query)
         return belief
 
     def predict(self, odometry: Odometry) -> None:

@@ -27,7 +27,9 @@ def through(segments: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "n 2"]:
     return np.stack([alpha, np.sum(normals(alpha) * segments[:, 0], axis=-1)], axis=-1)
 
 
-def lines_to_world(lines_robot: Float[np.ndarray, "n 2"], pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 2"]:
+def lines_to_world(
+    lines_robot: Float[np.ndarray, "n 2"], pose_world: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "n 2"]:
     """Return robot-frame lines in the world frame; there r may be negative."""
     alpha = wrap(lines_robot[:, 0] + pose_world[2])
     return np.stack([alpha, lines_robot[:, 1] + normals(alpha) @ pose_world[:2]], axis=-1)
