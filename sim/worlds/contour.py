@@ -184,7 +184,7 @@ def _refine(
 
 
 def _intervals(
-    faces: Float[np.ndarray, "n 2 2"], face_rings: Int[np.ndarray, " n"], spans: list[Float[np.ndarray, "i 2"]]
+    faces: Float[np.ndarray, "n 2 2"], face_rings: Int[np.ndarray, " n"], spans: list[Float[np.ndarray, "_ 2"]]
 ) -> Contour:
     face = np.repeat(np.arange(len(faces)), [len(span) for span in spans])
     span_m = np.concatenate(spans).reshape(-1, 2)

@@ -20,6 +20,7 @@ from skimage.measure import find_contours, label
 
 from .drawing import Drawing, WorldError, numbers, shorten
 from .files import read_bytes
+from .solid import drop_collinear
 
 PIXEL_M = 0.05
 PIXELS_MAX = 40_000_000
@@ -135,13 +136,28 @@ def _trace(solid: Bool[np.ndarray, "h w"], metres: float, origin: Float[np.ndarr
     if keep[clusters].all():
         raise WorldError("expected light free space, found only dark or unknown pixels: check the image's greys")
     found = find_contours(mask.astype(float), 0.5, fully_connected="high")  # type: ignore[no-untyped-call]
-    rings = [ring for ring in found if len(ring) > 3]
+    rings = [_square(ring[:-1]) for ring in found if len(ring) > 4]
     outlines = [shapely.LinearRing(_to_world(ring, height, metres, origin)) for ring in rings]
     area = shapely.build_area(shapely.geometrycollections(outlines))
     corners = np.array([[-0.5, -0.5], [-0.5, width - 0.5], [height - 0.5, width - 0.5], [height - 0.5, -0.5]]) + 1
     parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
     sheet = shapely.Polygon(_to_world(corners, height, metres, origin))
     return Drawing(solids=tuple(parts), sheet=sheet, simplify_m=STRAIGHT_PIXELS * metres)
+
+
+def _square(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+    """Return a ring of pixel outlines (row, column) whose right angles, cut by the tracing, are corners again."""
+    ring = drop_collinear(ring)
+    after = np.roll(ring, -1, axis=0)
+    edge = after - ring
+    before, behind = np.roll(edge, 1, axis=0), np.roll(edge, -1, axis=0)
+    length = np.abs(edge).sum(axis=1)
+    chamfer = (np.abs(np.abs(edge) - 0.5) < 1e-9).all(axis=1) & (np.abs(np.sum(before * behind, axis=1)) < 1e-9)
+    chamfer &= (np.roll(length, 1) >= 1) & (np.roll(length, -1) >= 1)
+    chamfer &= (np.abs(before).min(axis=1) < 1e-9) & (np.abs(behind).min(axis=1) < 1e-9)
+    corner = ring + np.where(np.abs(before) > 1e-9, edge, 0.0)
+    squared: Float[np.ndarray, "m 2"] = np.where(chamfer[:, None], corner, ring)[~np.roll(chamfer, 1)]
+    return squared
 
 
 def _to_world(

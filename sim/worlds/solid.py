@@ -84,10 +84,11 @@ def _behind_leaks(part: shapely.Polygon, page: shapely.Polygon) -> list[shapely.
 
 
 def _opened(part: shapely.Polygon, width_m: float) -> list[shapely.Polygon]:
-    """Return the pieces of a free part without what is narrower; mitres keep all corners where they were drawn."""
-    pieces = _areas(part.buffer(-0.5 * width_m, join_style="mitre", mitre_limit=MITRE))
-    # One by one and clipped, lest the mitres of two pieces meet again in the slit between them.
-    grown = [piece.buffer(0.5 * width_m, join_style="mitre", mitre_limit=MITRE) for piece in pieces]
+    """Return the pieces of a free part without what is narrower, all other corners where they were drawn."""
+    pieces = _areas(part.buffer(-0.5 * width_m, quad_segs=8))
+    # Grown with mitres, a little more than what arcs of 8 chords lost, and clipped: corners come back exactly. One by
+    # one, lest the mitres of two pieces meet again in the slit between them.
+    grown = [piece.buffer(0.505 * width_m, join_style="mitre", mitre_limit=MITRE) for piece in pieces]
     return [area for piece in grown for area in _areas(piece.intersection(part))]
 
 
@@ -141,12 +142,12 @@ def _straighten(part: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
     simple = part.simplify(tolerance_m)
     if not isinstance(simple, shapely.Polygon) or not simple.is_valid or simple.is_empty:
         simple = part
-    rings = [_drop_collinear(shapely.get_coordinates(ring)[:-1]) for ring in (simple.exterior, *simple.interiors)]
+    rings = [drop_collinear(shapely.get_coordinates(ring)[:-1]) for ring in (simple.exterior, *simple.interiors)]
     straight = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) > 2])
     return straight if straight.is_valid else simple
 
 
-def _drop_collinear(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+def drop_collinear(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
     """Return a ring without vertices that lie within 1 micrometre of the chord of their neighbours."""
     before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
     chord, off = after - before, ring - before

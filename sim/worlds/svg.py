@@ -30,7 +30,7 @@ DARK = 0.7
 CURVE_STEPS = 24
 SHAPES = 200_000
 UNITLESS_MAX = 200.0
-PHYSICAL = ("mm", "cm", "in", "pt", "pc", "Q")
+PHYSICAL = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "Q": 0.00025}
 PIXEL_M = 0.0254 / 96
 XLINK = "{http://www.w3.org/1999/xlink}href"
 INKSCAPE_LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
@@ -121,10 +121,10 @@ def _stated_scale(root: Element, box: tuple[float, float, float, float] | None) 
     sizes = []
     for key, i in (("width", 2), ("height", 3)):
         length = (root.get(key) or "").strip()
-        if length.endswith(PHYSICAL):
+        if length.endswith(tuple(PHYSICAL)):
             try:
-                metres = float(svgelements.Length(length).value(ppi=96)) * PIXEL_M
-            except Exception:
+                metres = float(length.rstrip("mcinptQ")) * next(v for k, v in PHYSICAL.items() if length.endswith(k))
+            except ValueError:
                 raise WorldError(
                     f"expected {key} as a length such as 900cm, found {shorten(length)}: correct it"
                 ) from None
