@@ -11,7 +11,7 @@ import tyro
 
 from .explore_command import Explore
 from .listings import Backends, Strategies, Worlds
-from .scenario import UsageError
+from .scenario import UsageError, choose
 
 BAD_USAGE, INTERRUPTED = 2, 130
 
@@ -53,6 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(arguments: Sequence[str] | None) -> Command:
     """Return the command that the arguments name; raises UsageError, in one line, where they make none."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words and not words[0].startswith("-"):
+        # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
+        choose("command", words[0], COMMANDS)
     said = io.StringIO()
     try:
         with redirect_stderr(said):
@@ -60,7 +64,7 @@ def _parse(arguments: Sequence[str] | None) -> Command:
                 COMMANDS,
                 prog="chainslam",
                 description="Explore a building by wall following and map it as chains of line segments.",
-                args=list(sys.argv[1:] if arguments is None else arguments),
+                args=words,
             )
         return command
     except SystemExit as leaving:

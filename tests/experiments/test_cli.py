@@ -16,6 +16,7 @@ def test_listings_start_each_line_with_a_name(listing, capsys):
     [
         [],
         ["fly"],
+        ["fly", "--help"],
         ["explore"],
         ["explore", "no-such-world"],
         ["explore", "no-such-world.json"],
