@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 import yaml
 from jaxtyping import Bool, Float
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 from skimage.measure import find_contours, label
 
 from .drawing import Drawing, WorldError, numbers, shorten
@@ -108,6 +108,12 @@ def _grey(path: Path) -> Float[np.ndarray, "h w"]:
             return _lightness(image)
     except WorldError:
         raise
+    except Image.DecompressionBombError:
+        raise WorldError(f"expected at most {PIXELS_MAX / 1e6:g} megapixels, found far more: shrink it") from None
+    except UnidentifiedImageError:
+        raise WorldError(
+            f"expected a PNG or PGM image, found another or a broken one: save {path.name} again"
+        ) from None
     except Exception as error:
         # Decoders raise whatever a broken file makes them meet; to the user all of it is one bad file.
         raise WorldError(f"expected a PNG or PGM image, found {shorten(str(error))}: save {path.name} again") from None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
@@ -55,9 +56,22 @@ def load(
     of a bare image (0.05 where not given) or metres per user unit of an SVG file. Raises WorldError, in one line.
     """
     pose = None if start is None else as_pose(numbers(list(start), (2, 3), "start", "(x, y, heading)"))
-    text = str(name_or_path)
+    # Degenerate shapes raise flags of floating point inside GEOS on the way to a sound result.
+    with np.errstate(all="ignore"):
+        try:
+            name, drawing = _read(str(name_or_path), scale)
+            return build(name, drawing, pose)
+        except shapely.errors.GEOSException as error:
+            raise WorldError(
+                f"expected outlines that can be mended, found {shorten(str(error))}: redraw them"
+            ) from None
+
+
+def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
+    if scale is not None and not 0 < scale < np.inf:
+        raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
     if text in WORLDS:
-        return build(text, read_svg((HERE / WORLDS[text].file).read_bytes()), pose)
+        return text, read_svg((HERE / WORLDS[text].file).read_bytes())
     path = Path(text)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -65,6 +79,4 @@ def load(
             f"expected one of {', '.join(WORLDS)} or a file ending in {', '.join(READERS)}, found {shorten(text)}:"
             " choose one of these"
         )
-    if scale is not None and not 0 < scale < np.inf:
-        raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
-    return build(path.stem, reader(path, scale), pose)
+    return path.stem, reader(path, scale)

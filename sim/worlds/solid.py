@@ -3,6 +3,7 @@
 import numpy as np
 import shapely
 from jaxtyping import Float
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
@@ -36,10 +37,17 @@ def solid_of(drawing: Drawing) -> BaseGeometry:
     """Return all that is solid: walls 0.1 m thick around the lines, and filled polygons, mended where they cross."""
     if not drawing.lines and not drawing.solids:
         raise WorldError("expected walls, found nothing drawn: draw dark lines or filled shapes")
-    merged = shapely.line_merge(shapely.union_all(np.array(drawing.lines))) if drawing.lines else shapely.LineString()
+    lines, solids = _on_grid(drawing.lines), _on_grid(drawing.solids)
+    merged = shapely.line_merge(shapely.union_all(lines)) if len(lines) else shapely.LineString()
     thick = merged.buffer(0.5 * WALL_M, cap_style="square", join_style="mitre", mitre_limit=MITRE)
-    mended = [shapely.make_valid(polygon) for polygon in drawing.solids]
+    mended = [shapely.make_valid(polygon) for polygon in solids]
     return shapely.union_all([thick, *(part for shape in mended for part in _areas(shape))])
+
+
+def _on_grid(shapes: tuple[shapely.LineString, ...] | tuple[shapely.Polygon, ...]) -> NDArray[np.object_]:
+    """Return shapes on a grid of 1 micrometre, without those that vanish: finer steps upset the algebra of polygons."""
+    rounded: NDArray[np.object_] = shapely.transform(np.array(shapes, dtype=object), lambda at: np.round(at, 6))
+    return rounded[shapely.length(rounded) > 0]
 
 
 def _areas(shape: BaseGeometry) -> list[shapely.Polygon]:

@@ -49,7 +49,7 @@ def read_svg(data: bytes, scale: float | None = None) -> Drawing:
     lines: list[shapely.LineString] = []
     solids: list[shapely.Polygon] = []
     for rings, rule in shapes:
-        world = [(ring * [1, -1] + [0, height]) * metres for ring in rings]
+        world = [np.round((ring * [1, -1] + [0, height]) * metres, 6) for ring in rings]
         if rule is None:
             lines += [shapely.LineString(ring) for ring in world]
         else:

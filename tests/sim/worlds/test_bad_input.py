@@ -1,0 +1,208 @@
+"""Whatever a file holds, load gives a World or one line that tells what is wrong."""
+
+import contextlib
+import json
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from sim.worlds import World, WorldError, load
+
+QUICK = settings(
+    max_examples=60, deadline=None, database=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
+NS = 'xmlns="http://www.w3.org/2000/svg"'
+ROOM = '<rect id="r" width="8" height="6" fill="none" stroke="black"/>'
+LAUGHS = '<!DOCTYPE svg [<!ENTITY a "lol"><!ENTITY b "&a;&a;&a;">]>'
+USES = "".join(
+    f'<g id="u{i}"><use href="#u{i + 1}"/><use href="#u{i + 1}"/><use href="#u{i + 1}"/></g>' for i in range(30)
+)
+
+
+def _plan(**changes: object) -> str:
+    return json.dumps({"walls": BOX, "start": [4, 3], **changes})
+
+
+def _geo(kind: str, coordinates: object) -> str:
+    return json.dumps({"type": kind, "coordinates": coordinates})
+
+
+def _png(width: int, height: int) -> bytes:
+    """Return a PNG that only claims its size."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    head = struct.pack(">I", 13) + head + struct.pack(">I", zlib.crc32(head))
+    return b"\x89PNG\r\n\x1a\n" + head + struct.pack(">I", 9) + b"IDAT"
+
+
+BAD: dict[str, tuple[str, str | bytes, str]] = {
+    "empty": ("a.json", "", "0 bytes"),
+    "not json": ("a.json", "walls", "expected JSON"),
+    "binary": ("a.json", bytes(range(256)), "expected JSON"),
+    "deep": ("a.json", "[" * 100_000, "expected JSON"),
+    "list": ("a.json", "[1, 2]", '"walls"'),
+    "no walls": ("a.json", _plan(walls=[]), "nothing drawn"),
+    "walls of 3": ("a.json", _plan(walls=[[0, 0, 1]]), "wall 0"),
+    "wall text": ("a.json", _plan(walls=[["0", 0, 1, 1]]), "wall 0"),
+    "walls object": ("a.json", _plan(walls={"a": 1}), "list"),
+    "nan": ("a.json", '{"walls": [[0, 0, NaN, 1]]}', "finite"),
+    "inf": ("a.json", '{"walls": [[0, 0, 1e999, 1]]}', "finite"),
+    "huge int": ("a.json", '{"walls": [[0, 0, 1' + "0" * 400 + ", 1]]}", "finite"),
+    "bool": ("a.json", _plan(walls=[[0, 0, True, 1]]), "finite"),
+    "points only": ("a.json", _plan(walls=[[1, 1, 1, 1]]), "nothing drawn"),
+    "too big": ("a.json", _plan(walls=[[0, 0, 1e9, 0]]), "1000 m"),
+    "too small": ("a.json", _plan(walls=[[0, 0, 0.1, 0]]), "1000 m"),
+    "start in wall": ("a.json", _plan(start=[0.01, 3]), "inside a wall"),
+    "start near wall": ("a.json", _plan(start=[0.2, 3]), "0.150 m"),
+    "start outside": ("a.json", _plan(start=[-3, 3]), "outside"),
+    "start text": ("a.json", _plan(start="here"), "start"),
+    "labels list": ("a.json", _plan(labels=[1]), "labels"),
+    "open": ("a.json", _plan(walls=BOX[:3], start=None), "closed wall"),
+    "geo unknown": ("a.geojson", _geo("Ball", [1]), "type"),
+    "geo null": ("a.geojson", '{"type": "Feature", "geometry": null}', "nothing drawn"),
+    "geo shape": ("a.geojson", _geo("LineString", [[0, 0], 3]), "position"),
+    "geo ring": ("a.geojson", _geo("Polygon", [[[0, 0], [1, 1]]]), "4 or more"),
+    "geo nested": ("a.geojson", '{"type":"Feature","geometry":' * 60 + "null" + "}" * 60, "GeoJSON object"),
+    "svg entities": ("a.svg", f"{LAUGHS}<svg {NS}><text>&b;</text>{ROOM}</svg>", "entity"),
+    "svg external": ("a.svg", f'<!DOCTYPE s [<!ENTITY x SYSTEM "file:///etc/passwd">]><svg {NS}>&x;</svg>', "entity"),
+    "svg uses": ("a.svg", f'<svg {NS}>{ROOM}{USES}<g id="u30"><path d="M0 0H1"/></g></svg>', "<use>"),
+    "svg loop": ("a.svg", f'<svg {NS}>{ROOM}<g id="a"><use href="#a"/></g></svg>', "<use>"),
+    "svg broken": ("a.svg", "<svg><rect", "broken XML"),
+    "html": ("a.svg", "<html></html>", "<svg>"),
+    "svg empty": ("a.svg", f"<svg {NS}/>", "draw the walls"),
+    "svg light": ("a.svg", f'<svg {NS}><rect width="8" height="6" stroke="#eee" fill="none"/></svg>', "draw the walls"),
+    "svg pixels": ("a.svg", f'<svg {NS}><rect width="800" height="600" stroke="red" fill="none"/></svg>', "per-unit"),
+    "svg paper": ("a.svg", f'<svg {NS} width="21cm" viewBox="0 0 210 297">{ROOM}</svg>', "1000 m"),
+    "svg scale": ("a.svg", f'<svg {NS} data-metres-per-unit="big">{ROOM}</svg>', "above 0"),
+    "svg view box": ("a.svg", f'<svg {NS} viewBox="0 0 8">{ROOM}</svg>', "viewBox"),
+    "svg nan": (
+        "a.svg",
+        f'<svg {NS} data-metres-per-unit="1">{ROOM}<path d="M0 0 L1e999 5" stroke="red"/></svg>',
+        "found",
+    ),
+    "svg no outer wall": ("a.svg", f'<svg {NS}><rect width="2" height="2"/></svg>', "closed wall"),
+    "png text": ("a.png", "hello", "PNG"),
+    "png bomb": ("a.png", _png(60_000, 60_000), "megapixels"),
+    "png large": ("a.png", _png(8_000, 8_000), "megapixels"),
+    "png cut": ("a.png", _png(100, 100), "PNG"),
+    "pgm cut": ("a.pgm", b"P5\n100 100\n255\n\0\0", "PNG or PGM"),
+    "pgm sizes": ("a.pgm", b"P5\n-5 100\n255\n", "PNG or PGM"),
+    "yaml tags": ("a.yaml", "!!python/object/apply:os.system ['true']", "YAML"),
+    "yaml list": ("a.yaml", "- 1", "YAML"),
+    "yaml broken": ("a.yaml", "a: [", "YAML"),
+    "yaml no image": ("a.yaml", "resolution: 0.05", "image"),
+    "yaml missing": ("a.yaml", "image: b.pgm\nresolution: 0.05", "no such file"),
+    "yaml outside": ("a.yaml", "image: ../../etc/passwd\nresolution: 0.05", "folder"),
+    "yaml absolute": ("a.yaml", "image: /etc/passwd\nresolution: 0.05", "folder"),
+    "yaml resolution": ("a.yaml", "image: b.pgm\nresolution: -1", "resolution"),
+    "yaml date": ("a.yaml", "image: b.pgm\nresolution: 2001-01-01", "resolution"),
+    "extension": ("a.dwg", "x", "ending in"),
+}
+
+
+def _refused(*arguments: object, **keywords: object) -> str:
+    with pytest.raises(WorldError) as caught:
+        load(*arguments, **keywords)  # type: ignore[arg-type]
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.startswith("expected ")
+    assert "found" in text
+    assert len(text) < 400
+    return text
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused_in_one_line(tmp_path, case):
+    name, content, words = BAD[case]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert words in _refused(tmp_path / name)
+
+
+def test_what_is_no_file_is_refused(tmp_path):
+    (tmp_path / "folder.json").mkdir()
+    assert "directory" in _refused(tmp_path / "folder.json")
+    assert "no such file" in _refused(tmp_path / "none.svg")
+    for name in ("", "\0.json", "x" * 5000 + ".json", "nowhere"):
+        _refused(name)
+
+
+def test_pictures_without_walls_or_without_room_are_refused(tmp_path):
+    for grey in (0, 255):
+        Image.fromarray(np.full((100, 100), grey, dtype=np.uint8)).save(tmp_path / "flat.png")
+        _refused(tmp_path / "flat.png")
+
+
+def test_bad_starts_and_scales_are_refused(tmp_path):
+    assert "start" in _refused("hall", start=(np.nan, 1.0))
+    assert "start" in _refused("hall", start=(1.0,))
+    assert "inside a wall" in _refused("hall", start=(7.9, 6.2))
+    (tmp_path / "a.svg").write_text(f"<svg {NS}>{ROOM}</svg>")
+    for scale in (0.0, -1.0, float("nan"), float("inf")):
+        assert "scale" in _refused(tmp_path / "a.svg", scale=scale)
+
+
+def test_a_start_given_by_the_caller_overrides_the_drawing():
+    np.testing.assert_array_equal(load("hall", start=(2.0, 2.0, 1.0)).start, [2, 2, 1])
+
+
+def _survives(path, content: bytes) -> None:
+    path.write_bytes(content)
+    with contextlib.suppress(WorldError):
+        world = load(path)
+        assert isinstance(world, World)
+        assert world.free.is_valid
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-20, 20) | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=5) | st.dictionaries(st.sampled_from("abc"), inner, max_size=3),
+    max_leaves=12,
+)
+KINDS = st.sampled_from(["LineString", "Polygon", "MultiPolygon", "Feature", "FeatureCollection", "Point", "Ball"])
+KEYS = st.sampled_from(["walls", "start", "labels", "type", "coordinates", "features", "geometry", "properties", "crs"])
+
+
+@QUICK
+@given(document=st.dictionaries(KEYS, VALUES | KINDS, max_size=6))
+def test_any_json_is_survived(tmp_path, document):
+    _survives(tmp_path / "any.json", json.dumps(document).encode())
+
+
+@QUICK
+@given(
+    walls=st.lists(st.lists(st.floats(-30, 30), min_size=4, max_size=4), max_size=12),
+    ring=st.lists(st.tuples(st.floats(-5, 15), st.floats(-5, 15)), min_size=4, max_size=9),
+)
+def test_any_scribble_is_survived(tmp_path, walls, ring):
+    _survives(tmp_path / "walls.json", json.dumps({"walls": BOX + walls}).encode())
+    _survives(tmp_path / "ring.json", json.dumps({"type": "Polygon", "coordinates": [ring]}).encode())
+    points = " ".join(f"{x},{y}" for x, y in ring)
+    shape = f'<polygon points="{points}"/><polyline points="{points}" stroke="black" fill="none"/>'
+    _survives(tmp_path / "ring.svg", f'<svg {NS} data-metres-per-unit="1">{ROOM}{shape}</svg>'.encode())
+
+
+@QUICK
+@given(data=st.data(), suffix=st.sampled_from(["json", "svg", "png", "pgm", "yaml", "geojson"]))
+def test_any_damage_is_survived(tmp_path, data, suffix):
+    if suffix in ("png", "pgm"):
+        image = np.full((40, 40), 255, dtype=np.uint8)
+        image[0], image[-1], image[:, 0], image[:, -1] = 0, 0, 0, 0
+        Image.fromarray(image).save(tmp_path / f"good.{suffix}")
+        good = (tmp_path / f"good.{suffix}").read_bytes()
+    else:
+        good = {
+            "json": _plan(),
+            "geojson": _geo("LineString", [[0, 0], [8, 0], [8, 6], [0, 0]]),
+            "svg": f'<svg {NS} viewBox="0 0 9 9"><g transform="scale(1.5) rotate(3)">{ROOM}</g></svg>',
+            "yaml": "image: good.png\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\nfree_thresh: 0.2\n",
+        }[suffix].encode()
+    broken = bytearray(good)
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(broken) - 1))
+        broken[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
+    _survives(tmp_path / f"any.{suffix}", bytes(broken))
