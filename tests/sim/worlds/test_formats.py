@@ -101,7 +101,7 @@ def test_svg_variants_give_the_same_geometry(tmp_path, truth, head, body):
 
 def test_a_rotated_svg_is_a_rotated_world(tmp_path, truth):
     svg = f'<svg {SVG} data-metres-per-unit="1"><g transform="rotate(-20)">{BODY}</g></svg>'
-    _same(load(_save(tmp_path, "map.svg", svg)), rotate(truth, 20, origin=(0, 0)))
+    _same(load(_save(tmp_path, "map.svg", svg)), rotate(truth, 20, origin=(0, 0)), 1e-4)
 
 
 def test_outlines_that_cross_themselves_are_filled_as_a_browser_fills_them(tmp_path):
