@@ -24,7 +24,7 @@ from sim.worlds import WORLDS, World, WorldError, load
 from slam.consistency import nees
 from slam.extraction import extract
 from slam.geometry.lines import directions, normals, through
-from slam.geometry.poses import rotation, wrap
+from slam.geometry.poses import to_robot, wrap
 from slam.robot import Scan
 from slam.segments import MIN_BEAMS, Segments
 
@@ -103,11 +103,6 @@ def wall_of_face(faces: Float[np.ndarray, "n 2 2"]) -> Int[np.ndarray, " n"]:
     return np.asarray(walls)
 
 
-def true_lines(faces: Float[np.ndarray, "n 2 2"], pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 2"]:
-    """Return the lines (alpha, r) of faces in the robot frame."""
-    return through((faces - pose_world[:2]) @ rotation(float(pose_world[2])))
-
-
 def join(
     segments: Segments,
     face_of_beam: Int[np.ndarray, " k"],
@@ -125,7 +120,7 @@ def join(
         seen, votes = np.unique(wall_of_beam[run], return_counts=True)
         label[i], share[i] = seen[np.argmax(votes)], votes.max() / len(run)
         face[i] = np.bincount(face_of_beam[run[wall_of_beam[run] == label[i]]]).argmax()
-    truth = true_lines(faces[face], pose)
+    truth = through(to_robot(faces[face], pose))
     e1 = wrap(segments.lines[:, 0] - truth[:, 0])
     t0 = segments.cov[:, 0, 1] / segments.cov[:, 0, 0]
     across = segments.lines[:, 1] * np.cos(e1) - t0 * np.sin(e1) - truth[:, 1]
@@ -239,23 +234,16 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
         table.add_row(name, str(int(rows.sum())), *numbers)
     console.print(table)
     counts = Table("walls by beams", "seen", "recall")
-    for name, rows in {
-        "5 or more": walls.beams >= MIN_BEAMS,
-        "5": walls.beams == 5,
-        "6 to 9": (walls.beams >= 6) & (walls.beams <= 9),
-        "10 or more": walls.beams >= 10,
-        "4": walls.beams == 4,
-        "3": walls.beams == 3,
-    }.items():
-        counts.add_row(name, str(int(rows.sum())), f"{walls.is_found[rows].mean():.4f}" if rows.any() else "")
+    for low, high in ((5, 999), (5, 5), (6, 9), (10, 999), (4, 4), (3, 3)):
+        rows = (walls.beams >= low) & (walls.beams <= high)
+        counts.add_row(f"{low} to {high}", str(int(rows.sum())), f"{walls.is_found[rows].mean():.4f}")
     console.print(counts)
-    long = lines.beams >= MIN_BEAMS
-    mixed, double = long & (lines.share < MIXED_SHARE), long & lines.is_double
-    console.print(
-        f"of {long.sum()} lines of 5 beams or more: mixed {mixed.sum()} ({mixed.sum() / long.sum():.2%}),"
-        f" double {double.sum()} ({double.sum() / long.sum():.2%}); lines of 3 or 4 beams: {(~long).sum()},"
-        f" of these mixed {np.sum(~long & (lines.share < MIXED_SHARE))}"
-    )
+    for name, rows in {"5 beams or more": lines.beams >= MIN_BEAMS, "3 or 4 beams": lines.beams < MIN_BEAMS}.items():
+        mixed, double = rows & (lines.share < MIXED_SHARE), rows & lines.is_double
+        console.print(
+            f"{rows.sum()} lines of {name}: mixed {mixed.sum()} ({mixed.sum() / max(rows.sum(), 1):.2%}),"
+            f" double {double.sum()} ({double.sum() / max(rows.sum(), 1):.2%})"
+        )
 
 
 def main(config: StudyConfig) -> None:

@@ -98,7 +98,8 @@ class FreeSpace:
         self._reserve(pose_world[:2], scan.range_max_m + 2 * cell)
         half = int(np.ceil(scan.range_max_m / cell)) + 1
         here = self.cells(pose_world[None, :2])[0]
-        rows, columns = slice(here[0] - half, here[0] + half + 1), slice(here[1] - half, here[1] + half + 1)
+        r, c = int(here[0]), int(here[1])
+        rows, columns = slice(r - half, r + half + 1), slice(c - half, c + half + 1)
         free = self._seen_free(pose_world, scan, here, half)
         window = self._evidence[rows, columns]
         returned = np.isfinite(scan.ranges_m)
@@ -112,10 +113,8 @@ class FreeSpace:
         np.clip(window + change, -self.config.limit, self.config.limit, out=window)
         changed = np.nonzero((window > 0) != before)
         if len(changed[0]):
-            self._mark(
-                rows.start + changed[0].min(), rows.start + changed[0].max() + 1,
-                columns.start + changed[1].min(), columns.start + changed[1].max() + 1,
-            )  # fmt: skip
+            (r0, r1), (c0, c1) = ((int(axis.min()), int(axis.max()) + 1) for axis in changed)
+            self._mark(rows.start + r0, rows.start + r1, columns.start + c0, columns.start + c1)
 
     def _seen_free(
         self, pose_world: Float[np.ndarray, "3"], scan: Scan, here: Int[np.ndarray, "2"], half: int
@@ -162,7 +161,7 @@ class FreeSpace:
         evidence = np.zeros(shape, dtype=np.int8)
         clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
         if self._evidence.size:
-            c, r = self._first - first
+            c, r = (self._first - first).tolist()
             place = (slice(r, r + self._evidence.shape[0]), slice(c, c + self._evidence.shape[1]))
             evidence[place], clearance[place] = self._evidence, self._clearance
             if self._dirty is not None:

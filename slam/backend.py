@@ -6,7 +6,7 @@ wall where it was seen, not to the world's origin. The anchor c = 0 is the paper
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -77,6 +77,7 @@ class Observations:
     cov: Float[np.ndarray, "m 2 2"]
 
 
+@runtime_checkable
 class Backend(Protocol):
     """An estimator of the stochastic map: a few verbs, its state hidden, its belief shown."""
 

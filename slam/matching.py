@@ -25,7 +25,7 @@ class MatchingConfig:
     """Probability level of the chi-square gate."""
     doubt: float = 0.999999
     """A segment beyond the gate but within this level of a wall that it overlaps is neither fused nor made a wall."""
-    angle_rad: float = 0.35
+    angle_rad: float = 1.05
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
     offset_m: float = 0.5
     """Nor are lines that stand further apart than this at the seen piece."""
@@ -34,9 +34,11 @@ class MatchingConfig:
     overlap_m: float = 0.05
     """A segment that overlaps two walls by this much shows that they may be one."""
     short_m: float = 0.3
-    """Shorter segments are too poor in direction for the gate alone: one that lies within `beside_m` is in doubt too."""
+    """Shorter segments are too poor in direction for the gate alone: they are in doubt also beside a wall."""
     beside_m: float = 0.08
-    """Distance from a wall, across it, within which a short segment that overlaps it is not a new wall."""
+    """Distance from a wall, across it, within which a short segment of which it covers half is not a new wall."""
+    beside_rad: float = 0.35
+    """Largest difference in direction, beyond three sigmas of the short segment's, for the same."""
     clear_ratio: float = 9.0
     """A first match is clear when the second-best wall is this many times farther (squared Mahalanobis distance)."""
 
@@ -122,6 +124,9 @@ def match(
     found = _candidates(segments, reach, walls, joint, config)
     level = chi2.ppf(config.gate, 2)
     fits = (found.d2 <= level) & (found.excess <= config.gap_m)
+    # Two rooms' walls may stand on one line, a wall's thickness apart: the one that the segment overlaps is meant.
+    overlaps = fits & (found.gap < 0.0)
+    fits &= overlaps | ~np.isin(found.segment, found.segment[overlaps])
     best = np.full(count, -1)
     order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
     best[found.segment[order]] = order
@@ -131,9 +136,8 @@ def match(
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     firm = ~segments.is_tentative[found.segment]
-    lengths = np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T)
-    beside = (lengths[found.segment] < config.short_m) & (np.abs(found.model.e[:, 1]) < config.beside_m)
-    doubt = (beside | (found.d2 <= chi2.ppf(config.doubt, 2))) & (found.gap <= 0.0)
+    beside = _is_beside(found, segments, config)
+    doubt = beside | ((found.d2 <= chi2.ppf(config.doubt, 2)) & (found.gap <= 0.0))
     doubtful = np.zeros(count, dtype=bool)
     doubtful[found.segment[doubt]] = True
     return Matches(
@@ -179,6 +183,18 @@ def _candidates(
     slack_before = reach[segment, 1] + walls.reach[line, 0]
     gap, excess = np.maximum(after, before), np.maximum(after - slack_after, before - slack_before)
     return _Candidates(segment, line, model, _distances(model, line, joint), gap, excess)
+
+
+def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -> np.ndarray:
+    """Which candidates are short segments lying along a wall, however badly their direction is known."""
+    length = np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T)[found.segment]
+    turn = config.beside_rad + 3.0 * np.sqrt(segments.cov[found.segment, 0, 0])
+    return (
+        (length < config.short_m)
+        & (np.abs(found.model.e[:, 0]) < turn)
+        & (np.abs(found.model.e[:, 1]) < config.beside_m)
+        & (found.gap <= -0.5 * length * np.cos(found.model.e[:, 0]))
+    )
 
 
 def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) -> Float[np.ndarray, " c"]:

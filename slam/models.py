@@ -67,7 +67,8 @@ def innovations(
 
     With epsilon the angle between the two and t0 = C_alpha_r / C_alpha_alpha the place of the piece's centre along
     the seen line, e = (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_predicted): linear in r however far off to one
-    side the piece lies, where the difference in (alpha, r) is not.
+    side the piece lies, where the difference in (alpha, r) is not. The centre stays on its beam: an error in the
+    seen direction turns the line about it, so the two parts of e are independent, and remain so where epsilon is large.
     """
     alpha = means[:, 0]
     n, t = normals(alpha), directions(alpha)
@@ -88,11 +89,11 @@ def innovations(
     H_line[:, 0, 0] = 1.0
     H_line[:, 1, 0] = np.sum(t * to_anchor, axis=-1) - along
     H_line[:, 1, 1] = 1.0
-    M = np.zeros((m, 2, 2))
-    M[:, 0, 0] = 1.0
-    M[:, 1, 0] = -along
-    M[:, 1, 1] = cosine
-    return Innovations(e, H_pose, H_line, M @ cov @ M.swapaxes(1, 2))
+    R = np.zeros((m, 2, 2))
+    R[:, 0, 0] = cov[:, 0, 0]
+    across = cov[:, 1, 1] - cov[:, 0, 1] * t0
+    R[:, 1, 1] = across * (cosine - t0 * sine / lines[:, 1]) ** 2
+    return Innovations(e, H_pose, H_line, R)
 
 
 @dataclass(frozen=True)

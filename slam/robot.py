@@ -1,7 +1,7 @@
 """The robot as this software sees it: all that passes between the two is in this file."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -46,6 +46,7 @@ class MotionCommand:
     turn_rad: float
 
 
+@runtime_checkable
 class Robot(Protocol):
     """Anything that senses and drives: the simulated robot, a recorded one, or real hardware."""
 

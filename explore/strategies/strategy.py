@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -35,6 +35,7 @@ class Choice:
     reason: str
 
 
+@runtime_checkable
 class Strategy(Protocol):
     """Chooses the open end to explore next."""
 
