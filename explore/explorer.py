@@ -46,6 +46,7 @@ class Explorer:
         self._unreached: dict[tuple[int, int], int] = {}
         self._skipped_places: list[Float[np.ndarray, 2]] = []
         self.set_aside: dict[tuple[int, int], SetAside] = {}
+        self.still_open: tuple[SetAside, ...] = ()
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
 
@@ -59,6 +60,7 @@ class Explorer:
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
         self._abandon(ends)
+        self.still_open = tuple(aside for key, aside in self.set_aside.items() if key in ends)
         for _ in range(len(ends) + 20):
             if self._errand is None and not self._choose(around, chains, ends, graph):
                 return None

@@ -65,7 +65,7 @@ def explore_mission(
         yield Step(
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
             update.map, update.chains, free_space, graph.graph, explorer.goal, explorer.walls_to_follow,
-            tuple(explorer.set_aside.values()), command, path_length, time.perf_counter() - began, ended, reason,
+            explorer.still_open, command, path_length, time.perf_counter() - began, ended, reason,
         )  # fmt: skip
         if command is None:
             return
@@ -76,5 +76,5 @@ def explore_mission(
 
 
 def _closing_words(explorer: Explorer) -> str:
-    left = len(explorer.set_aside)
-    return "every chain is closed" if not left else f"no reachable open end is left; {left} set aside"
+    left = len(explorer.still_open)
+    return "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"

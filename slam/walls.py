@@ -11,7 +11,7 @@ from .geometry.poses import to_world
 from .matching import KnownWalls
 from .robot import Scan
 from .segments import EndKind, Segments
-from .sightlines import sightlines
+from .sightlines import Sightlines, sightlines
 from .stochastic_map import StochasticMap
 
 
@@ -34,8 +34,14 @@ class WallsConfig:
     """A beam that goes on this far beyond a line has passed through it."""
     contradictions: int = 2
     """A wall is cut back once so many scans have shown beams passing through it."""
+    end_margin_m: float = 0.1
+    """Beams that pass this near to an end do not count: ends and corners are known no better."""
     least_m: float = 0.05
     """A wall cut back to less than this is forgotten."""
+    claims: int = 6
+    """A wall is forgotten when so many scans in turn gave all its beams to other walls ..."""
+    established_sightings: int = 10
+    """... unless it was seen at least this often."""
     corner_leap_m: float = 0.15
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
@@ -52,6 +58,7 @@ class Walls:
         self._sightings = np.zeros(0, dtype=np.int64)
         self._last_seen = np.zeros(0, dtype=np.int64)
         self._against = np.zeros(0, dtype=np.int64)
+        self._claimed = np.zeros(0, dtype=np.int64)
         self._scans = 0
 
     def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
@@ -76,22 +83,40 @@ class Walls:
         self._stretch(belief, scan, segments, used, rows)
         self._sightings[np.unique(rows)] += 1
         self._last_seen[rows] = self._scans
-        self._contradict(belief, scan)
+        self._weigh(belief, scan, segments, owners)
         stale = self._scans - self._last_seen > self._config.patience_steps
         shaky = stale & (self._sightings < self._config.trusted_sightings)
+        shaky |= (self._claimed >= self._config.claims) & (self._sightings < self._config.established_sightings)
         forgotten = self._ids[shaky | (self._extents[:, 1] - self._extents[:, 0] < self._config.least_m)]
         self._drop(forgotten)
         owners[np.isin(owners, forgotten)] = -1
         return forgotten
 
-    def _contradict(self, belief: Belief, scan: Scan) -> None:
-        """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
+    def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
+        """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
         ends = self.map(belief).ends_world
         near = np.flatnonzero(distance_to_segments(belief.pose_world[None, :2], ends)[0] < scan.range_max_m)
-        lines = sightlines(
-            scan, belief.pose_world, belief.anchors[near], belief.means[near], self._config.pass_margin_m
-        )
-        inside = (lines.along > self._extents[near, :1] + 0.02) & (lines.along < self._extents[near, 1:] - 0.02)
+        anchors, means = belief.anchors[near], belief.means[near]
+        lines = sightlines(scan, belief.pose_world, anchors, means, self._config.pass_margin_m)
+        self._note_claims(near, lines, owners_of_beams(segments, owners, len(scan.bearings_rad)))
+        self._cut_back(near, lines)
+
+    def _note_claims(
+        self, near: Int[np.ndarray, " n"], lines: Sightlines, owners_of_beams: Int[np.ndarray, " k"]
+    ) -> None:
+        """Count for how many scans in turn every beam on a wall has been some other wall's."""
+        low, high = self._extents[near, :1], self._extents[near, 1:]
+        on = lines.hits & (lines.along > low) & (lines.along < high)
+        others = on & (owners_of_beams >= 0) & (owners_of_beams != self._ids[near, None])
+        count = np.count_nonzero(on, axis=1)
+        claimed = (count >= 4) & (np.count_nonzero(others, axis=1) >= 0.8 * count)
+        seen = self._last_seen[near] == self._scans
+        self._claimed[near] = np.where(seen, 0, self._claimed[near] + claimed)
+
+    def _cut_back(self, near: Int[np.ndarray, " n"], lines: Sightlines) -> None:
+        """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
+        margin = self._config.end_margin_m
+        inside = (lines.along > self._extents[near, :1] + margin) & (lines.along < self._extents[near, 1:] - margin)
         passed = np.count_nonzero(lines.passes & inside, axis=1) >= 2
         self._against[near] = np.where(passed, self._against[near] + 1, 0)
         for k in np.flatnonzero(self._against[near] >= self._config.contradictions):
@@ -129,12 +154,13 @@ class Walls:
         self._sightings = np.concatenate([self._sightings, np.zeros(m, dtype=np.int64)])
         self._last_seen = np.concatenate([self._last_seen, np.full(m, self._scans)])
         self._against = np.concatenate([self._against, np.zeros(m, dtype=np.int64)])
+        self._claimed = np.concatenate([self._claimed, np.zeros(m, dtype=np.int64)])
 
     def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
         self._is_corner, self._sightings = self._is_corner[kept], self._sightings[kept]
-        self._last_seen, self._against = self._last_seen[kept], self._against[kept]
+        self._last_seen, self._against, self._claimed = self._last_seen[kept], self._against[kept], self._claimed[kept]
 
     def _stretch(
         self,
@@ -174,6 +200,17 @@ def _kept_piece(
     if len(inner) and best < len(length) - 1 and high - inner.max() < 0.5:
         high = inner.max()
     return np.array([low, high])
+
+
+def owners_of_beams(segments: Segments, owners: Int[np.ndarray, " s"], beams: int) -> Int[np.ndarray, " k"]:
+    """Return for each beam of a scan the id of the wall that its segment belongs to, -1 for none."""
+    owner = np.full(beams, -1, dtype=np.int64)
+    for (first, last), wall in zip(segments.beams.tolist(), owners.tolist(), strict=True):
+        if first <= last:
+            owner[first : last + 1] = wall
+        else:
+            owner[first:], owner[: last + 1] = wall, wall
+    return owner
 
 
 def sure_pieces(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:
