@@ -40,7 +40,7 @@ class StudyConfig:
     half: Literal["tune", "report"] = "report"
     """Every second plan served to set the thresholds; the others are kept for the report."""
     lines: int = 10_000
-    """Stop after this many labelled lines of 5 beams or more."""
+    """Stop after the world in which this many labelled lines of 5 beams or more are reached."""
     seed: int = 2
     """Seed of the poses and of the noise."""
     scans_per_world: int = 40
@@ -54,7 +54,7 @@ class StudyConfig:
     sigma_m: float = 0.010
     """Its radial noise; stated as it is."""
     errorless: bool = False
-    """Exact ranges with the noise still stated: recall and mixed lines only."""
+    """Exact ranges, the noise still stated: recall and mixed lines only."""
 
 
 Rows = TypeVar("Rows")
@@ -95,12 +95,10 @@ class Walls:
 def wall_of_face(faces: Float[np.ndarray, "n 2 2"]) -> Int[np.ndarray, " n"]:
     """Return a wall number for each face; faces on one line with the free side on the same side share it."""
     lines = through(faces)
-    normal = normals(lines[:, 0])
-    parallel = np.abs(wrap(lines[:, None, 0] - lines[None, :, 0])) < FLAT_RAD
-    off = [np.abs(faces[:, end] @ normal.T - lines[None, :, 1]) < FLAT_M for end in (0, 1)]
-    one = parallel & off[0] & off[1]
-    _, walls = connected_components(one & one.T, directed=False)
-    return np.asarray(walls)
+    one = np.abs(wrap(lines[:, None, 0] - lines[None, :, 0])) < FLAT_RAD
+    for end in (0, 1):
+        one &= np.abs(faces[:, end] @ normals(lines[:, 0]).T - lines[None, :, 1]) < FLAT_M
+    return np.asarray(connected_components(one & one.T, directed=False)[1])
 
 
 def join(
@@ -143,24 +141,22 @@ def join(
 def poses(world: World, count: int, rng: np.random.Generator) -> Iterator[Float[np.ndarray, "3"]]:
     """Yield random poses that a disc of 0.25 m can reach; none where there is no such place."""
     free = world.reachable(0.25)
-    if free.area < 0.1:
-        return
     x0, y0, x1, y1 = free.bounds
     shapely.prepare(free)
-    while count:
-        x, y, heading = rng.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
-        if shapely.contains_xy(free, x, y):
+    while count and free.area > 0.1:
+        pose = rng.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
+        if shapely.contains_xy(free, *pose[:2]):
             count -= 1
-            yield np.array([x, y, heading])
+            yield pose
 
 
 def worlds(config: StudyConfig) -> Iterator[World]:
     """Yield the bundled worlds and this half of the plans, in random order."""
     plans = sorted(config.plans.glob("*.json"))[{"tune": 0, "report": 1}[config.half] :: 2]
     names = [*WORLDS, *map(str, plans)]
-    for i in np.random.default_rng(config.seed).permutation(len(names)):
+    for name in np.random.default_rng(config.seed).permutation(names):
         try:
-            yield load(names[i])
+            yield load(str(name))
         except WorldError as refusal:
             Console(stderr=True).print(f"left out: {refusal}")
 
@@ -168,8 +164,7 @@ def worlds(config: StudyConfig) -> Iterator[World]:
 def sample(config: StudyConfig) -> tuple[Lines, Walls]:
     """Return the lines and walls of as many scans as the study needs."""
     lidar = LidarConfig(beams=config.beams, fov_rad=np.deg2rad(config.fov_deg), sigma_m=config.sigma_m)
-    rng = np.random.default_rng(config.seed)
-    noise = 0.0 if config.errorless else config.sigma_m
+    rng, noise = np.random.default_rng(config.seed), 0.0 if config.errorless else config.sigma_m
     lines: list[Lines] = []
     met: list[Walls] = []
     total = 0
@@ -204,10 +199,10 @@ def both_nees(lines: Lines) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, 
 def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
     """Return the rows of the table: what each is called and which lines are in it."""
     clean, long = lines.share >= MIXED_SHARE, lines.beams >= MIN_BEAMS
-    good = clean & long & (np.sqrt(lines.cov[:, 0, 0]) < np.deg2rad(1.5))
+    is_sharp = long & (np.sqrt(lines.cov[:, 0, 0]) < np.deg2rad(1.5))
+    good = clean & is_sharp
     low, high = lines.along[:, 0], lines.along[:, 1]
-    middle = 0.5 * (low + high)
-    incidence = np.rad2deg(np.arctan2(np.abs(middle), lines.r))
+    incidence = np.rad2deg(np.arctan2(np.abs(0.5 * (low + high)), lines.r))
     has_foot = (low <= 0.0) & (high >= 0.0)
     rows = {
         "heading sigma < 1.5 deg": good,
@@ -218,7 +213,7 @@ def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
         rows[f"  incidence {start} to {stop} deg"] = good & (incidence >= start) & (incidence < stop)
     for start, stop in ((5, 7), (8, 12), (13, 25), (26, 999)):
         rows[f"  {start} to {stop} beams"] = good & (lines.beams >= start) & (lines.beams <= stop)
-    rows["  with mixed lines"] = long & (np.sqrt(lines.cov[:, 0, 0]) < np.deg2rad(1.5))
+    rows["  with mixed lines"] = is_sharp
     rows["all of 5 beams or more"] = clean & long
     rows["lines of 4 beams"] = clean & (lines.beams == 4)
     rows["lines of 3 beams"] = clean & (lines.beams == 3)
@@ -248,8 +243,7 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
 
 def main(config: StudyConfig) -> None:
     """Take the scans and print the tables."""
-    lines, walls = sample(config)
-    report(lines, walls, Console(width=120))
+    report(*sample(config), Console(width=120))
 
 
 if __name__ == "__main__":

@@ -20,13 +20,13 @@ class ExtractionConfig:
 
     split: SplitConfig = field(default_factory=SplitConfig)
     """What counts as one straight piece."""
-    joint_beams: float = 4.0
-    """A boundary moves at most this many beams to where its two lines cross."""
+    joint_beams: float = 1.0
+    """A boundary moves to where its two lines cross, when that is at most this many beams outside the gap."""
     corner_beams: float = 1.0
     """The lines of a corner cross at most this many beams outside the gap between them."""
-    gate_sigmas: float = 3.5
+    gate_sigmas: float = 4.0
     """Residual beyond which a beam leaves the fit."""
-    open_gate_sigmas: float = 2.5
+    open_gate_sigmas: float = 3.0
     """The same for the last beam at an end where another surface begins and no lines cross."""
     doubt_sigmas: float = 2.5
     """The last beam before a joint is left out where the other line predicts it within this."""

@@ -31,9 +31,9 @@ class SplitConfig:
     """Chi-square that two lines must save to make a candidate."""
     sure_gain: float = 30.0
     """Saving from which the neighbours of a candidate are candidates too: a beam there may belong to neither line."""
-    segment_cost: float = 18.0
+    segment_cost: float = 20.0
     """Chi-square that one more segment must save."""
-    loose_cost: float = 7.0
+    loose_cost: float = 9.0
     """Chi-square of a beam that belongs to no segment."""
 
 

@@ -1,23 +1,19 @@
-"""Extraction: its algebra against slow truths, its covariance against Monte Carlo, its symmetries."""
+"""Extraction: its covariance against Monte Carlo, its contract, its symmetries."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from slam.extraction import extract
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import wrap
-from slam.line_fit import Beams, Fit, fit_runs, polar, prefix_sums, refit
 from slam.robot import Scan
 from slam.segments import EndKind
-from slam.splitting import _least
 
 SIGMA = 0.01
 
@@ -62,66 +58,6 @@ def wall(offset, half_length=0.7, distance=1.5):
     return np.array([[[distance, offset - half_length], [distance, offset + half_length]]])
 
 
-# ---- the algebra of one line
-
-
-@given(seed=seeds)
-@settings(max_examples=30, deadline=None)
-def test_prefix_sums_fit_every_run_as_weighted_least_squares_does(seed):
-    scan = room_scan(seed)
-    seen = np.isfinite(scan.ranges_m)
-    theta, rho = scan.bearings_rad[seen], scan.ranges_m[seen]
-    rng = np.random.default_rng(seed)
-    start = rng.integers(0, len(rho) - 12, 5)
-    stop = start + rng.integers(4, 12, 5)
-    fit, values = fit_runs(prefix_sums(Beams(np.cos(theta), np.sin(theta), rho), SIGMA), start, stop)
-    for i in range(5):
-        run = slice(start[i], stop[i])
-        rows = np.column_stack([np.cos(theta[run]), np.sin(theta[run])]) * (rho[run, None] ** 2 / SIGMA)
-        target = rho[run] / SIGMA
-        solution, *_ = np.linalg.lstsq(rows, target)
-        np.testing.assert_allclose([fit.a[i], fit.b[i]], solution, rtol=1e-5, atol=1e-6)
-        assert values[i] == pytest.approx(np.sum((rows @ solution - target) ** 2), rel=1e-5, abs=1e-5)
-
-
-def test_refitting_converges_to_the_maximum_likelihood_line():
-    rng = np.random.default_rng(0)
-    theta = np.deg2rad(np.arange(-20.0, 50.0, 2.0))
-    rho = 1.4 / np.cos(theta - 0.3) + SIGMA * rng.standard_normal(len(theta))
-    beams, zeros = Beams(np.cos(theta), np.sin(theta), rho), np.zeros(len(theta), int)
-    fit = Fit(*(np.array([x]) for x in (0.7, 0.2, 1.0, 0.0, 1.0)))
-    for _ in range(6):
-        fit = refit(fit, beams, zeros, np.array([0]), np.full(len(theta), SIGMA**-2))
-    best = least_squares(lambda x: (x[1] / np.cos(theta - x[0]) - rho) / SIGMA, [0.3, 1.4], xtol=1e-14, ftol=1e-14)
-    line, cov = polar(fit)
-    np.testing.assert_allclose(line[0], best.x, atol=1e-6)
-    np.testing.assert_allclose(cov[0], np.linalg.inv(best.jac.T @ best.jac), rtol=1e-4)
-
-
-@given(seed=seeds, cuts=st.integers(2, 7))
-@settings(max_examples=50, deadline=None)
-def test_the_dynamic_program_finds_the_cheapest_of_all_divisions(seed, cuts):
-    rng = np.random.default_rng(seed)
-    at = np.concatenate([[0], np.cumsum(rng.integers(1, 4, cuts))])
-    cost = {(i, j): float(rng.uniform(0.0, 30.0)) for j in range(1, cuts + 1) for i in range(j)}
-    pieces = _least(list(cost.values()), [0] * cuts, at, 7.0)
-    position = {int(x): i for i, x in enumerate(at)}
-    chosen = [(position[int(i)], position[int(j)]) for i, j in zip(*pieces, strict=True)]
-
-    def price(segments):
-        covered = sum(int(at[j] - at[i]) for i, j in segments)
-        return sum(cost[s] for s in segments) + 7.0 * (int(at[-1]) - covered)
-
-    inner = range(1, cuts)
-    divisions = (
-        [pair for pair, used in zip(itertools.pairwise((0, *marks, cuts)), use, strict=True) if used]
-        for size in range(cuts)
-        for marks in itertools.combinations(inner, size)
-        for use in itertools.product((False, True), repeat=size + 1)
-    )
-    assert price(chosen) == pytest.approx(min(map(price, divisions)))
-
-
 # ---- the covariance
 
 
@@ -145,13 +81,13 @@ def test_one_wall_is_calibrated_centred_and_off_to_one_side_alike(offset):
     rng = np.random.default_rng(4)
     exact = scan_of(wall(offset), np.zeros(3))
     errors, covs, pieces = [], [], 0
-    for _ in range(1500):
+    for _ in range(3500):  # the 95th percentile is then known to 2.5 %
         segments = extract(replace(exact, ranges_m=exact.ranges_m + SIGMA * rng.standard_normal(180)))
         best = int(np.argmax(segments.beam_counts))
         pieces += len(segments)
         errors.append(segments.lines[best] - np.array([0.0, 1.5]))
         covs.append(segments.cov[best])
-    assert pieces <= 1510
+    assert pieces <= 3510
     e, c = np.array(errors), np.array(covs)
     values = np.einsum("ni,nij,nj->n", e, np.linalg.inv(c), e)
     assert np.median(values) == pytest.approx(chi2.median(2), rel=0.1)
