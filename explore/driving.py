@@ -79,7 +79,7 @@ class Pilot:
         return MotionCommand(0.0, turn) if abs(turn) > 0.02 else None
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-        """The farthest point of the path within the lookahead to which the straight way is clear."""
+        """Return the farthest point of the path within the lookahead to which the straight way is clear."""
         gaps = np.hypot(*(self._points[self._at : self._at + 40] - position_world).T)
         self._at += int(np.argmin(gaps))
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._points[self._at :], axis=0).T))])

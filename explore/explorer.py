@@ -1,5 +1,7 @@
 """The top layer: which open end next, when to abandon it, what was given up and why (paper, section 3.3)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -38,7 +40,7 @@ class ExplorerConfig:
 class Explorer:
     """Holds the present goal and the memory of what was given up."""
 
-    def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, "2"], config: ExplorerConfig) -> None:
+    def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
         self._strategy, self._start, self._config = strategy, start_world, config
         self._errand: Errand | None = None
         self._steps_on_goal = 0
@@ -55,7 +57,7 @@ class Explorer:
         """What the robot is about, in words."""
         return self._errand.doing if self._errand is not None else ""
 
-    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph) -> MotionCommand | None:
+    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
         """Return the next step, or None when there is nowhere left to go."""
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
@@ -76,8 +78,9 @@ class Explorer:
         """Forget what was set aside where the end is gone or has moved: there it may be tried again."""
         for key, aside in list(self.set_aside.items()):
             end = ends.get(key)
-            gone = end is not None and np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m
-            if gone and not self._is_hopeless(end.position_world):
+            if end is None or self._is_hopeless(end.position_world):
+                continue
+            if np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m:
                 del self.set_aside[key]
 
     def _abandon(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
@@ -99,7 +102,7 @@ class Explorer:
         around: Surroundings,
         chains: tuple[Chain, ...],
         ends: dict[tuple[int, int], OpenEnd],
-        graph: nx.DiGraph,
+        graph: nx.DiGraph[int],
     ) -> bool:
         self._steps_on_goal = 0
         candidates = self._candidates(ends)
@@ -156,7 +159,7 @@ class Explorer:
         self.walls_to_follow = ()
         return True
 
-    def _was_skipped(self, place: Float[np.ndarray, "2"]) -> bool:
+    def _was_skipped(self, place: Float[np.ndarray, 2]) -> bool:
         return sum(np.hypot(*(place - other)) < 0.3 for other in self._skipped_places) >= 2
 
     def _give_up(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
@@ -178,5 +181,5 @@ class Explorer:
         self.set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
         self._attempts.append(end.position_world)
 
-    def _is_hopeless(self, place: Float[np.ndarray, "2"]) -> bool:
+    def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
         return sum(np.hypot(*(place - other)) < 0.3 for other in self._attempts) >= self._config.attempts

@@ -1,9 +1,11 @@
 """From a goal wall to the sequence of walls that leads there (paper, section 3.2)."""
 
+from __future__ import annotations
+
 import networkx as nx
 
 
-def route(graph: nx.DiGraph, here: int | None, goal: int) -> tuple[int, ...]:
+def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...]:
     """Return the walls to follow from the present one to the goal, both included, by the fewest changes of wall.
 
     Where no way is known the goal stands alone: the robot then looks for one over the free floor.

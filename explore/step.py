@@ -1,5 +1,7 @@
 """One turn of the closed loop, frozen; timelines, scores, progress bars and log writers iterate over these."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import networkx as nx
@@ -34,7 +36,7 @@ class Step:
     chains: tuple[Chain, ...]
     free_space: FreeSpace
     """A view that the mission goes on updating: read it at once or copy it."""
-    graph: nx.DiGraph
+    graph: nx.DiGraph[int]
     """The visibility graph, likewise."""
     goal: Goal | None
     walls_to_follow: tuple[int, ...]
@@ -51,6 +53,6 @@ class Step:
     """What the robot is doing and why; at the last step, why it ended."""
 
     @property
-    def pose_world(self) -> Float[np.ndarray, "3"]:
+    def pose_world(self) -> Float[np.ndarray, 3]:
         """The estimated pose."""
         return self.map.belief.pose_world

@@ -1,5 +1,7 @@
 """The graph whose nodes are walls: neighbours in a chain both ways, what was seen from where one way (section 3.2)."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 import networkx as nx
@@ -15,7 +17,7 @@ class VisibilityGraph:
     """Grows with what the robot sees; a sight is never taken to hold in the other direction."""
 
     def __init__(self) -> None:
-        self.graph: nx.DiGraph = nx.DiGraph()
+        self.graph: nx.DiGraph[int] = nx.DiGraph()
         self._neighbours: set[tuple[int, int]] = set()
 
     def observe(self, walls: StochasticMap, chains: Iterable[Chain], followed: int | None, seen: Iterable[int]) -> None:
@@ -24,7 +26,7 @@ class VisibilityGraph:
         self.graph.remove_nodes_from([node for node in self.graph if node not in present])
         self.graph.add_nodes_from(present)
         self._connect({pair for chain in chains for pair in neighbours(chain)})
-        if followed in present:
+        if followed is not None and followed in present:
             for wall in seen:
                 if wall in present and wall != followed and not self.graph.has_edge(followed, wall):
                     self.graph.add_edge(followed, wall, kind=SIGHT)

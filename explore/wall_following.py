@@ -93,7 +93,7 @@ class Errand:
             self._failures = 0
 
     def _planner(self, around: Surroundings, window_m: float | None) -> Planner:
-        """A planner that keeps farther from walls after each failure."""
+        """Return a planner that keeps farther from walls after each failure."""
         paths = self._config.paths
         wider = PathConfig(
             paths.radius_m, paths.margin_m + 0.01 * self._failures, paths.standoff_m, paths.narrow_cost, paths.escape_m

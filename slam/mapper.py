@@ -11,10 +11,11 @@ from .chains import Chain, ChainConfig, connect
 from .extraction import extract
 from .geometry.lines import distance_to_segments
 from .matching import KnownWalls, Matches, MatchingConfig, match, relocate, same_line
+from .pieces import end_reach, sure_pieces
 from .robot import Odometry, Scan
 from .segments import Segments
 from .stochastic_map import StochasticMap
-from .walls import Walls, WallsConfig, end_reach, sure_pieces
+from .walls import Walls, WallsConfig
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,8 @@ class Mapper:
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
-        segments = sure_pieces(self._extract(scan), scan, self.config.walls)
-        reach = end_reach(segments, scan, self.config.walls)
+        segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
+        reach = end_reach(segments, scan, self.config.walls.pieces)
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan)
         joint = self.backend.belief.joint(near.ids)
@@ -86,7 +87,7 @@ class Mapper:
         return MapUpdate(segments, matches, owners, walls, connect(walls, set_aside, self.config.chains))
 
     def _nearby(self, scan: Scan) -> KnownWalls:
-        """The walls that this scan can show."""
+        """Return the walls that this scan can show."""
         walls = self._walls.map(self.backend.belief)
         distance = distance_to_segments(walls.belief.pose_world[None, :2], walls.ends_world)[0]
         return self._walls.known(walls.ids[distance < scan.range_max_m + self.config.matching.offset_m])
@@ -103,7 +104,7 @@ class Mapper:
             owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
         forgotten = self._walls.see(self.backend.belief, scan, segments, owners)
         if len(forgotten):
-            self.backend.remove(forgotten)
+            self.backend.remove(forgotten.tolist())
         return owners
 
     def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> None:

@@ -1,14 +1,15 @@
 """How far along its line each wall has been seen, how often, and whether it deserves trust."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from .backend import Belief
-from .geometry.lines import directions, distance_to_segments, normals
+from .geometry.lines import directions, distance_to_segments
 from .geometry.poses import to_world
 from .matching import KnownWalls
+from .pieces import PiecesConfig, beam_spacing, believable_reach, owners_of_beams
 from .robot import Scan
 from .segments import EndKind, Segments
 from .sightlines import Sightlines, sightlines
@@ -23,13 +24,8 @@ class WallsConfig:
     """A wall is tentative until it was seen this often with enough beams."""
     patience_steps: int = 15
     """A tentative wall is forgotten after this many scans without a sighting."""
-    sure_gap_m: float = 0.35
-    """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    reach_m: float = 0.02
-    """A wall may go on unseen by one beam spacing beyond its last beam, but by no more than this: two rooms'
-    walls on one line stand a wall's thickness apart."""
-    corner_reach_m: float = 0.01
-    """And by this where a corner was seen."""
+    pieces: PiecesConfig = field(default_factory=PiecesConfig)
+    """How far the ends of what a scan shows can be believed."""
     pass_margin_m: float = 0.1
     """A beam that goes on this far beyond a line has passed through it."""
     contradictions: int = 2
@@ -42,8 +38,6 @@ class WallsConfig:
     """A wall is forgotten when so many scans in turn gave all its beams to other walls ..."""
     established_sightings: int = 10
     """... unless it was seen at least this often."""
-    corner_leap_m: float = 0.15
-    """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 
 class Walls:
@@ -64,7 +58,7 @@ class Walls:
     def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
         """Return what matching needs of some walls."""
         rows = np.searchsorted(self._ids, ids)
-        reach = _reach(self._spacing[rows], self._is_corner[rows], self._config)
+        reach = believable_reach(self._spacing[rows], self._is_corner[rows], self._config.pieces)
         return KnownWalls(ids, self._extents[rows], reach)
 
     def map(self, belief: Belief) -> StochasticMap:
@@ -125,7 +119,7 @@ class Walls:
             kept = _kept_piece(self._extents[row], through, on)
             cut = kept != self._extents[row]
             self._extents[row] = kept
-            self._spacing[row] = np.where(cut, self._config.reach_m, self._spacing[row])
+            self._spacing[row] = np.where(cut, self._config.pieces.reach_m, self._spacing[row])
             self._is_corner[row] &= ~cut
             self._against[row] = 0
 
@@ -189,7 +183,7 @@ class Walls:
 def _kept_piece(
     extent: Float[np.ndarray, "2"], through: Float[np.ndarray, " p"], on: Float[np.ndarray, " h"]
 ) -> Float[np.ndarray, "2"]:
-    """Return the piece between passing beams that most beams end on (else the longest), cut back to the last of these."""
+    """Return the piece between passing beams that most beams end on (else the longest), cut back to its hits."""
     bounds = np.concatenate([extent[:1], np.sort(through), extent[1:]])
     hits, length = np.histogram(on, bounds)[0], np.diff(bounds)
     best = int(np.lexsort((length, hits))[-1])
@@ -200,68 +194,3 @@ def _kept_piece(
     if len(inner) and best < len(length) - 1 and high - inner.max() < 0.5:
         high = inner.max()
     return np.array([low, high])
-
-
-def owners_of_beams(segments: Segments, owners: Int[np.ndarray, " s"], beams: int) -> Int[np.ndarray, " k"]:
-    """Return for each beam of a scan the id of the wall that its segment belongs to, -1 for none."""
-    owner = np.full(beams, -1, dtype=np.int64)
-    for (first, last), wall in zip(segments.beams.tolist(), owners.tolist(), strict=True):
-        if first <= last:
-            owner[first : last + 1] = wall
-        else:
-            owner[first:], owner[: last + 1] = wall, wall
-    return owner
-
-
-def sure_pieces(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:
-    """Shorten each segment to where its beams stand close enough together that no door hides between them.
-
-    Beams dtheta apart meet a line at distance r, s beyond the foot of the perpendicular, (r^2 + s^2) dtheta / r
-    apart. A segment that lies beyond altogether keeps the end nearer to the foot. Corners far beyond the last
-    beam are not believed either.
-    """
-    segments = _without_leaps(segments, scan, config)
-    r = segments.lines[:, 1]
-    farthest = np.sqrt(np.maximum(r * config.sure_gap_m / beam_step(scan) - r**2, 0.0))
-    t, n = directions(segments.lines[:, 0]), normals(segments.lines[:, 0])
-    along = np.sum(segments.ends * t[:, None], axis=-1)
-    inner = np.where(np.sign(along[:, :1]) == np.sign(along[:, 1:]), np.abs(along).min(axis=1, keepdims=True), 0.0)
-    farthest = np.maximum(farthest[:, None], inner)
-    clipped = np.clip(along, -farthest, farthest)
-    cut = clipped != along
-    ends = np.where(cut[..., None], (r[:, None] * n)[:, None] + clipped[..., None] * t[:, None], segments.ends)
-    return replace(segments, ends=ends, end_kinds=np.where(cut, int(EndKind.OPEN), segments.end_kinds))
-
-
-def _without_leaps(segments: Segments, scan: Scan, config: WallsConfig) -> Segments:
-    """Put ends that lie far beyond the last beam back to where that beam meets the line."""
-    off_normal = scan.bearings_rad[segments.beams] - segments.lines[:, :1]
-    distance = segments.lines[:, 1:] / np.maximum(np.cos(off_normal), 0.02)
-    bearing = scan.bearings_rad[segments.beams]
-    last = distance[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    leap = np.hypot(*np.moveaxis(segments.ends - last, -1, 0)) > config.corner_leap_m
-    kinds = np.where(leap, int(EndKind.OPEN), segments.end_kinds)
-    return replace(segments, ends=np.where(leap[..., None], last, segments.ends), end_kinds=kinds)
-
-
-def end_reach(segments: Segments, scan: Scan, config: WallsConfig) -> Float[np.ndarray, "n 2"]:
-    """Return how much farther each end of each segment may really lie than it was seen, m."""
-    return _reach(beam_spacing(scan, segments), segments.end_kinds == EndKind.CORNER, config)
-
-
-def _reach(
-    spacing: Float[np.ndarray, "n 2"], is_corner: Bool[np.ndarray, "n 2"], config: WallsConfig
-) -> Float[np.ndarray, "n 2"]:
-    return np.where(is_corner, config.corner_reach_m, np.minimum(spacing, config.reach_m))
-
-
-def beam_step(scan: Scan) -> float:
-    """Return the angle between neighbouring beams, rad."""
-    return float((scan.bearings_rad[-1] - scan.bearings_rad[0]) / max(len(scan.bearings_rad) - 1, 1))
-
-
-def beam_spacing(scan: Scan, segments: Segments) -> Float[np.ndarray, "n 2"]:
-    """Return the distance between neighbouring beams on the wall at each end of each segment, m."""
-    distance = np.hypot(segments.ends[..., 0], segments.ends[..., 1])
-    cosine = np.clip(segments.lines[:, 1, None] / np.maximum(distance, 1e-9), 0.05, 1.0)
-    return beam_step(scan) * distance / cosine

@@ -27,7 +27,7 @@ def compose(pose_world: Float[np.ndarray, "3"], motion: Float[np.ndarray, "3"]) 
 
 
 def inverse(pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Return the pose of the old frame seen from the new one: compose(pose, inverse(pose)) = 0."""
+    """Return the old frame as seen from the pose, so that the two compose to nothing."""
     position = -rotation(-pose[2]) @ pose[:2]
     return np.array([position[0], position[1], wrap(-pose[2])])
 
