@@ -11,13 +11,13 @@ from slam.robot import MotionCommand, Odometry
 
 @dataclass(frozen=True)
 class DriveConfig:
-    """The wheels and how they slip; the defaults lose about 2.8 degrees of heading per square root of a metre."""
+    """The wheels and how they slip; the defaults lose about 4 degrees of heading per square root of a metre."""
 
     wheel_base_m: float = 0.4
     """Distance m between the wheels."""
-    wheel_slip: float = 0.014
+    wheel_slip: float = 0.02
     """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
-    lateral_slip: float = 0.004
+    lateral_slip: float = 0.006
     """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
     floor: float = 1e-6
     """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""

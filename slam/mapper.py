@@ -11,7 +11,7 @@ from .chains import Chain, ChainConfig, connect
 from .extraction import extract
 from .geometry.lines import distance_to_segments
 from .matching import KnownWalls, Matches, MatchingConfig, match, relocate, same_line
-from .pieces import end_reach, sure_pieces
+from .pieces import sure_pieces
 from .robot import Odometry, Scan
 from .segments import Segments
 from .stochastic_map import StochasticMap
@@ -66,17 +66,16 @@ class Mapper:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
         segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
-        reach = end_reach(segments, scan, self.config.walls.pieces)
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan)
         joint = self.backend.belief.joint(near.ids)
-        clear = self._match(segments, reach, near, joint, self.config.matching, clear_only=True)
+        clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
         first = _firm(clear, segments)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         relocated = relocate(joint, near.ids, first)
         # 4. Match the remaining features with their re-prediction from the new robot pose.
         rest = clear.unmatched
-        again = self._match(segments.take(rest), reach[rest], near, relocated, self.config.matching)
+        again = self._match(segments.take(rest), near, relocated, self.config.matching)
         matches = _both(clear, again)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, _firm(matches, segments))

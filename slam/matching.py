@@ -29,9 +29,10 @@ class MatchingConfig:
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
     offset_m: float = 0.5
     """Nor are lines that stand further apart than this at the seen piece."""
-    gap_m: float = 0.02
-    """Largest gap along the line between a segment and its wall, beyond how far either may really reach."""
-    overlap_m: float = 0.05
+    overlap_m: float = 0.02
+    """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
+    apart than a wall is thick."""
+    bridge_m: float = 0.05
     """A segment that overlaps two walls by this much shows that they may be one."""
     short_m: float = 0.3
     """Shorter segments are too poor in direction for the gate alone: they are in doubt also beside a wall."""
@@ -80,8 +81,6 @@ class KnownWalls:
     """Ascending."""
     extents: Float[np.ndarray, "n 2"]
     """From and to along the line, m from the anchor."""
-    reach: Float[np.ndarray, "n 2"]
-    """How much farther each end may really lie than it was seen, m: next to nothing at a corner."""
 
 
 @dataclass(frozen=True)
@@ -94,13 +93,10 @@ class _Candidates:
     d2: Float[np.ndarray, " c"]
     gap: Float[np.ndarray, " c"]
     """Distance along the line between segment and wall, m; negative where they overlap by that much."""
-    excess: Float[np.ndarray, " c"]
-    """What is left of the gap when each end lies as far out as it may, m."""
 
 
 def match(
     segments: Segments,
-    reach: Float[np.ndarray, "s 2"],
     walls: KnownWalls,
     joint: Joint,
     config: MatchingConfig = MatchingConfig(),
@@ -108,8 +104,6 @@ def match(
     clear_only: bool = False,
 ) -> Matches:
     """Match segments to the lines of `joint`, which are those of `walls` in the same order.
-
-    `reach` says how much farther each end of each segment may really lie than it was seen, m.
 
     With `clear_only`, keep only segments with one candidate that stands out, and of these only a jointly
     compatible set: what is safe enough to relocate the robot by.
@@ -121,12 +115,9 @@ def match(
             NO_MATCHES.pairs, NO_MATCHES.distances, NO_MATCHES.bridges,
             np.arange(count), NO_MATCHES.doubtful, {},
         )  # fmt: skip
-    found = _candidates(segments, reach, walls, joint, config)
+    found = _candidates(segments, walls, joint, config)
     level = chi2.ppf(config.gate, 2)
-    fits = (found.d2 <= level) & (found.excess <= config.gap_m)
-    # Two rooms' walls may stand on one line, a wall's thickness apart: the one that the segment overlaps is meant.
-    overlaps = fits & (found.gap < 0.0)
-    fits &= overlaps | ~np.isin(found.segment, found.segment[overlaps])
+    fits = (found.d2 <= level) & (found.gap <= -config.overlap_m)
     best = np.full(count, -1)
     order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
     best[found.segment[order]] = order
@@ -143,7 +134,7 @@ def match(
     return Matches(
         np.stack([found.segment[chosen], ids[found.line[chosen]]], axis=-1),
         found.d2[chosen],
-        ids[_bridges(found, chosen, fits & firm & (found.gap < -config.overlap_m))],
+        ids[_bridges(found, chosen, fits & firm & (found.gap < -config.bridge_m))],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
         _refusals(found, ids, ~matched, level, config),
@@ -164,9 +155,7 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
     return Joint(joint.mean + gain @ model.e.ravel(), joint.cov - gain @ PHt.T, joint.anchors)
 
 
-def _candidates(
-    segments: Segments, reach: Float[np.ndarray, "s 2"], walls: KnownWalls, joint: Joint, config: MatchingConfig
-) -> _Candidates:
+def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: MatchingConfig) -> _Candidates:
     pose, means = joint.mean[:3], joint.mean[3:].reshape(-1, 2)
     alpha_world = segments.lines[:, 0] + pose[2]
     turned = alpha_world[:, None] - means[:, 0]
@@ -179,10 +168,7 @@ def _candidates(
     along = np.sum((ends_world - joint.anchors[line][:, None]) * directions(means[line, 0])[:, None], axis=-1)
     after = along[:, 0] - walls.extents[line, 1]
     before = walls.extents[line, 0] - along[:, 1]
-    slack_after = reach[segment, 0] + walls.reach[line, 1]
-    slack_before = reach[segment, 1] + walls.reach[line, 0]
-    gap, excess = np.maximum(after, before), np.maximum(after - slack_after, before - slack_before)
-    return _Candidates(segment, line, model, _distances(model, line, joint), gap, excess)
+    return _Candidates(segment, line, model, _distances(model, line, joint), np.maximum(after, before))
 
 
 def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -> np.ndarray:
@@ -277,8 +263,8 @@ def _refusals(
     order = np.argsort(-found.d2, kind="stable")
     for pair in order[unmatched[found.segment[order]]]:
         wall, d2, gap = ids[found.line[pair]], found.d2[pair], found.gap[pair]
-        if found.excess[pair] > config.gap_m:
-            why = f"{gap:.2f} m beyond the end of wall {wall}, which may reach {gap - found.excess[pair]:.2f} m farther"
+        if gap > -config.overlap_m:
+            why = f"{max(gap, 0.0):.2f} m beyond the end of wall {wall}"
         elif d2 > level:
             why = f"squared distance {d2:.1f} from wall {wall} (gate {level:.1f})"
         else:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from .geometry.lines import directions, normals
 from .robot import Scan
@@ -16,11 +16,6 @@ class PiecesConfig:
 
     sure_gap_m: float = 0.35
     """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    reach_m: float = 0.02
-    """A wall may go on unseen by one beam spacing beyond its last beam, but by no more than this: two rooms'
-    walls on one line stand a wall's thickness apart."""
-    corner_reach_m: float = 0.01
-    """And by this where a corner was seen."""
     corner_leap_m: float = 0.15
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
@@ -65,18 +60,6 @@ def _without_leaps(segments: Segments, scan: Scan, config: PiecesConfig) -> Segm
     leap = np.hypot(*np.moveaxis(segments.ends - last, -1, 0)) > config.corner_leap_m
     kinds = np.where(leap, int(EndKind.OPEN), segments.end_kinds)
     return replace(segments, ends=np.where(leap[..., None], last, segments.ends), end_kinds=kinds)
-
-
-def end_reach(segments: Segments, scan: Scan, config: PiecesConfig) -> Float[np.ndarray, "n 2"]:
-    """Return how much farther each end of each segment may really lie than it was seen, m."""
-    return believable_reach(beam_spacing(scan, segments), segments.end_kinds == EndKind.CORNER, config)
-
-
-def believable_reach(
-    spacing: Float[np.ndarray, "n 2"], is_corner: Bool[np.ndarray, "n 2"], config: PiecesConfig
-) -> Float[np.ndarray, "n 2"]:
-    """Return how much farther ends may really lie, from the beam spacing m there and whether they are corners."""
-    return np.where(is_corner, config.corner_reach_m, np.minimum(spacing, config.reach_m))
 
 
 def beam_step(scan: Scan) -> float:

@@ -9,7 +9,7 @@ from .backend import Belief
 from .geometry.lines import directions, distance_to_segments
 from .geometry.poses import to_world
 from .matching import KnownWalls
-from .pieces import PiecesConfig, beam_spacing, believable_reach, owners_of_beams
+from .pieces import PiecesConfig, beam_spacing, owners_of_beams
 from .robot import Scan
 from .segments import EndKind, Segments
 from .sightlines import Sightlines, sightlines
@@ -48,7 +48,6 @@ class Walls:
         self._ids = np.zeros(0, dtype=np.int64)
         self._extents = np.zeros((0, 2))
         self._spacing = np.zeros((0, 2))
-        self._is_corner = np.zeros((0, 2), dtype=bool)
         self._sightings = np.zeros(0, dtype=np.int64)
         self._last_seen = np.zeros(0, dtype=np.int64)
         self._against = np.zeros(0, dtype=np.int64)
@@ -58,8 +57,7 @@ class Walls:
     def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
         """Return what matching needs of some walls."""
         rows = np.searchsorted(self._ids, ids)
-        reach = believable_reach(self._spacing[rows], self._is_corner[rows], self._config.pieces)
-        return KnownWalls(ids, self._extents[rows], reach)
+        return KnownWalls(ids, self._extents[rows])
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with the extents."""
@@ -119,8 +117,7 @@ class Walls:
             kept = _kept_piece(self._extents[row], through, on)
             cut = kept != self._extents[row]
             self._extents[row] = kept
-            self._spacing[row] = np.where(cut, self._config.pieces.reach_m, self._spacing[row])
-            self._is_corner[row] &= ~cut
+            self._spacing[row] = np.where(cut, self._config.end_margin_m, self._spacing[row])
             self._against[row] = 0
 
     def merge(self, belief: Belief, keep: int, drop: int) -> None:
@@ -134,7 +131,6 @@ class Walls:
             if outward * (theirs[side] - self._extents[row, side]) > 0:
                 self._extents[row, side] = theirs[side]
                 self._spacing[row, side] = self._spacing[other, side]
-                self._is_corner[row, side] = self._is_corner[other, side]
         self._sightings[row] += self._sightings[other]
         self._last_seen[row] = max(self._last_seen[row], self._last_seen[other])
         self._drop(np.array([drop]))
@@ -144,7 +140,6 @@ class Walls:
         self._ids = np.concatenate([self._ids, ids])
         self._extents = np.concatenate([self._extents, np.tile([np.inf, -np.inf], (m, 1))])
         self._spacing = np.concatenate([self._spacing, np.full((m, 2), np.inf)])
-        self._is_corner = np.concatenate([self._is_corner, np.zeros((m, 2), dtype=bool)])
         self._sightings = np.concatenate([self._sightings, np.zeros(m, dtype=np.int64)])
         self._last_seen = np.concatenate([self._last_seen, np.full(m, self._scans)])
         self._against = np.concatenate([self._against, np.zeros(m, dtype=np.int64)])
@@ -153,7 +148,7 @@ class Walls:
     def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
-        self._is_corner, self._sightings = self._is_corner[kept], self._sightings[kept]
+        self._sightings = self._sightings[kept]
         self._last_seen, self._against, self._claimed = self._last_seen[kept], self._against[kept], self._claimed[kept]
 
     def _stretch(
@@ -177,7 +172,6 @@ class Walls:
                 if beyond > 0 or (sharper and -beyond < self._spacing[row, side]):
                     self._extents[row, side] = along[k, side]
                     self._spacing[row, side] = spacing[k, side]
-                    self._is_corner[row, side] = corner[k, side]
 
 
 def _kept_piece(
