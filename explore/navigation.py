@@ -8,11 +8,15 @@ import networkx as nx
 def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...]:
     """Return the walls to follow from the present one to the goal, both included, by the fewest changes of wall.
 
-    Where no way is known the goal stands alone: the robot then looks for one over the free floor.
+    Among equals the one with the lowest ids comes first. Where no way is known the goal stands alone: the robot
+    then looks for one over the free floor.
     """
     if here is None or here == goal or here not in graph or goal not in graph:
         return (goal,)
-    try:
-        return tuple(nx.shortest_path(graph, here, goal))
-    except nx.NetworkXNoPath:
+    came_from = dict(nx.bfs_predecessors(graph, here, sort_neighbors=sorted))
+    if goal not in came_from:
         return (goal,)
+    walls = [goal]
+    while walls[-1] != here:
+        walls.append(came_from[walls[-1]])
+    return tuple(reversed(walls))
