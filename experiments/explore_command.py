@@ -30,7 +30,7 @@ class Explore:
     """Covariance of the start: zero (0.1 mm, 1e-5 rad), small (0.01 m, 0.1 degree) or large (0.1 m, 2 degrees)."""
     errorless: bool = False
     """Exact ranges and wheels, the estimate started at the truth; the models keep the stated noise."""
-    max_steps: int = 5000
+    max_steps: int = 100_000
     """The run is stopped after this many scans."""
     start: tuple[float, ...] | None = None
     """Start pose instead of the drawing's own: x and y in metres, and perhaps the heading in rad."""

@@ -39,7 +39,7 @@ class TrialConfig:
     seed: int = 1
     p0: P0 = "small"
     errorless: bool = False
-    max_steps: int = 5000
+    max_steps: int = 100_000
     start: tuple[float, ...] | None = None
     """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
     scale: float | None = None

@@ -45,7 +45,7 @@ class Suite:
     """Covariance of the start."""
     errorless: bool = False
     """Exact ranges and wheels."""
-    max_steps: int = 2500
+    max_steps: int = 100_000
     """A trial is stopped after this many scans."""
     jobs: int = 2
     """Number of processes."""

@@ -57,6 +57,12 @@ class Explorer:
         """What the robot is about, in words."""
         return self._errand.doing if self._errand is not None else ""
 
+    @property
+    def closing_words(self) -> str:
+        """Why there is nowhere left to go."""
+        left = len(self.still_open)
+        return "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
+
     def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
         """Return the next step, or None when there is nowhere left to go."""
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}

@@ -1,17 +1,24 @@
 """The closed loop over any robot, as a generator of steps: sense, map, choose, drive."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
+import networkx as nx
 import numpy as np
 
 from slam.backend import Backend
+from slam.chains import Chain
 from slam.mapper import Mapper, MapperConfig
-from slam.robot import Odometry, Robot
+from slam.robot import MotionCommand, Odometry, Robot
 
 from .explorer import Explorer, ExplorerConfig
 from .free_space import FreeSpace, FreeSpaceConfig
+from .goal import Goal, SetAside
+from .passenger import Passenger
 from .step import Step
 from .strategies import Strategy
 from .visibility import VisibilityGraph, followed_wall
@@ -29,6 +36,30 @@ class MissionConfig:
     """A mission that takes longer ends as `stopped`."""
 
 
+@runtime_checkable
+class Decider(Protocol):
+    """Who chooses where to go: the explorer, or a passenger of a recorded robot."""
+
+    set_aside: dict[tuple[int, int], SetAside]
+    still_open: tuple[SetAside, ...]
+    goal: Goal | None
+    walls_to_follow: tuple[int, ...]
+
+    @property
+    def doing(self) -> str:
+        """What the robot is about, in words."""
+        ...
+
+    @property
+    def closing_words(self) -> str:
+        """Why there is nothing left to do."""
+        ...
+
+    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
+        """Return the next step, or None at the end."""
+        ...
+
+
 def explore_mission(
     robot: Robot,
     backend: Backend,
@@ -40,32 +71,45 @@ def explore_mission(
 
     A `mapper` made elsewhere (with oracles in place of extraction or matching) takes the place of the usual one.
     """
-    mapper = mapper or Mapper(backend, config.mapper)
-    free_space, graph = FreeSpace(config.free_space), VisibilityGraph()
     explorer = Explorer(strategy, backend.belief.pose_world[:2].copy(), config.explorer)
+    return _mission(robot, mapper or Mapper(backend, config.mapper), explorer, config)
+
+
+def ride_mission(
+    robot: Robot,
+    scans: int,
+    backend: Backend,
+    config: MissionConfig = MissionConfig(),
+    mapper: Mapper | None = None,
+) -> Iterator[Step]:
+    """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step."""
+    return _mission(robot, mapper or Mapper(backend, config.mapper), Passenger(scans), config)
+
+
+def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConfig) -> Iterator[Step]:
+    free_space, graph = FreeSpace(config.free_space), VisibilityGraph()
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     path_length, index = 0.0, 0
     while True:
         began = time.perf_counter()
         scan = robot.sense()
-        update = mapper.step(scan, explorer.set_aside.keys())
+        update = mapper.step(scan, decider.set_aside.keys())
         pose_world = update.map.belief.pose_world
         free_space.integrate(pose_world, scan)
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
-        around = Surroundings(update.map, free_space, scan)
         ended, command = None, None
         if index + 1 >= config.max_steps:
             ended, reason = "stopped", f"the limit of {config.max_steps} steps"
         else:
-            command = explorer.command(around, update.chains, graph.graph)
-            reason = explorer.doing
+            command = decider.command(Surroundings(update.map, free_space, scan), update.chains, graph.graph)
+            reason = decider.doing
             if command is None:
-                ended, reason = "complete", _closing_words(explorer)
+                ended, reason = "complete", decider.closing_words
         yield Step(
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
-            update.map, update.chains, free_space, graph.graph, explorer.goal, explorer.walls_to_follow,
-            explorer.still_open, command, path_length, time.perf_counter() - began, ended, reason,
+            update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
+            decider.still_open, command, path_length, time.perf_counter() - began, ended, reason,
         )  # fmt: skip
         if command is None:
             return
@@ -73,8 +117,3 @@ def explore_mission(
         mapper.predict(odometry)
         path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))
         index += 1
-
-
-def _closing_words(explorer: Explorer) -> str:
-    left = len(explorer.still_open)
-    return "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
