@@ -1,0 +1,132 @@
+"""Whatever the map says, a command keeps the disc clear of every return of the scan."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from explore.driving import DrivingConfig, Pilot, heading_to, returns
+from explore.free_space import FreeSpace
+from explore.paths import Path, PathConfig, Planner
+from slam.geometry.poses import arc, compose
+from slam.robot import MotionCommand, Scan
+
+few = settings(max_examples=80, deadline=None, derandomize=True)
+CONFIG = DrivingConfig()
+BEARINGS = -np.pi + np.arange(180) * np.deg2rad(2.0)
+
+
+def scan_of(ranges):
+    return Scan(BEARINGS, ranges, 0.01, 4.0, 0.0)
+
+
+def open_floor(pose):
+    """Return a free space in which everything around the robot was seen free."""
+    grid = FreeSpace()
+    grid.integrate(pose, scan_of(np.full(180, np.nan)))
+    return grid
+
+
+def straight(start, end):
+    share = np.linspace(0, 1, max(int(np.hypot(*(end - start)) / 0.05), 2))[:, None]
+    points = start + share * (end - start)
+    return Path(points, 1.0, 0)
+
+
+def pilot_to(goal, pose, grid):
+    return Pilot(straight(pose[:2], goal), Planner(grid, pose[:2], PathConfig()), CONFIG)
+
+
+@few
+@given(st.integers(0, 2**32))
+def test_the_disc_keeps_clear_of_all_returns_on_the_whole_step(seed):
+    """The way of the disc is sampled a hundred times as densely as needed; only a step that leads away may be tight."""
+    rng = np.random.default_rng(seed)
+    pose = np.append(rng.uniform(-1, 1, 2), rng.uniform(-3, 3))
+    grid = open_floor(pose)
+    pilot = pilot_to(pose[:2] + rng.uniform(-1.5, 1.5, 2), pose, grid)
+    ranges = rng.uniform(rng.choice([0.21, 0.3]), 1.2, 180)
+    ranges[rng.random(180) < rng.uniform(0, 0.95)] = np.nan
+    scan = scan_of(ranges)
+    command = pilot.command(pose, scan, grid)
+    if command is None or command.forward_m == 0.0 or not len(returns(scan)):
+        return
+    points = returns(scan)
+    places = np.stack([arc(s * command.forward_m, s * command.turn_rad)[:2] for s in np.linspace(0, 1, 100)])
+    gap = np.hypot(*np.moveaxis(points - places[:, None], -1, 0))
+    now = gap[0].min()
+    assert gap.min() > CONFIG.radius_m
+    assert gap.min() >= min(CONFIG.radius_m + CONFIG.margin_m, now) - 2e-3  # between the samples of its own check
+
+
+@few
+@given(st.integers(0, 2**32))
+def test_commands_are_short_forward_steps_and_small_turns(seed):
+    rng = np.random.default_rng(seed)
+    pose = np.append(rng.uniform(-1, 1, 2), rng.uniform(-3, 3))
+    grid = open_floor(pose)
+    pilot = pilot_to(pose[:2] + rng.uniform(-1.5, 1.5, 2), pose, grid)
+    command = pilot.command(pose, scan_of(np.full(180, np.nan)), grid)
+    assert command is not None
+    assert 0.0 <= command.forward_m <= CONFIG.step_m
+    assert abs(command.turn_rad) <= CONFIG.turn_rad + 1e-12
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, 3.1, -2.0])
+def test_the_robot_gets_to_the_end_of_a_free_path(heading):
+    pose = np.array([0.0, 0.0, heading])
+    grid, goal = open_floor(pose), np.array([1.5, 0.8])
+    pilot = pilot_to(goal, pose, grid)
+    for _ in range(80):
+        if pilot.arrived(pose):
+            break
+        command = pilot.command(pose, scan_of(np.full(180, np.nan)), grid)
+        assert command is not None
+        pose = compose(pose, arc(command.forward_m, command.turn_rad))
+    assert np.hypot(*(pose[:2] - goal)) < CONFIG.arrived_m
+    assert pilot.remaining_m < 0.3
+
+
+def test_a_path_through_a_return_is_obstructed_and_one_past_it_is_not():
+    pose = np.zeros(3)
+    grid = open_floor(pose)
+    pilot = pilot_to(np.array([1.0, 0.0]), pose, grid)
+    ranges = np.full(180, np.nan)
+    ranges[np.argmin(np.abs(BEARINGS))] = 0.6
+    assert pilot.is_obstructed(pose, scan_of(ranges))
+    assert not pilot.is_obstructed(pose, scan_of(np.full(180, np.nan)))
+    aside = np.full(180, np.nan)
+    aside[np.argmin(np.abs(BEARINGS - np.pi / 2))] = 0.3
+    assert not pilot.is_obstructed(pose, scan_of(aside))
+
+
+def test_a_step_onto_floor_that_was_never_seen_is_careful():
+    pose = np.zeros(3)
+    seen = open_floor(pose)
+    blind = FreeSpace()
+    blind.integrate(pose, scan_of(np.full(180, 0.3)))
+    pilot = pilot_to(np.array([1.0, 0.0]), pose, seen)
+    free = scan_of(np.full(180, np.nan))
+    bold, careful = pilot.command(pose, free, seen), pilot.command(pose, free, blind)
+    assert bold is not None
+    assert careful is not None
+    assert careful.forward_m <= CONFIG.careful_m < bold.forward_m
+
+
+def test_a_robot_that_faces_the_wrong_way_turns_on_the_spot_the_short_way():
+    pose = np.zeros(3)
+    grid = open_floor(pose)
+    free = scan_of(np.full(180, np.nan))
+    left = pilot_to(np.array([-1.0, 0.2]), pose, grid).command(pose, free, grid)
+    right = pilot_to(np.array([-1.0, -0.2]), pose, grid).command(pose, free, grid)
+    assert left == MotionCommand(0.0, CONFIG.turn_rad)
+    assert right == MotionCommand(0.0, -CONFIG.turn_rad)
+
+
+def test_the_heading_to_a_place_is_the_turn_that_faces_it():
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        pose, target = rng.uniform(-3, 3, 3), rng.uniform(-5, 5, 2)
+        turned = pose[2] + heading_to(pose, target)
+        way = (target - pose[:2]) / np.hypot(*(target - pose[:2]))
+        np.testing.assert_allclose([np.cos(turned), np.sin(turned)], way, atol=1e-12)

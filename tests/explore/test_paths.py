@@ -1,0 +1,205 @@
+"""Paths over a drawn grid, against a dense Dijkstra and against shapely."""
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+
+from explore.free_space import FreeSpace
+from explore.paths import PathConfig, Planner, cells_within, sees
+from sim.lidar import LidarConfig, RangeFinder
+from slam.robot import Scan
+
+CONFIG = PathConfig()
+CELL = 0.05
+LEAST = CONFIG.radius_m + CONFIG.margin_m
+
+
+def explored(seed):
+    """Return a room of 5 m with random blocks, the grid after scans all over it, and free places."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.uniform([0, 0, 0.2, 0.2], [4.5, 4.5, 1.2, 1.2], (5, 4))
+    blocks = [shapely.box(x, y, x + w, y + h) for x, y, w, h in drawn]
+    room = shapely.box(0, 0, 5, 5).difference(shapely.union_all(blocks))
+    room = shapely.orient_polygons(max(shapely.get_parts(room), key=lambda part: part.area))
+    rings = [shapely.get_coordinates(ring) for ring in (room.exterior, *room.interiors)]
+    faces = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    finder, grid = RangeFinder(faces, LidarConfig()), FreeSpace()
+    places = rng.uniform(0, 5, (500, 2))
+    places = places[shapely.contains_xy(room.buffer(-0.3), places[:, 0], places[:, 1])]
+    for place in places[:25]:
+        pose = np.append(place, rng.uniform(-3, 3))
+        grid.integrate(pose, Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0))
+    return room, grid, places
+
+
+SEEDS = range(5)
+
+
+def costs_by_definition(grid):
+    """Return what a metre through each cell costs: 1 at the stand-off, more nearer to walls, no end below the least."""
+    clearance = grid.clearance().astype(float)
+    tight = np.clip((CONFIG.standoff_m - clearance) / (CONFIG.standoff_m - LEAST), 0.0, 1.0)
+    passable = (grid.evidence < 0) & (clearance >= LEAST)
+    return np.where(passable, 1.0 + CONFIG.narrow_cost * tight**2, np.inf)
+
+
+def dijkstra(costs, start, goal):
+    """Return the cheapest cost in cells over the eight neighbours of each cell, or None."""
+    graph = nx.Graph()
+    rows, columns = np.nonzero(np.isfinite(costs))
+    for r, c in zip(rows.tolist(), columns.tolist(), strict=True):
+        for dr, dc in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            q, k = r + dr, c + dc
+            if 0 <= q < costs.shape[0] and 0 <= k < costs.shape[1] and np.isfinite(costs[q, k]):
+                graph.add_edge((r, c), (q, k), weight=float(np.hypot(dr, dc) * 0.5 * (costs[r, c] + costs[q, k])))
+    if start not in graph or goal not in graph or not nx.has_path(graph, start, goal):
+        return None
+    return nx.dijkstra_path_length(graph, start, goal)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_path_costs_what_a_dense_dijkstra_says(seed):
+    _, grid, places = explored(seed)
+    costs = costs_by_definition(grid)
+    start = places[0]
+    planner = Planner(grid, start, CONFIG)
+    compared = 0
+    for goal in places[1:4]:
+        a, b = (tuple(grid.cells(p[None])[0].tolist()) for p in (start, goal))
+        expected, path = dijkstra(costs, a, b), planner.to(goal[None])
+        assert (path is None) == (expected is None)
+        if path is not None:
+            assert path.cost == pytest.approx(expected * CELL, rel=1e-5, abs=1e-6)
+            compared += 1
+    assert compared
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_path_never_crosses_a_wall_and_keeps_the_bodys_clearance(seed):
+    room, grid, places = explored(seed)
+    planner = Planner(grid, places[0], CONFIG)
+    found = 0
+    for goal in places[1:12]:
+        path = planner.to(goal[None])
+        if path is None:
+            continue
+        found += 1
+        way = shapely.LineString(np.repeat(path.points_world, 2, axis=0))
+        assert room.contains(way)
+        # Cells know walls to half a diagonal at either end.
+        assert shapely.distance(way, room.boundary) > LEAST - 1.5 * CELL
+        clearance = grid.clearance()[tuple(grid.cells(path.points_world).T)]
+        assert np.all(clearance[1:] >= LEAST - 1e-6)
+        assert np.all(np.hypot(*np.diff(path.points_world, axis=0).T) < 1.5 * CELL)
+        assert np.hypot(*(path.points_world[-1] - goal)) < CELL
+    assert found >= 5
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_cheapest_of_several_places_is_the_one_reached(seed):
+    _, grid, places = explored(seed)
+    planner = Planner(grid, places[0], CONFIG)
+    single = [planner.to(place[None]) for place in places[1:8]]
+    together = planner.to(places[1:8])
+    costs = [np.inf if path is None else path.cost for path in single]
+    assert together is not None
+    assert together.reached == int(np.argmin(costs))
+    assert together.cost == pytest.approx(min(costs))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_reachable_cells_are_those_with_a_path(seed):
+    _, grid, places = explored(seed)
+    planner = Planner(grid, places[0], CONFIG)
+    reachable = {tuple(cell) for cell in planner.reachable_cells().tolist()}
+    for place in places[1:20]:
+        assert (tuple(grid.cells(place[None])[0].tolist()) in reachable) == (planner.to(place[None]) is not None)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_window_only_ever_makes_paths_longer(seed):
+    _, grid, places = explored(seed)
+    whole = Planner(grid, places[0], CONFIG)
+    window = Planner(grid, places[0], CONFIG, 1.5)
+    for place in places[1:20]:
+        inner, outer = window.to(place[None]), whole.to(place[None])
+        if np.abs(place - places[0]).max() > 1.5 + CELL:
+            assert inner is None
+        if inner is not None:
+            assert outer is not None
+            assert inner.cost >= outer.cost - 1e-9
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_straight_way_is_clear_only_over_floor_that_the_body_may_take(seed):
+    room, grid, places = explored(seed)
+    planner, said = Planner(grid, places[0], CONFIG), []
+    roomy, tight = room.buffer(-LEAST - 1.5 * CELL), room.buffer(-LEAST + 1.5 * CELL)
+    for a, b in zip(places[:40], places[40:80], strict=False):
+        way = shapely.LineString([a, b])
+        clear = planner.clear_ahead(a, b)
+        said.append(clear)
+        if clear:
+            assert tight.contains(way) or np.hypot(*(a - places[0])) < 0.35 or np.hypot(*(b - places[0])) < 0.35
+        elif roomy.contains(way):
+            cells = grid.cells(np.linspace(a, b, 200))
+            assert np.any(grid.evidence[tuple(cells.T)] >= 0)  # floor that no scan saw, not a wall
+    assert 0 < sum(said) < len(said)
+
+
+def test_no_place_and_places_off_the_grid_have_no_path():
+    _, grid, places = explored(0)
+    planner = Planner(grid, places[0], CONFIG)
+    assert planner.to(np.zeros((0, 2))) is None
+    assert planner.to(np.array([[500.0, 0.0]])) is None
+    assert planner.to(np.array([[-0.3, 2.0]])) is None
+
+
+def test_a_robot_too_near_to_a_wall_gets_away_from_it():
+    _, grid, places = explored(1)
+    clearance, cells = grid.clearance(), np.argwhere(grid.evidence < 0)
+    near = cells[(clearance[tuple(cells.T)] < LEAST) & (clearance[tuple(cells.T)] >= 0.15)]
+    escaped = 0
+    for cell in near[:: max(len(near) // 20, 1)]:
+        path = Planner(grid, grid.points(cell[None])[0], CONFIG).to(places)
+        if path is None:
+            continue
+        kept = clearance[tuple(grid.cells(path.points_world).T)]
+        assert np.all(kept >= kept[0] - 1e-6)
+        escaped += 1
+    assert escaped >= 10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_lines_of_sight_agree_with_shapely(seed):
+    room, grid, places = explored(seed)
+    target, viewers = places[0], places[1:80]
+    short = 0.12
+    seen = sees(grid, viewers, target, short)
+    for viewer, said in zip(viewers, seen, strict=True):
+        way = target - viewer
+        length = np.hypot(*way)
+        line = shapely.LineString([viewer, target - way / length * min(short, length)])
+        gap = shapely.distance(line, room.boundary)
+        if not room.contains(line) and shapely.length(line.difference(room)) > 2.0 * CELL:
+            assert not said
+        elif room.contains(line) and gap > 1.5 * CELL:
+            assert said
+    assert 0 < seen.sum() < len(seen)
+
+
+def test_a_wall_behind_the_last_bit_of_the_way_does_not_hide_its_own_end():
+    room, grid, places = explored(0)
+    corner = shapely.get_coordinates(room.exterior)[:1]
+    viewers = places[np.hypot(*(places - corner).T) < 1.5]
+    if len(viewers):
+        assert sees(grid, viewers, corner[0], 3.0).all()
+
+
+def test_cells_within_reach_are_all_those_within_reach():
+    _, grid, places = explored(2)
+    found = {tuple(cell) for cell in cells_within(grid, places[0], 0.4).tolist()}
+    every = np.argwhere(np.ones(grid.shape, dtype=bool))
+    near = every[np.hypot(*(grid.points(every) - places[0]).T) <= 0.4]
+    assert found == {tuple(cell) for cell in near.tolist()}
