@@ -11,6 +11,7 @@ import tyro
 
 from .explore_command import Explore
 from .listings import Backends, Strategies, Worlds
+from .replay_command import Replay
 from .scenario import UsageError, choose
 
 BAD_USAGE, INTERRUPTED = 2, 130
@@ -27,6 +28,7 @@ class Command(Protocol):
 
 COMMANDS: dict[str, Callable[..., Any]] = {
     "explore": Explore,
+    "replay": Replay,
     "worlds": Worlds,
     "backends": Backends,
     "strategies": Strategies,

@@ -1,6 +1,6 @@
 """What a person sees of a run: a progress line while it goes on, one table at its end."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -86,3 +86,28 @@ def _counts(summary: dict[str, Any]) -> str:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
+
+
+def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
+    """Print one row for each of several replays of one recording on standard output."""
+    table = Table(title=title, title_justify="left")
+    columns = {
+        "pose ANEES": "pose_anees",
+        "in band": "pose_nees_in_band",
+        "map ANEES": "map_anees",
+        "pose m": "pose_rmse_m",
+        "heading rad": "heading_rmse_rad",
+        "lines": "lines",
+        "double": "duplicate_lines",
+        "false": "false_matches",
+    }
+    table.add_column("back end")
+    for title_of_column in columns:
+        table.add_column(title_of_column, justify="right")
+    for summary in summaries:
+        table.add_row(summary["backend"], *(_short(summary[key]) for key in columns.values()))
+    Console().print(table)
+
+
+def _short(value: Any) -> str:
+    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)

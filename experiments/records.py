@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from explore.step import Step
-from sim.robot import SimulatedRobot
 from slam.backend import Joint
 
 from .association import Votes
+from .scenario import WitnessedRobot
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Log:
 class Recorder:
     """Gathers a run while it goes on, so that whatever ends it leaves everything up to then."""
 
-    robot: SimulatedRobot
+    robot: WitnessedRobot
     votes: Votes
     last: Step | None = None
     joint: Joint | None = None

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -11,10 +11,11 @@ from jaxtyping import Float
 from explore.mission import MissionConfig
 from explore.strategies import STRATEGIES, Strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
-from sim.robot import RobotConfig, SimulatedRobot
+from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
 from slam.backend import Backend
 from slam.backends import BACKENDS
+from slam.robot import Robot
 
 P0 = Literal["zero", "small", "large"]
 P0_SIGMAS: dict[str, tuple[float, float]] = {
@@ -23,6 +24,10 @@ P0_SIGMAS: dict[str, tuple[float, float]] = {
     "large": (0.1, float(np.deg2rad(2.0))),
 }
 """Standard deviations of the start: position m (each axis), heading rad."""
+
+
+STRATEGY_OF_REPLAYS = "none"
+"""Nobody decides where a recorded robot goes."""
 
 
 class UsageError(ValueError):
@@ -48,15 +53,26 @@ class TrialConfig:
     mission: MissionConfig = field(default_factory=MissionConfig)
 
 
+@runtime_checkable
+class WitnessedRobot(Robot, Protocol):
+    """A robot of which the truth is known."""
+
+    @property
+    def record(self) -> TrueRecord:
+        """What really happened, up to the last scan."""
+        ...
+
+
 @dataclass(frozen=True)
 class Scenario:
     """Everything that a trial needs, built."""
 
     config: TrialConfig
     world: World
-    robot: SimulatedRobot
+    robot: WitnessedRobot
     backend: Backend
-    strategy: Strategy
+    strategy: Strategy | None
+    """None where a recorded robot is ridden."""
     start_estimate: Float[np.ndarray, "3"]
     """Where the back end believes to start, world frame, m m rad."""
     start_cov: Float[np.ndarray, "3 3"]
@@ -86,7 +102,7 @@ def choose(kind: str, name: str, known: Iterable[str]) -> str:
 def check(config: TrialConfig) -> None:
     """Raise UsageError for names that are in no registry and numbers out of range, before anything is computed."""
     choose("back end", config.backend, BACKENDS)
-    choose("strategy", config.strategy, STRATEGIES)
+    choose("strategy", config.strategy, [*STRATEGIES, STRATEGY_OF_REPLAYS])
     choose("start covariance (--p0)", config.p0, P0_SIGMAS)
     if not 0 <= config.seed <= SEED_MAX:
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")
@@ -97,6 +113,7 @@ def check(config: TrialConfig) -> None:
 def build(config: TrialConfig, world: World | None = None) -> Scenario:
     """Build a scenario; `world` saves loading it again. Raises UsageError for bad names and unusable worlds."""
     check(config)
+    choose("strategy", config.strategy, STRATEGIES)
     world = world or load_world(config.world, config.start, config.scale)
     position_m, heading_rad = P0_SIGMAS[config.p0]
     sigmas = np.array([position_m, position_m, heading_rad])

@@ -38,6 +38,7 @@ Mission = Callable[[Scenario], Iterator[Step]]
 
 def default_mission(scenario: Scenario) -> Iterator[Step]:
     """Return the closed loop over the simulated robot."""
+    assert scenario.strategy is not None, "expected a strategy to explore by"
     return explore_mission(scenario.robot, scenario.backend, scenario.strategy, scenario.config.mission)
 
 
@@ -52,8 +53,12 @@ def run_trial(
     `watch` sees every step. A failure or Ctrl-C in the mission becomes the ending; raises UsageError for bad names
     and unusable worlds before anything is computed.
     """
-    scenario = build(config, world)
-    truth = truth_of(scenario.world, config.robot)
+    return run_scenario(build(config, world), watch, mission)
+
+
+def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mission) -> TrialResult:
+    """Run a scenario to its end, whatever that is, and return all that was computed."""
+    truth = truth_of(scenario.world, scenario.config.robot)
     recorder = Recorder(scenario.robot, Votes(truth))
     ending = _run(scenario, recorder, watch, mission)
     recorder.close()

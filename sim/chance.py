@@ -16,6 +16,8 @@ class Channel(IntEnum):
     LASER = 2
     START = 3
     """The error of the pose that the estimate starts from."""
+    ORACLE = 4
+    """Noise of lines that an oracle extracts."""
 
 
 def standard_normals(seed: int, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:

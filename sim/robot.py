@@ -67,13 +67,18 @@ class SimulatedRobot:
     def __init__(self, world: Building, seed: int, errorless: bool = False, config: RobotConfig | None = None) -> None:
         """Stand at the start of `world`; `errorless` makes ranges and wheels exact but keeps the stated noise."""
         self.config = config or RobotConfig()
-        self.record = TrueRecord()
+        self._record = TrueRecord()
         self._seed, self._errorless = seed, errorless
         self._finder = RangeFinder(world.faces, self.config.lidar)
         self._faces = np.asarray(world.faces, dtype=np.float64)
         self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
         self._pose = np.array(world.start, dtype=np.float64)
         self._time_s, self._drives = 0.0, 0
+
+    @property
+    def record(self) -> TrueRecord:
+        """What really happened, up to the last scan."""
+        return self._record
 
     @property
     def true_pose(self) -> Float[np.ndarray, "3"]:
@@ -83,12 +88,12 @@ class SimulatedRobot:
     def sense(self) -> Scan:
         """Return the scan at the present place and record the truth about it."""
         ranges, faces = self._finder.cast(self._pose)
-        lidar, step = self.config.lidar, len(self.record.poses_world)
+        lidar, step = self.config.lidar, len(self._record.poses_world)
         if not self._errorless:
             draws = standard_normals(self._seed, Channel.LASER, step, len(ranges))
             ranges = noisy(ranges, lidar.sigma_m, draws, lidar.range_max_m)
-        self.record.poses_world.append(self._pose.copy())
-        self.record.faces_of_beams.append(np.where(np.isnan(ranges), -1, faces))
+        self._record.poses_world.append(self._pose.copy())
+        self._record.faces_of_beams.append(np.where(np.isnan(ranges), -1, faces))
         self._time_s += self.config.scan_s
         return Scan(self._finder.bearings_rad, ranges, lidar.sigma_m, lidar.range_max_m, self._time_s)
 
@@ -107,16 +112,16 @@ class SimulatedRobot:
         motions = true_motion(command, slip, drive, shares)
         free = self._free_places(to_world(motions[:, :2], self._pose))
         if free < count:
-            self.record.collisions += 1
+            self._record.collisions += 1
             share = float(shares[free - 1]) if free else 0.0
             command = MotionCommand(share * command.forward_m, share * command.turn_rad)
         if free:
             self._pose = compose(self._pose, motions[free - 1])
-            self.record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
+            self._record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
         self._drives += 1
         duration = seconds(command, drive)
         self._time_s += duration
-        self.record.drive_time_s += duration
+        self._record.drive_time_s += duration
         return odometry(command, drive)
 
     def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:

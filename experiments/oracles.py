@@ -1,0 +1,125 @@
+"""The truth in place of one part of the software, to find out which part a fault comes from; handed to the mapper."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sim.chance import Channel, standard_normals
+from slam.backend import Joint
+from slam.extraction import extract
+from slam.geometry.poses import compose, inverse
+from slam.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
+from slam.robot import Scan
+from slam.segments import Segments
+
+from .association import ONE_FACE_SHARE
+from .truth import Truth
+
+
+@dataclass
+class Witness:
+    """What really stood before the robot in each scan of a run, and where the run now is."""
+
+    truth: Truth
+    poses_world: Float[np.ndarray, "s 3"]
+    face_of_beam: Int[np.ndarray, "s k"]
+    at: int = 0
+    """The scan that is being mapped."""
+
+    def faces(self, segments: Segments) -> Int[np.ndarray, " n"]:
+        """Return the true face of each segment: the one of most beams on its wall; -1 where several walls mixed."""
+        beams = self.face_of_beam[self.at]
+        found = np.full(len(segments), -1, dtype=np.int64)
+        for row, (first, last) in enumerate(segments.beams.tolist()):
+            span = np.arange(first, last + 1 + (len(beams) if last < first else 0)) % len(beams)
+            faces = beams[span]
+            faces = faces[faces >= 0]
+            if not len(faces):
+                continue
+            walls = np.bincount(self.truth.walls[faces])
+            if walls.max() >= ONE_FACE_SHARE * len(span):
+                found[row] = np.bincount(faces[self.truth.walls[faces] == walls.argmax()]).argmax()
+        return found
+
+
+class TrueAssociation:
+    """A matcher that knows which wall each segment was seen on; a line's wall is that of the segment that began it."""
+
+    def __init__(self, witness: Witness) -> None:
+        self._witness = witness
+        self._line_of_wall: dict[int, int] = {}
+        self._all: Int[np.ndarray, " s"] = np.zeros(0, dtype=np.int64)
+        self._rest: Int[np.ndarray, "u 2"] = np.zeros((0, 2), dtype=np.int64)
+
+    def __call__(
+        self,
+        segments: Segments,
+        walls: KnownWalls,
+        joint: Joint,
+        config: MatchingConfig,
+        *,
+        clear_only: bool = False,
+    ) -> Matches:
+        """Return the true pairs when asked for the clear ones, and none of the rest."""
+        if not clear_only:
+            # Called with the segments left over: those of walls without a line begin one, the others are not used.
+            rows = np.arange(len(segments))
+            return replace(NO_MATCHES, unmatched=rows, doubtful=rows[~self._begins_a_line(self._rest)])
+        faces = self._witness.faces(segments)
+        wall = np.where(faces >= 0, self._witness.truth.walls[faces], -1)
+        line = np.array([self._line_of_wall.get(int(w), -1) for w in wall], dtype=np.int64)
+        pairs = np.flatnonzero((line >= 0) & np.isin(line, walls.ids))
+        self._all, self._rest = wall, np.delete(np.column_stack([wall, segments.beam_counts]), pairs, axis=0)
+        unmatched = np.setdiff1d(np.arange(len(segments)), pairs)
+        return replace(
+            NO_MATCHES,
+            pairs=np.column_stack([pairs, line[pairs]]),
+            distances=np.zeros(len(pairs)),
+            unmatched=unmatched,
+        )
+
+    def learn(self, owners: Int[np.ndarray, " s"]) -> None:
+        """Take note of which lines were begun by which walls; call it after each scan was mapped."""
+        for wall, line in zip(self._all.tolist(), owners.tolist(), strict=True):
+            if wall >= 0 and line >= 0:
+                self._line_of_wall.setdefault(wall, line)
+
+    def _begins_a_line(self, rest: Int[np.ndarray, "u 2"]) -> np.ndarray:
+        """Which leftover segments lie on walls without a line: of several on one wall, that of most beams."""
+        begins = np.zeros(len(rest), dtype=bool)
+        for wall in np.unique(rest[:, 0]):
+            if wall >= 0 and int(wall) not in self._line_of_wall:
+                rows = np.flatnonzero(rest[:, 0] == wall)
+                begins[rows[np.argmax(rest[rows, 1])]] = True
+        return begins
+
+
+class PerfectExtraction:
+    """Real segmentation, but each line is the true one plus noise drawn from exactly the stated covariance."""
+
+    def __init__(self, witness: Witness, seed: int) -> None:
+        self._witness, self._seed = witness, seed
+
+    def __call__(self, scan: Scan) -> Segments:
+        """Extract the segments of one scan; those of several walls are left out."""
+        segments = extract(scan)
+        faces = self._witness.faces(segments)
+        segments, faces = segments.take(faces >= 0), faces[faces >= 0]
+        if not len(segments):
+            return segments
+        pose = self._witness.poses_world[self._witness.at]
+        alpha, r = self._witness.truth.lines[faces].T
+        exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
+        draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
+        noise = np.linalg.cholesky(segments.cov) @ draws[: 2 * len(segments)].reshape(-1, 2, 1)
+        return replace(segments, lines=exact + noise[..., 0])
+
+
+def true_odometry(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
+    """Return the true motion that led to each pose, in the frame of the pose before; zero for the first."""
+    motions = [np.zeros(3)]
+    for before, after in pairwise(poses_world):
+        motions.append(compose(inverse(before), after))
+    return np.array(motions)
