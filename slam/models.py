@@ -1,7 +1,7 @@
 """Motion and line-measurement models with their Jacobians, shared by every back end.
 
 A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world frame; a pose is (p, theta). J is the
-90-degree rotation and n' = J n.
+90-degree rotation and n' = J n. Jacobians are taken at the estimate, or where the caller says (`position`, `alpha`).
 """
 
 from dataclasses import dataclass
@@ -24,13 +24,18 @@ class Motion:
     """Derivative by the odometry's motion."""
 
 
-def move(pose_world: Float[np.ndarray, "3"], motion: Float[np.ndarray, "3"]) -> Motion:
-    """Predict the pose after `motion` (robot frame)."""
+def move(
+    pose_world: Float[np.ndarray, "3"],
+    motion: Float[np.ndarray, "3"],
+    position: Float[np.ndarray, "2"] | None = None,
+) -> Motion:
+    """Predict the pose after `motion` (robot frame); F is J (p+ - p) with p the estimate, or `position`."""
     R = rotation(pose_world[2])
     F, W = np.eye(3), np.eye(3)
-    F[:2, 2] = J @ R @ motion[:2]
+    moved = compose(pose_world, motion)
+    F[:2, 2] = J @ (R @ motion[:2] if position is None else moved[:2] - position)
     W[:2, :2] = R
-    return Motion(compose(pose_world, motion), F, W)
+    return Motion(moved, F, W)
 
 
 def lines_robot(
@@ -62,6 +67,8 @@ def innovations(
     means: Float[np.ndarray, "m 2"],
     lines: Float[np.ndarray, "m 2"],
     cov: Float[np.ndarray, "m 2 2"],
+    position: Float[np.ndarray, "2"] | None = None,
+    alpha: Float[np.ndarray, " m"] | None = None,
 ) -> Innovations:
     """Compare seen lines (alpha, r) with their covariance, robot frame, to map lines, row by row.
 
@@ -69,18 +76,20 @@ def innovations(
     the seen line, e = (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_predicted): linear in r however far off to one
     side the piece lies, where the difference in (alpha, r) is not. The centre stays on its beam: an error in the
     seen direction turns the line about it, so the two parts of e are independent, and remain so where epsilon is large.
+
+    e and R are those of the estimate; H is taken at the robot's `position` and the lines' directions `alpha` if given.
     """
-    alpha = means[:, 0]
-    n, t = normals(alpha), directions(alpha)
-    to_anchor = anchors - pose_world[:2]
-    r_predicted = means[:, 1] + np.sum(n * to_anchor, axis=-1)
-    epsilon = wrap(lines[:, 0] - (alpha - pose_world[2]))
+    r_predicted = means[:, 1] + np.sum(normals(means[:, 0]) * (anchors - pose_world[:2]), axis=-1)
+    epsilon = wrap(lines[:, 0] - (means[:, 0] - pose_world[2]))
     t0 = cov[:, 0, 1] / cov[:, 0, 0]
     cosine, sine = np.cos(epsilon), np.sin(epsilon)
     along = lines[:, 1] * sine + t0 * cosine
 
     m = len(lines)
     e = np.stack([epsilon, lines[:, 1] * cosine - t0 * sine - r_predicted], axis=-1)
+    at = means[:, 0] if alpha is None else alpha
+    n, t = normals(at), directions(at)
+    to_anchor = anchors - (pose_world[:2] if position is None else position)
     H_pose = np.zeros((m, 2, 3))
     H_pose[:, 0, 2] = -1.0
     H_pose[:, 1, :2] = -n
@@ -111,17 +120,19 @@ def grow(
     lines: Float[np.ndarray, "m 2"],
     centres: Float[np.ndarray, "m 2"],
     at_wall: bool = True,
+    position: Float[np.ndarray, "2"] | None = None,
 ) -> Growth:
     """Turn seen lines (alpha, r), robot frame, into map lines, anchored at their seen centres or at the world's origin.
 
-    Centres are points of the lines in the robot frame, m; the anchors that come of them are constants.
+    Centres are points of the lines in the robot frame, m; the anchors that come of them are constants. The Jacobians
+    are taken at the robot's `position` if given.
     """
     alpha = wrap(lines[:, 0] + pose_world[2])
     n, t = normals(alpha), directions(alpha)
     anchors = centres @ rotation(pose_world[2]).T + pose_world[:2] if at_wall else np.zeros_like(centres)
     to_robot = pose_world[:2] - anchors
     means = np.stack([alpha, lines[:, 1] + np.sum(n * to_robot, axis=-1)], axis=-1)
-    lever = np.sum(t * to_robot, axis=-1)
+    lever = np.sum(t * (to_robot if position is None else position - anchors), axis=-1)
     m = len(lines)
     G_pose, G_line = np.zeros((m, 2, 3)), np.zeros((m, 2, 2))
     G_pose[:, 0, 2] = 1.0
@@ -134,9 +145,12 @@ def grow(
 
 
 def reanchor(
-    mean: Float[np.ndarray, "2"], anchor: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]
+    mean: Float[np.ndarray, "2"],
+    anchor: Float[np.ndarray, "2"],
+    other: Float[np.ndarray, "2"],
+    alpha: float | None = None,
 ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"]]:
-    """Express a line about another anchor and return it with the derivative of the change."""
+    """Express a line about another anchor and return it with the derivative of the change (at `alpha` if given)."""
     shift = anchor - other
-    n, t = normals(mean[0]), directions(mean[0])
+    n, t = normals(mean[:1])[0], directions(mean[:1] if alpha is None else np.array([alpha]))[0]
     return np.array([mean[0], mean[1] + n @ shift]), np.array([[1.0, 0.0], [t @ shift, 1.0]])

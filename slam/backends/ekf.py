@@ -1,0 +1,156 @@
+"""The verbs of an extended Kalman filter over (x, y, heading, alpha_1, d_1, ...), its pieces open to be replaced.
+
+A filter is this class with a map that keeps all covariances or only blocks, and with what it does differently:
+where it takes its Jacobians, which observations move what, what it does to P afterwards.
+"""
+
+from collections.abc import Sequence
+from typing import Generic, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..backend import Belief, Joint, Observations, StaleBeliefError
+from ..models import Growth, Innovations, Motion, grow, innovations, move
+from ..robot import Odometry
+from .linear import Linear, equality, stack
+
+ONE_WALL = 1e-12 * np.eye(2)
+"""Two lines known to be one leave S singular: a thousandth of a millimetre keeps it invertible."""
+
+
+@runtime_checkable
+class GaussianMap(Protocol):
+    """Where a filter keeps its mean and covariance."""
+
+    ids: Int[np.ndarray, " n"]
+    anchors: Float[np.ndarray, "n 2"]
+
+    @property
+    def pose_world(self) -> Float[np.ndarray, "3"]: ...  # noqa: D102
+    @property
+    def pose_cov(self) -> Float[np.ndarray, "3 3"]: ...  # noqa: D102
+    @property
+    def means(self) -> Float[np.ndarray, "n 2"]: ...  # noqa: D102
+
+    def joint(self, rows: Int[np.ndarray, " m"]) -> Joint:
+        """Return the Gaussian of the pose and some lines."""
+        ...
+
+    def move(
+        self, pose_world: Float[np.ndarray, "3"], F: Float[np.ndarray, "3 3"], Q: Float[np.ndarray, "3 3"]
+    ) -> None:
+        """Put the pose elsewhere."""
+        ...
+
+    def append(
+        self,
+        anchors: Float[np.ndarray, "m 2"],
+        means: Float[np.ndarray, "m 2"],
+        G_pose: Float[np.ndarray, "m 2 3"],
+        noise: Float[np.ndarray, "m 2 2"],
+    ) -> Int[np.ndarray, " m"]:
+        """Add lines and return their ids."""
+        ...
+
+    def drop(self, rows: Int[np.ndarray, " m"]) -> None:
+        """Forget lines."""
+        ...
+
+    def condition(self, model: Linear) -> None:
+        """Take in a measurement."""
+        ...
+
+
+M = TypeVar("M", bound=GaussianMap)
+
+
+class Ekf(Generic[M]):
+    """An EKF on a map; as it stands, every observation counts once, in one joint update a scan."""
+
+    def __init__(self, gaussian: M, at_wall: bool) -> None:
+        """Start from a map without lines.
+
+        With `at_wall` lines are anchored where they were seen; without, at the world's origin (the paper's form).
+        """
+        self._map = gaussian
+        self._at_wall = at_wall
+        self._version = 0
+        self._belief: Belief | None = None
+
+    @property
+    def belief(self) -> Belief:
+        """The estimate now."""
+        if self._belief is None:
+            self._belief = self._new_belief()
+        return self._belief
+
+    def predict(self, odometry: Odometry) -> None:
+        """Move the pose by what the wheels report."""
+        self._move_on()
+        motion = self._motion(odometry)
+        self._map.move(motion.pose_world, motion.F, motion.W @ odometry.cov @ motion.W.T)
+
+    def update(self, first: Observations, second: Observations) -> None:
+        """Fuse one scan's matches at once (`second`; a joint filter has no use for `first`)."""
+        if len(second.ids):
+            model = self._linear(second)
+            self._move_on()
+            self._map.condition(model)
+
+    def grow(
+        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
+    ) -> Int[np.ndarray, " m"]:
+        """Add lines seen in the robot frame and return their ids."""
+        self._move_on()
+        new = self._growth(lines, centres)
+        return self._map.append(new.anchors, new.means, new.G_pose, new.G_line @ cov @ new.G_line.swapaxes(1, 2))
+
+    def merge(self, keep: int, drop: int) -> None:
+        """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
+        rows = self.belief.rows([keep, drop])
+        self._move_on()
+        alpha = self._align(rows)
+        H, e = equality(self._map.means[rows], self._map.anchors[rows], alpha)
+        self._map.condition(Linear(rows, H, e, ONE_WALL))
+        self._map.drop(rows[1:])
+
+    def remove(self, ids: Sequence[int]) -> None:
+        """Forget lines; raises KeyError where an id is not in the map."""
+        rows = self.belief.rows(ids)
+        self._move_on()
+        self._map.drop(rows)
+
+    def _motion(self, odometry: Odometry) -> Motion:
+        return move(self._map.pose_world, odometry.motion)
+
+    def _innovations(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Innovations:
+        pose, means, anchors = self._map.pose_world, self._map.means, self._map.anchors
+        return innovations(pose, anchors[rows], means[rows], seen.lines, seen.cov)
+
+    def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
+        return grow(self._map.pose_world, lines, centres, self._at_wall)
+
+    def _align(self, rows: Int[np.ndarray, "2"]) -> float | None:
+        """Prepare a merge of two rows (keep, drop); return where its Jacobian is taken if not at the estimate."""
+        return None
+
+    def _linear(self, seen: Observations) -> Linear:
+        rows = self.belief.rows(seen.ids)
+        return stack(rows, self._innovations(rows, seen))
+
+    def _move_on(self) -> None:
+        self._version += 1
+        self._belief = None
+
+    def _new_belief(self) -> Belief:
+        version = self._version
+
+        def query(wanted: Int[np.ndarray, " m"]) -> Joint:
+            if version != self._version:
+                raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
+            return self._map.joint(belief.rows(wanted))
+
+        m = self._map
+        belief = Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, query)
+        return belief

@@ -1,0 +1,68 @@
+"""What the filters share: sightings as one linear measurement, and what P must follow when the estimate moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..geometry.lines import normals
+from ..geometry.poses import J, wrap
+from ..models import Innovations, reanchor
+
+POSE = 3
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A linear measurement of the pose and a few lines: e = H dx + v, v of covariance R."""
+
+    rows: Int[np.ndarray, " u"]
+    """Rows of the map's lines that are measured, each once."""
+    H: Float[np.ndarray, "k s"]
+    """By the pose and those lines, s = 3 + 2 u."""
+    e: Float[np.ndarray, " k"]
+    R: Float[np.ndarray, "k k"]
+
+
+def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
+    """Join the innovations of m sightings (several may be of one line) into one measurement."""
+    m = len(rows)
+    lines, place = np.unique(rows, return_inverse=True)
+    each = np.arange(m)
+    H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
+    H_lines[each, :, place, :] = model.H_line
+    R[each, :, each, :] = model.R
+    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, -1)], axis=1)
+    return Linear(lines, H, model.e.ravel(), R.reshape(2 * m, 2 * m))
+
+
+def equality(
+    means: Float[np.ndarray, "2 2"], anchors: Float[np.ndarray, "2 2"], alpha: float | None = None
+) -> tuple[Float[np.ndarray, "2 7"], Float[np.ndarray, "2"]]:
+    """Return H and e of the measurement that two lines are one, the Jacobian taken at the direction `alpha`."""
+    moved, D = reanchor(means[1], anchors[1], anchors[0], alpha)
+    H = np.zeros((2, 7))
+    H[:, 3:5], H[:, 5:] = np.eye(2), -D
+    e = moved - means[0]
+    e[0] = wrap(e[0])
+    return H, e
+
+
+def carry(
+    position: Float[np.ndarray, "2"],
+    moved: Float[np.ndarray, "2"],
+    alpha: Float[np.ndarray, " n"],
+    turned: Float[np.ndarray, " n"],
+    anchors: Float[np.ndarray, "n 2"],
+) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "n 2 3"]]:
+    """Return what D - I adds to the pose (3, 3) and to each line (n, 2, 3), both multiples of the pose's error.
+
+    D takes the directions that no scan can observe from those at (position, alpha) to those at (moved, turned):
+    dp += J (p+ - p-) d_theta and dd += (n+ - n-)·(dp - J (p- - c) d_theta).
+    """
+    by_pose, by_line = np.zeros((POSE, POSE)), np.zeros((len(alpha), 2, POSE))
+    by_pose[:2, 2] = J @ (moved - position)
+    dn = normals(turned) - normals(alpha)
+    by_line[:, 1, :2] = dn
+    by_line[:, 1, 2] = -np.sum(dn * ((position - anchors) @ J.T), axis=-1)
+    return by_pose, by_line
