@@ -1,0 +1,185 @@
+"""Which wall a segment belongs to: the gate's level, the sides of thin walls, doors, and conditioning."""
+
+import numpy as np
+import pytest
+import shapely
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backend import Joint, Observations
+from slam.backends import BACKENDS
+from slam.geometry.poses import compose, inverse, wrap
+from slam.mapper import Mapper
+from slam.matching import KnownWalls, MatchingConfig, match, relocate
+from slam.models import innovations
+from slam.robot import Odometry, Scan
+from slam.segments import Segments
+
+P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
+
+
+def faces_of(polygon):
+    polygon = shapely.orient_polygons(polygon)
+    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+
+
+class Walker:
+    """Maps from chosen true poses; wheels as exact as stated."""
+
+    def __init__(self, faces, start, rng=None, backend="full-ekf", matcher=match):
+        self.finder, self.rng = RangeFinder(faces, LidarConfig()), rng
+        self.pose = np.asarray(start, dtype=float)
+        self.mapper = Mapper(BACKENDS[backend].make(self.pose.copy(), P0.copy()), matcher=matcher)
+
+    def scan(self):
+        ranges = self.finder.cast(self.pose)[0]
+        if self.rng is not None:
+            ranges = ranges + 0.01 * self.rng.standard_normal(len(ranges))
+        return self.mapper.step(Scan(self.finder.bearings_rad, ranges, 0.01, 4.0, 0.0))
+
+    def go(self, pose, sigma=0.01):
+        motion = compose(inverse(self.pose), np.asarray(pose, dtype=float))
+        cov = np.diag([sigma, sigma, 0.5 * sigma]) ** 2
+        noise = np.zeros(3) if self.rng is None else np.sqrt(np.diag(cov)) * self.rng.standard_normal(3)
+        self.mapper.predict(Odometry(motion + noise, cov))
+        self.pose = np.asarray(pose, dtype=float)
+        return self.scan()
+
+
+def random_joint(rng):
+    """Return pose and one line, correlated, with the truth drawn from it."""
+    pose = np.append(rng.uniform(-2, 2, 2), rng.uniform(-3, 3))
+    alpha = pose[2] + rng.uniform(-2, 2)
+    n = np.array([np.cos(alpha), np.sin(alpha)])
+    anchor = pose[:2] + rng.uniform(0.8, 3.0) * n + rng.uniform(-1, 1) * np.array([-n[1], n[0]])
+    mean = np.concatenate([pose, [wrap(alpha), 0.0]])
+    root = np.diag([0.02, 0.02, 0.005, 0.006, 0.01]) @ (np.eye(5) + 0.4 * rng.standard_normal((5, 5)))
+    return Joint(mean, root @ root.T, anchor[None]), mean + root @ rng.standard_normal(5)
+
+
+def segment_of(truth, anchor, rng):
+    """Return the true line as one segment of 1 m with noise of the exact model, seen off to one side."""
+    pose, (alpha, d) = truth[:3], truth[3:]
+    n, t = np.array([np.cos(alpha), np.sin(alpha)]), np.array([-np.sin(alpha), np.cos(alpha)])
+    r = d + n @ (anchor - pose[:2])
+    t0 = t @ (anchor - pose[:2]) + rng.uniform(-0.2, 0.2)
+    turn = np.array([[1.0, 0.0], [t0, 1.0]])
+    cov = turn @ np.diag([0.006, 0.004]) ** 2 @ turn.T
+    line = np.array([wrap(alpha - pose[2]), r]) + turn @ (np.array([0.006, 0.004]) * rng.standard_normal(2))
+    c, s = np.cos(line[0]), np.sin(line[0])
+    ends = line[1] * np.array([c, s]) + np.array([[t0 - 0.5], [t0 + 0.5]]) * np.array([-s, c])
+    one, two = np.array([9]), np.array([[0, 8]])
+    return Segments(line[None], cov[None], ends[None], two, one, np.zeros((1, 2), dtype=np.int64))
+
+
+def test_one_true_match_in_a_hundred_is_refused_by_the_gate():
+    rng, trials, refused = np.random.default_rng(41), 1500, 0
+    level = 1.0 - MatchingConfig().gate
+    for _ in range(trials):
+        joint, truth = random_joint(rng)
+        segment = segment_of(truth, joint.anchors[0], rng)
+        matches = match(segment, KnownWalls(np.array([5]), np.array([[-2.0, 2.0]])), joint)
+        refused += not len(matches.pairs)
+        if len(matches.pairs):
+            assert matches.pairs.tolist() == [[0, 5]]
+        else:
+            assert matches.unmatched.tolist() == [0]
+            assert matches.refusals[0]
+    assert abs(refused / trials - level) < 3 * np.sqrt(level * (1 - level) / trials) + 1e-3
+
+
+def test_relocation_is_conditioning_in_information_form():
+    rng = np.random.default_rng(42)
+    count = 6
+    ids = np.array([2, 3, 5, 8, 9, 11])
+    pose = np.array([3.0, -2.0, 0.7])
+    alpha = rng.uniform(-3, 3, count)
+    n = np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
+    anchors = pose[:2] + 2.0 * n + rng.uniform(-1, 1, (count, 2))
+    mean = np.concatenate([pose, np.column_stack([alpha, np.sum(n * (pose[:2] + 2.0 * n - anchors), axis=-1)]).ravel()])
+    root = 0.01 * rng.standard_normal((len(mean), len(mean)))
+    joint = Joint(mean, root @ root.T + 1e-6 * np.eye(len(mean)), anchors)
+    chosen = np.array([4, 1, 2])
+    lines = np.column_stack([wrap(alpha[chosen] - pose[2]), np.full(3, 2.0)]) + 0.01 * rng.standard_normal((3, 2))
+    cov = np.array([[[1e-4, 5e-5], [5e-5, 2e-4]]] * 3)
+
+    def e(state):
+        rows = state[3:].reshape(-1, 2)[chosen]
+        return innovations(state[:3], anchors[chosen], rows, lines, cov).e.ravel()
+
+    step = 1e-6
+    H = -np.stack([(e(mean + d) - e(mean - d)) / (2 * step) for d in step * np.eye(len(mean))], axis=-1)
+    R = innovations(pose, anchors[chosen], mean[3:].reshape(-1, 2)[chosen], lines, cov).R
+    information = np.linalg.inv(joint.cov)
+    innovation = e(mean)
+    shift = np.zeros(len(mean))
+    for k in range(3):
+        rows = slice(2 * k, 2 * k + 2)
+        information = information + H[rows].T @ np.linalg.inv(R[k]) @ H[rows]
+        shift += H[rows].T @ np.linalg.solve(R[k], innovation[rows])
+    found = relocate(joint, ids, Observations(ids[chosen], lines, cov))
+    expected = np.linalg.inv(information)
+    np.testing.assert_allclose(found.cov, expected, atol=1e-8)
+    np.testing.assert_allclose(found.mean, mean + expected @ shift, atol=1e-6)
+    np.testing.assert_array_equal(found.anchors, anchors)
+
+
+def test_relocation_by_nothing_is_no_relocation():
+    joint, _ = random_joint(np.random.default_rng(43))
+    nothing = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+    assert relocate(joint, np.array([5]), nothing) is joint
+
+
+def test_without_walls_nothing_matches_and_nothing_is_doubtful():
+    joint = Joint(np.zeros(3), P0, np.zeros((0, 2)))
+    _, truth = random_joint(np.random.default_rng(44))
+    segment = segment_of(truth, truth[:2] + 1.0, np.random.default_rng(44))
+    matches = match(segment, KnownWalls(np.zeros(0, dtype=np.int64), np.zeros((0, 2))), joint)
+    assert matches.pairs.shape == (0, 2)
+    assert matches.unmatched.tolist() == [0]
+    assert len(matches.doubtful) == 0
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_the_two_faces_of_a_thin_wall_never_fuse(seed):
+    """Seen from one side, then from the other, anywhere in the plane and at any angle, with a vague pose between."""
+    rng = np.random.default_rng(seed)
+    thick, turn = rng.uniform(0.06, 0.3), rng.uniform(-np.pi, np.pi)
+    place = rng.uniform(-30, 30, 2)
+    c, s = np.cos(turn), np.sin(turn)
+    R = np.array([[c, -s], [s, c]])
+    corners = np.array([[-1.5, 0.0], [-1.5, thick], [1.5, thick], [1.5, 0.0]]) @ R.T + place
+    faces = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)  # clockwise: free outside
+
+    def beside(y):
+        return np.append(np.array([rng.uniform(-0.8, 0.8), y]) @ R.T + place, rng.uniform(-3, 3))
+
+    walker = Walker(faces, beside(-rng.uniform(0.4, 1.5)), rng)
+    front = set(walker.scan().walls_of_segments.tolist()) - {-1}
+    far = walker.go(beside(thick + rng.uniform(0.4, 1.5)), sigma=0.1)
+    back = set(far.walls_of_segments.tolist()) - {-1}
+    assert front
+    assert back
+    assert not front & back
+    again = walker.go(beside(-rng.uniform(0.4, 1.5)), sigma=0.1)
+    assert not back & (set(again.walls_of_segments.tolist()) - {-1})
+
+
+@pytest.mark.parametrize("door", [0.6, 0.8, 1.2])
+@pytest.mark.parametrize("noisy", [False, True])
+def test_the_walls_beside_a_door_stay_two_also_when_the_robot_drives_through(door, noisy):
+    """The paper's example: left and right of the door the walls have one place in model space."""
+    wall = shapely.union(shapely.box(2.95, 0, 3.05, 2 - door / 2), shapely.box(2.95, 2 + door / 2, 3.05, 4))
+    faces = faces_of(shapely.box(0, 0, 6, 4).difference(wall))
+    walker = Walker(faces, [1.5, 2.0, 0.0], np.random.default_rng(7) if noisy else None)
+    update = walker.scan()
+    for x in np.arange(1.65, 4.6, 0.15):
+        update = walker.go([x, 2.0, 0.0])
+    ends, alpha = update.map.ends_world, update.map.belief.means[:, 0]
+    for n, x in ((1.0, 2.95), (-1.0, 3.05)):
+        beside = (np.cos(alpha) * n > 0.95) & (np.abs(ends[..., 0].mean(axis=1) - x) < 0.05) & ~update.map.tentative
+        assert np.count_nonzero(beside) >= 2
+        low, high = np.sort(ends[beside][..., 1], axis=1).T
+        assert not np.any((low < 2.0 - door / 2 + 0.15) & (high > 2.0 + door / 2 - 0.15))
+        assert np.any(high < 2.0)
+        assert np.any(low > 2.0)
