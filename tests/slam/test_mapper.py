@@ -1,0 +1,177 @@
+"""The seven steps over exact scans of drawn rooms, and with oracles in place of extraction and matching."""
+
+import numpy as np
+import pytest
+import shapely
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.extraction import extract
+from slam.geometry.poses import compose, inverse
+from slam.mapper import Mapper
+from slam.matching import NO_MATCHES, Matches, match
+from slam.robot import Odometry, Scan
+
+P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
+ODOMETRY_COV = np.diag([0.01, 0.01, 0.005]) ** 2
+PLACES = [[1.5, 1.2, 0.3], [2.4, 1.3, 1.2], [2.3, 2.1, -2.0], [1.0, 2.2, 3.0], [1.1, 1.0, 0.0]]
+
+
+def faces_of(polygon):
+    polygon = shapely.orient_polygons(polygon)
+    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+
+
+SQUARE = faces_of(shapely.box(0, 0, 3.4, 3.4))
+
+
+def walk(faces, places, backend="full-ekf", rng=None, **oracles):
+    """Yield what each scan of an exact walk does to the map; with a generator scans are noisy."""
+    finder = RangeFinder(faces, LidarConfig())
+    places = np.asarray(places, dtype=float)
+    mapper = Mapper(BACKENDS[backend].make(places[0].copy(), P0.copy()), **oracles)
+    for k, pose in enumerate(places):
+        if k:
+            mapper.predict(Odometry(compose(inverse(places[k - 1]), pose), ODOMETRY_COV))
+        ranges = finder.cast(pose)[0]
+        if rng is not None:
+            ranges = ranges + 0.01 * rng.standard_normal(len(ranges))
+        yield mapper.step(Scan(finder.bearings_rad, ranges, 0.01, 4.0, 0.1 * k))
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_a_square_room_is_four_walls_in_one_closed_chain(backend):
+    *_, last = walk(SQUARE, PLACES, backend)
+    assert len(last.map) == 4
+    (chain,) = last.chains
+    assert chain.is_closed
+    corners = {tuple(corner) for corner in np.round(chain.corners_world, 2) + 0.0}
+    assert corners == {(0.0, 0.0), (3.4, 0.0), (3.4, 3.4), (0.0, 3.4)}
+    np.testing.assert_allclose(last.map.belief.pose_world, PLACES[-1], atol=1e-4)
+
+
+def test_every_segment_of_a_known_room_belongs_to_a_wall_of_the_map():
+    first, *rest = walk(SQUARE, PLACES)
+    assert sorted(first.walls_of_segments.tolist()) == first.map.ids.tolist()
+    assert first.map.tentative.all()
+    for update in rest:
+        assert sorted(update.walls_of_segments.tolist()) == first.map.ids.tolist()
+        assert len(update.matches.unmatched) == 0
+    assert not update.map.tentative.any()
+    assert np.all(update.map.sightings == len(PLACES))
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+@pytest.mark.parametrize("world", [np.array([100.0, -100.0, 0.0]), np.array([3.0, 40.0, 2.3])])
+def test_a_moved_world_gives_the_moved_map(backend, world):
+    def moved(points):
+        c, s = np.cos(world[2]), np.sin(world[2])
+        return points @ np.array([[c, -s], [s, c]]).T + world[:2]
+
+    *_, here = walk(SQUARE, PLACES, backend)
+    *_, there = walk(moved(SQUARE), [compose(world, np.array(place)) for place in PLACES], backend)
+    np.testing.assert_array_equal(there.map.ids, here.map.ids)
+    np.testing.assert_allclose(there.map.ends_world, moved(here.map.ends_world), atol=1e-6)
+    assert [chain.walls for chain in there.chains] == [chain.walls for chain in here.chains]
+
+
+def test_a_matcher_given_in_its_place_is_asked_twice_a_scan_and_believed():
+    """First what is clear, then the rest; an oracle that knows the true wall of every segment is obeyed."""
+    asked = []
+
+    def oracle(segments, walls, joint, config, *, clear_only=False):
+        asked.append(clear_only)
+        return match(segments, walls, joint, config, clear_only=clear_only)
+
+    updates = list(walk(SQUARE, PLACES, matcher=oracle))
+    assert asked == [True, False] * len(PLACES)
+    for mine, usual in zip(updates, walk(SQUARE, PLACES), strict=True):
+        np.testing.assert_array_equal(mine.map.belief.means, usual.map.belief.means)
+        np.testing.assert_array_equal(mine.map.belief.pose_cov, usual.map.belief.pose_cov)
+
+
+def nothing(segments, walls, joint, config, *, clear_only=False):
+    none = NO_MATCHES
+    return Matches(none.pairs, none.distances, none.bridges, np.arange(len(segments)), none.doubtful, {})
+
+
+def test_a_matcher_that_knows_no_wall_makes_every_segment_a_new_one():
+    first, second, *_ = walk(SQUARE, PLACES, matcher=nothing)
+    assert len(first.map) == 4
+    assert set(second.walls_of_segments.tolist()).isdisjoint(first.map.ids.tolist())
+    np.testing.assert_allclose(second.map.belief.pose_world, PLACES[1], atol=1e-12)
+
+
+def test_doubtful_segments_are_neither_fused_nor_entered():
+    def doubter(segments, walls, joint, config, *, clear_only=False):
+        every, none = np.arange(len(segments)), NO_MATCHES
+        return Matches(none.pairs, none.distances, none.bridges, every, every, {})
+
+    for update in walk(SQUARE, PLACES[:3], matcher=doubter):
+        assert len(update.map) == 0
+        assert np.all(update.walls_of_segments == -1)
+
+
+def test_an_extractor_given_in_its_place_is_believed():
+    def half(scan):
+        segments = extract(scan)
+        return segments.take(np.flatnonzero(np.cos(segments.lines[:, 0]) > 0))
+
+    for update in walk(SQUARE, PLACES, extractor=half):
+        assert np.all(np.cos(update.segments.lines[:, 0]) > 0)
+        assert len(update.segments) < 4
+
+
+def test_a_wall_that_was_there_and_is_gone_is_cut_back():
+    """A pillar stands at first; then beams pass where it stood, in scan after scan."""
+    room = shapely.box(0, 0, 3.4, 3.4)
+    before = faces_of(room.difference(shapely.box(1.5, 1.5, 2.1, 1.8)))
+    finders = [RangeFinder(faces, LidarConfig()) for faces in (before, SQUARE)]
+    inside = shapely.box(1.4, 1.4, 2.2, 1.9)
+    pose = np.array([1.8, 0.8, 0.4])
+    mapper = Mapper(BACKENDS["full-ekf"].make(pose.copy(), P0.copy()))
+
+    def scan(k):
+        return Scan(finders[k].bearings_rad, finders[k].cast(pose)[0], 0.01, 4.0, 0.0)
+
+    with_pillar = [mapper.step(scan(0)) for _ in range(3)][-1]
+    stands = [shapely.LineString(ends).intersection(inside).length for ends in with_pillar.map.ends_world]
+    assert max(stands) > 0.5
+    without = [mapper.step(scan(1)) for _ in range(6)][-1]
+    left = [shapely.LineString(ends).intersection(inside).length for ends in without.map.ends_world]
+    assert max(left) < 0.3
+
+
+def test_walls_hidden_behind_something_are_not_cut_back():
+    """A pillar set down before a known wall hides it: nobody saw that the wall is gone."""
+    room = shapely.box(0, 0, 3.4, 3.4)
+    after = faces_of(room.difference(shapely.box(1.2, 2.2, 2.4, 2.6)))
+    finders = [RangeFinder(faces, LidarConfig()) for faces in (SQUARE, after)]
+    pose = np.array([1.8, 0.8, 0.4])
+    mapper = Mapper(BACKENDS["full-ekf"].make(pose.copy(), P0.copy()))
+
+    def scan(k):
+        return Scan(finders[k].bearings_rad, finders[k].cast(pose)[0], 0.01, 4.0, 0.0)
+
+    known = [mapper.step(scan(0)) for _ in range(3)][-1]
+    hidden = [mapper.step(scan(1)) for _ in range(10)][-1]
+    rows = np.searchsorted(hidden.map.ids, known.map.ids)
+    np.testing.assert_array_equal(hidden.map.ids[rows], known.map.ids)
+    np.testing.assert_allclose(hidden.map.ends_world[rows], known.map.ends_world, atol=0.02)
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_the_same_noise_gives_the_same_map_bit_for_bit(backend):
+    runs = [list(walk(SQUARE, PLACES * 3, backend, np.random.default_rng(3)))[-1] for _ in range(2)]
+    assert runs[0].map.belief.means.tobytes() == runs[1].map.belief.means.tobytes()
+    assert runs[0].map.extents.tobytes() == runs[1].map.extents.tobytes()
+
+
+def test_extents_and_ends_follow_the_line_they_are_measured_along():
+    *_, last = walk(SQUARE, PLACES, rng=np.random.default_rng(5))
+    alpha, r = last.map.belief.lines_world.T
+    off = np.einsum("nd,ned->ne", np.stack([np.cos(alpha), np.sin(alpha)], axis=-1), last.map.ends_world)
+    np.testing.assert_allclose(off, np.repeat(r[:, None], 2, axis=1), atol=1e-12)
+    along = last.map.ends_world[:, 1] - last.map.ends_world[:, 0]
+    np.testing.assert_allclose(np.hypot(*along.T), last.map.extents[:, 1] - last.map.extents[:, 0], atol=1e-12)
