@@ -1,12 +1,12 @@
 """The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from .backend import Backend, Observations
+from .backend import Backend, Joint, Observations
 from .chains import Chain, ChainConfig, connect
 from .extraction import extract
 from .geometry.lines import distance_to_segments
@@ -73,7 +73,7 @@ class Mapper:
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan)
         joint = self.backend.belief.joint(near.ids)
-        clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
+        clear = self._clear(segments, near, joint)
         first = self._firm(clear, segments)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         relocated = relocate(joint, near.ids, first)
@@ -88,6 +88,20 @@ class Mapper:
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         walls = self._walls.map(self.backend.belief)
         return MapUpdate(segments, matches, owners, walls, connect(walls, set_aside, self.config.chains))
+
+    def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
+        """Return matches safe enough to relocate the robot by.
+
+        One bad slip of the wheels takes all walls out of their gates at once: where more segments lie just beyond
+        the gate than within, the clear ones among them are believed together, if one error of the pose explains all.
+        """
+        clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
+        beyond = np.count_nonzero(~segments.is_tentative[clear.doubtful])
+        if beyond <= np.count_nonzero(~segments.is_tentative[clear.pairs[:, 0]]):
+            return clear
+        wide = replace(self.config.matching, gate=self.config.matching.doubt)
+        wider = self._match(segments, near, joint, wide, clear_only=True)
+        return wider if len(wider.pairs) > len(clear.pairs) else clear
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate: those of enough beams and of a clear direction."""
