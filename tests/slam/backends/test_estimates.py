@@ -10,7 +10,7 @@ from slam.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
 
-DROP_CORRELATIONS = {"block-ekf", "joint-block"}
+DROP_CORRELATIONS = {"block-ekf", "joint-block-ekf"}
 """These depart from the batch solution and from honest errors, as the paper's section 5 shows."""
 RUNS = 200
 
