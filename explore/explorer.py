@@ -49,6 +49,7 @@ class Explorer:
         self._skipped_places: list[Float[np.ndarray, 2]] = []
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self.still_open: tuple[SetAside, ...] = ()
+        self.needs_floor = True
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
 

@@ -44,6 +44,8 @@ class Decider(Protocol):
     still_open: tuple[SetAside, ...]
     goal: Goal | None
     walls_to_follow: tuple[int, ...]
+    needs_floor: bool
+    """Whether it plans paths; nobody else reads the free space."""
 
     @property
     def doing(self) -> str:
@@ -94,8 +96,8 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
         began = time.perf_counter()
         scan = robot.sense()
         update = mapper.step(scan, decider.set_aside.keys())
-        pose_world = update.map.belief.pose_world
-        free_space.integrate(pose_world, scan)
+        if decider.needs_floor:
+            free_space.integrate(update.map.belief.pose_world, scan)
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
         ended, command = None, None

@@ -18,6 +18,7 @@ class Passenger:
         self._left = scans
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self.still_open: tuple[SetAside, ...] = ()
+        self.needs_floor = False
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
         self.doing = "riding along"
