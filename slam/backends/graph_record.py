@@ -1,0 +1,100 @@
+"""All that a factor graph was told, as plain numbers: enough to build the graph again."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+Seen = tuple[float, float, float, float, float]
+"""One sighting of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
+FORMAT = 1
+
+
+@dataclass
+class LineRecord:
+    """One line and its sightings."""
+
+    anchor: Float[np.ndarray, "2"]
+    """World frame, m."""
+    sightings: list[int] = field(default_factory=list)
+    """Numbers of the sightings that hold for it."""
+    shown: bool = True
+    """A line that was forgotten after several sightings is no longer shown, but what it said of the rest stays."""
+
+
+@dataclass
+class Record:
+    """Prior, odometry and sightings in the order in which they came."""
+
+    pose_world: Float[np.ndarray, "3"]
+    pose_cov: Float[np.ndarray, "3 3"]
+    motions: list[Float[np.ndarray, "3"]] = field(default_factory=list)
+    """How the robot came to pose k + 1 from pose k."""
+    motion_covs: list[Float[np.ndarray, "3 3"]] = field(default_factory=list)
+    poses_of_steps: list[int] = field(default_factory=lambda: [0])
+    """Index of the pose after each prediction (a rest without any error makes no new pose), the start first."""
+    seen_from: list[int] = field(default_factory=list)
+    """Index of the pose of each sighting."""
+    seen: list[Seen] = field(default_factory=list)
+    lines: dict[int, LineRecord] = field(default_factory=dict)
+    """By id, ascending."""
+    next_id: int = 0
+
+    def add(self, pose: int, line: int, seen: Seen) -> int:
+        """Note a sighting and return its number."""
+        self.seen_from.append(pose)
+        self.seen.append(seen)
+        self.lines[line].sightings.append(len(self.seen) - 1)
+        return len(self.seen) - 1
+
+    def sightings(self) -> Iterator[tuple[int, int]]:
+        """Yield (number of sighting, id of its line) of all that hold, in the order in which they came."""
+        yield from sorted((number, line) for line, record in self.lines.items() for number in record.sightings)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return everything as plain arrays, fit for `numpy.savez`."""
+        owner = np.full(len(self.seen), -1, dtype=np.int64)
+        for number, line in self.sightings():
+            owner[number] = line
+        return {
+            "format": np.array(FORMAT),
+            "prior_pose_world": self.pose_world,
+            "prior_cov": self.pose_cov,
+            "odometry": np.array(self.motions).reshape(-1, 3),
+            "odometry_cov": np.array(self.motion_covs).reshape(-1, 3, 3),
+            "poses_of_steps": np.array(self.poses_of_steps, dtype=np.int64),
+            "seen_from": np.array(self.seen_from, dtype=np.int64),
+            "seen": np.array(self.seen, dtype=np.float64).reshape(-1, 5),
+            "seen_line": owner,
+            "line_ids": np.array(list(self.lines), dtype=np.int64),
+            "line_anchors": np.array([line.anchor for line in self.lines.values()]).reshape(-1, 2),
+            "line_shown": np.array([line.shown for line in self.lines.values()], dtype=bool),
+            "next_id": np.array(self.next_id),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "Record":
+        """Return the record that `arrays` was made of; raises ValueError for another format."""
+        if int(arrays["format"]) != FORMAT:
+            raise ValueError(f"expected a graph saved in format {FORMAT}, found {int(arrays['format'])}: save it again")
+        lines = {
+            int(line): LineRecord(np.array(anchor), shown=bool(shown))
+            for line, anchor, shown in zip(
+                arrays["line_ids"], arrays["line_anchors"], arrays["line_shown"], strict=True
+            )
+        }
+        for number, line in enumerate(arrays["seen_line"].tolist()):
+            if line >= 0:
+                lines[line].sightings.append(number)
+        return cls(
+            pose_world=np.array(arrays["prior_pose_world"]),
+            pose_cov=np.array(arrays["prior_cov"]),
+            motions=list(np.array(arrays["odometry"])),
+            motion_covs=list(np.array(arrays["odometry_cov"])),
+            poses_of_steps=arrays["poses_of_steps"].tolist(),
+            seen_from=arrays["seen_from"].tolist(),
+            seen=[tuple(row) for row in arrays["seen"].tolist()],
+            lines=lines,
+            next_id=int(arrays["next_id"]),
+        )
