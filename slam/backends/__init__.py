@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..backend import Backend
+from .block_ekf import BlockEkf
+from .fej_ekf import FejEkf
 from .full_ekf import FullEkf
+from .invariant_ekf import InvariantEkf
+from .joint_block_ekf import JointBlockEkf
+from .relocation_ekf import RelocationEkf
 
 
 @dataclass(frozen=True)
@@ -18,5 +23,10 @@ class BackendEntry:
 
 
 BACKENDS: dict[str, BackendEntry] = {
+    "block-ekf": BackendEntry(BlockEkf, "the paper's filter: relocation, then fusion, all cross-covariances neglected"),
+    "joint-block-ekf": BackendEntry(JointBlockEkf, "one joint update a scan, then the cross-covariances dropped"),
+    "relocation-ekf": BackendEntry(RelocationEkf, "relocation, then fusion, with every cross-covariance kept"),
     "full-ekf": BackendEntry(FullEkf, "EKF with every cross-covariance, one joint update a scan (baseline)"),
+    "fej-ekf": BackendEntry(FejEkf, "full EKF with its Jacobians at first estimates: gains nothing unobservable"),
+    "invariant-ekf": BackendEntry(InvariantEkf, "full EKF with the right-invariant error: gains nothing unobservable"),
 }

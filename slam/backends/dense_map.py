@@ -98,39 +98,10 @@ class DenseMap:
         self.ids, self._slots = np.delete(self.ids, rows), np.delete(self._slots, rows)
         self.anchors = np.delete(self.anchors, rows, axis=0)
 
-    def condition(self, model: Linear, pose_noise: Float[np.ndarray, "3 k"] | None = None) -> None:
-        """Take in a measurement: x += P H' S^-1 e, P -= P H' S^-1 H P.
-
-        With `pose_noise`, the covariance of the pose's error with the measurement's, the pose itself is held.
-        """
-        columns = self._columns(model.rows)
-        PHt = (model.H @ self._across(columns)).T
-        S = model.H @ PHt[columns] + model.R
-        held = self._x[:POSE].copy(), self.pose_cov
-        if pose_noise is not None:
-            cross = model.H[:, :POSE] @ pose_noise
-            S += cross + cross.T
-            PHt[:POSE] += pose_noise
-        root = cholesky(S)
-        W = dtrsm(1.0, root, PHt, side=1, lower=1, trans_a=1, overwrite_b=1)
-        self._x += W @ dtrsv(root, model.e, lower=1)
-        self._P = dsyrk(-1.0, W, beta=1.0, c=self._P, lower=1, overwrite_c=1)
-        if pose_noise is not None:
-            self._x[:POSE], self._P[:POSE, :POSE] = held
-        self._wrap()
-
-    def relocate(self, model: Linear) -> Float[np.ndarray, "3 k"]:
-        """Take in a measurement by the pose alone, the lines held, and return the gain."""
-        columns = self._columns(model.rows)
-        PHt = (model.H @ self._across(columns)).T
-        S = model.H @ PHt[columns] + model.R
-        gain = np.linalg.solve(0.5 * (S + S.T), PHt[:POSE].T).T
-        self._x[:POSE] += gain @ model.e
-        block = self.pose_cov - gain @ S @ gain.T
-        self._P[POSE:, :POSE] -= PHt[POSE:] @ gain.T
-        self._P[:POSE, :POSE] = 0.5 * (block + block.T)
-        self._wrap()
-        return gain
+    def condition(self, model: Linear) -> None:
+        """Take in a measurement: x += P H' S^-1 e, P -= P H' S^-1 H P."""
+        PHt, S = self._predicted(model)
+        self._correct(PHt, cholesky(S + model.R), model.e)
 
     def shear(self, by_pose: Float[np.ndarray, "3 3"], by_line: Float[np.ndarray, "n 2 3"]) -> None:
         """Add multiples of the pose's error to all errors: P <- D P D' with D = I + [by_pose; by_line] [I3, 0]."""
@@ -148,6 +119,24 @@ class DenseMap:
         columns[POSE + 1 :: 2] = columns[POSE::2] + 1
         return columns
 
+    def _correct(
+        self, PHt: Float[np.ndarray, "t k"], root: Float[np.ndarray, "k k"], e: Float[np.ndarray, " k"]
+    ) -> None:
+        """Apply the gain P H' S^-1, S = root root'; overwrites PHt."""
+        if not len(e):
+            return
+        W = dtrsm(1.0, root, PHt, side=1, lower=1, trans_a=1, overwrite_b=1)
+        self._x += W @ dtrsv(root, e, lower=1)
+        self._P = dsyrk(-1.0, W, beta=1.0, c=self._P, lower=1, overwrite_c=1)
+        self._x[2] = wrap(self._x[2])
+        self._x[POSE::2] = wrap(self._x[POSE::2])
+
+    def _predicted(self, model: Linear) -> tuple[Float[np.ndarray, "t k"], Float[np.ndarray, "k k"]]:
+        """Return P H' and H P H'."""
+        columns = self._columns(model.rows)
+        PHt = (model.H @ self._across(columns)).T
+        return PHt, model.H @ PHt[columns]
+
     def _across(self, columns: Int[np.ndarray, " c"]) -> Float[np.ndarray, "c t"]:
         """Return whole rows of P, which are whole columns, from the triangle that holds."""
         right = np.arange(len(self._x)) >= columns[:, None]
@@ -157,10 +146,6 @@ class DenseMap:
         """Return the part of P of some columns, from the triangle that holds."""
         part = self._P[columns[:, None], columns]
         return np.where(columns[:, None] >= columns, part, part.T)
-
-    def _wrap(self) -> None:
-        self._x[2] = wrap(self._x[2])
-        self._x[POSE::2] = wrap(self._x[POSE::2])
 
     def _reserve(self, lines: int) -> None:
         """Have room for so many lines more."""
@@ -177,6 +162,8 @@ class DenseMap:
 
 def cholesky(S: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
     """Return the lower root of S; raises numpy.linalg.LinAlgError where S is not positive definite."""
+    if not len(S):
+        return S
     root, failed = dpotrf(S, lower=1)
     if failed:
         raise np.linalg.LinAlgError("expected a positive definite innovation covariance: are all noises above zero?")

@@ -96,7 +96,7 @@ class Ekf(Generic[M]):
         if len(second.ids):
             model = self._linear(second)
             self._move_on()
-            self._map.condition(model)
+            self._condition(model)
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
@@ -112,7 +112,7 @@ class Ekf(Generic[M]):
         self._move_on()
         alpha = self._align(rows)
         H, e = equality(self._map.means[rows], self._map.anchors[rows], alpha)
-        self._map.condition(Linear(rows, H, e, ONE_WALL))
+        self._condition(Linear(rows, H, e, ONE_WALL))
         self._map.drop(rows[1:])
 
     def remove(self, ids: Sequence[int]) -> None:
@@ -130,6 +130,9 @@ class Ekf(Generic[M]):
 
     def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
         return grow(self._map.pose_world, lines, centres, self._at_wall)
+
+    def _condition(self, model: Linear) -> None:
+        self._map.condition(model)
 
     def _align(self, rows: Int[np.ndarray, "2"]) -> float | None:
         """Prepare a merge of two rows (keep, drop); return where its Jacobian is taken if not at the estimate."""

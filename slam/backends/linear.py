@@ -32,7 +32,7 @@ def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
     H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
     H_lines[each, :, place, :] = model.H_line
     R[each, :, each, :] = model.R
-    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, -1)], axis=1)
+    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, 2 * len(lines))], axis=1)
     return Linear(lines, H, model.e.ravel(), R.reshape(2 * m, 2 * m))
 
 

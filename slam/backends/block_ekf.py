@@ -1,0 +1,58 @@
+"""The paper's filter: relocation, then fusion, every cross-covariance neglected (sections 2.1, 2.2 and 4.1)."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..backend import Observations
+from .block_map import BlockMap
+from .ekf import Ekf
+from .linear import stack
+
+
+class BlockEkf(Ekf[BlockMap]):
+    """Moves the robot by the first matches, then fuses each line with its second match alone."""
+
+    def __init__(
+        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
+    ) -> None:
+        """Start at a pose with its covariance and an empty map; see `Ekf`."""
+        super().__init__(BlockMap(pose_world, pose_cov), at_wall)
+
+    def update(self, first: Observations, second: Observations) -> None:
+        """Relocate by `first`, then fuse `second`; a line seen several times in the scan is fused several times."""
+        moving, rest = self.belief.rows(first.ids), self.belief.rows(second.ids)
+        if not len(moving) + len(rest):
+            return
+        self._move_on()
+        if len(moving):
+            self._map.relocate(stack(moving, self._innovations(moving, first)))
+        left = np.arange(len(rest))
+        while len(left):
+            rows, once = np.unique(rest[left], return_index=True)
+            chosen = left[once]
+            self._fuse(rows, Observations(second.ids[chosen], second.lines[chosen], second.cov[chosen]))
+            left = np.delete(left, once)
+
+    def _fuse(self, rows: Int[np.ndarray, " m"], seen: Observations) -> None:
+        """Take the weighted mean of each line and what was seen of it, in model space: equations (2) and (3).
+
+        x_2 = x_1 + H_line^-1 e is the sighting in the map's frame, and its covariance C_2 has the robot's in it.
+        """
+        model = self._innovations(rows, seen)
+        to_line = np.linalg.inv(model.H_line)
+        by_pose = model.H_pose @ self._map.pose_cov @ model.H_pose.swapaxes(1, 2)
+        difference = (to_line @ model.e[..., None])[..., 0]
+        C1, C2 = self._map.covs[rows], to_line @ (by_pose + model.R) @ to_line.swapaxes(1, 2)
+        fused, moved = weighted_mean(C1, C2, difference)
+        self._map.put(rows, self._map.means[rows] + moved, fused)
+
+
+def weighted_mean(
+    C1: Float[np.ndarray, "m 2 2"], C2: Float[np.ndarray, "m 2 2"], difference: Float[np.ndarray, "m 2"]
+) -> tuple[Float[np.ndarray, "m 2 2"], Float[np.ndarray, "m 2"]]:
+    """Return C_w = (C_1^-1 + C_2^-1)^-1 and x_w - x_1 = C_w C_2^-1 (x_2 - x_1), row by row.
+
+    Written with the inverse of C_1 + C_2 alone, which always exists: C_w = C_1 (C_1 + C_2)^-1 C_2.
+    """
+    share = np.linalg.solve(C1 + C2, C1).swapaxes(1, 2)
+    return share @ C2, (share @ difference[..., None])[..., 0]

@@ -1,0 +1,61 @@
+"""First-estimates Jacobians: an EKF that gains no information about where the world lies (docs/estimation.md)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..backend import Observations
+from ..models import Growth, Innovations, Motion, grow, innovations, move
+from ..robot import Odometry
+from .dense_map import DenseMap
+from .ekf import Ekf
+from .linear import carry
+
+
+class FejEkf(Ekf[DenseMap]):
+    """The full filter with every Jacobian at first estimates: p as it was predicted, alpha as it was first seen."""
+
+    def __init__(
+        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
+    ) -> None:
+        """Start at a pose with its covariance and an empty map; see `Ekf`."""
+        super().__init__(DenseMap(pose_world, pose_cov), at_wall)
+        self._position = self._map.pose_world[:2]
+        self._alpha = np.zeros(0)
+        """Direction of each line when it was first seen, in the order of the map's ids."""
+
+    def remove(self, ids: Sequence[int]) -> None:
+        """Forget lines; raises KeyError where an id is not in the map."""
+        self._alpha = np.delete(self._alpha, self.belief.rows(ids))
+        super().remove(ids)
+
+    def merge(self, keep: int, drop: int) -> None:
+        """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
+        row = self.belief.rows([keep, drop])[1]
+        super().merge(keep, drop)
+        self._alpha = np.delete(self._alpha, row)
+
+    def _motion(self, odometry: Odometry) -> Motion:
+        motion = move(self._map.pose_world, odometry.motion, self._position)
+        self._position = motion.pose_world[:2]
+        return motion
+
+    def _innovations(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Innovations:
+        pose, means, anchors = self._map.pose_world, self._map.means, self._map.anchors
+        return innovations(
+            pose, anchors[rows], means[rows], seen.lines, seen.cov, self._position, self._alpha[rows]
+        )  # fmt: skip
+
+    def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
+        new = grow(self._map.pose_world, lines, centres, self._at_wall, self._position)
+        self._alpha = np.concatenate([self._alpha, new.means[:, 0]])
+        return new
+
+    def _align(self, rows: Int[np.ndarray, "2"]) -> float:
+        """Turn the first direction of the line dropped to that of the line kept: else their equality says where."""
+        turned = self._alpha.copy()
+        turned[rows[1]] = turned[rows[0]]
+        self._map.shear(*carry(self._position, self._position, self._alpha, turned, self._map.anchors))
+        self._alpha = turned
+        return float(turned[rows[0]])

@@ -1,0 +1,33 @@
+"""The right-invariant error in plain coordinates: P follows the estimate's own corrections (docs/estimation.md)."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .dense_map import DenseMap
+from .ekf import Ekf
+from .linear import Linear, carry
+
+
+class InvariantEkf(Ekf[DenseMap]):
+    """The full filter, with P carried along after each correction: P <- D P D'."""
+
+    def __init__(
+        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
+    ) -> None:
+        """Start at a pose with its covariance and an empty map; see `Ekf`."""
+        super().__init__(DenseMap(pose_world, pose_cov), at_wall)
+
+    def _condition(self, model: Linear) -> None:
+        position, alpha = self._map.pose_world[:2], self._map.means[:, 0]
+        super()._condition(model)
+        after = self._map
+        after.shear(*carry(position, after.pose_world[:2], alpha, after.means[:, 0], after.anchors))
+
+    def _align(self, rows: Int[np.ndarray, "2"]) -> float:
+        """Take the line dropped to the direction of the line kept: else their equality says where the world lies."""
+        alpha = self._map.means[:, 0]
+        turned = alpha.copy()
+        turned[rows[1]] = turned[rows[0]]
+        position = self._map.pose_world[:2]
+        self._map.shear(*carry(position, position, alpha, turned, self._map.anchors))
+        return float(turned[rows[0]])
