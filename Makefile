@@ -1,6 +1,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+
 .PHONY: setup demo test check bench docs
 
 setup: .venv/made

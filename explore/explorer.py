@@ -33,6 +33,8 @@ class ExplorerConfig:
     """So many ends set aside at one place (within 0.3 m) are enough: it is not tried again."""
     patience_steps: int = 400
     """A goal that takes longer is set aside."""
+    second_looks: int = 4
+    """Before it ends, the robot turns on the spot this often while there are walls that it saw only once."""
     sweep: bool = True
     """After the last chain, visit what is reachable and unseen."""
 
@@ -48,7 +50,8 @@ class Explorer:
         self._unreached: dict[tuple[int, int], int] = {}
         self._skipped_places: list[Float[np.ndarray, 2]] = []
         self.set_aside: dict[tuple[int, int], SetAside] = {}
-        self.still_open: tuple[SetAside, ...] = ()
+        self._looked_again = 0
+        self._open: frozenset[tuple[int, int]] = frozenset()
         self.needs_floor = True
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
@@ -59,6 +62,11 @@ class Explorer:
         return self._errand.doing if self._errand is not None else ""
 
     @property
+    def still_open(self) -> tuple[SetAside, ...]:
+        """The ends that were set aside and are open still."""
+        return tuple(aside for key, aside in self.set_aside.items() if key in self._open)
+
+    @property
     def closing_words(self) -> str:
         """Why there is nowhere left to go."""
         left = len(self.still_open)
@@ -67,19 +75,27 @@ class Explorer:
     def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
         """Return the next step, or None when there is nowhere left to go."""
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
+        self._open = frozenset(ends)
         self._revive(ends)
         self._abandon(ends)
-        self.still_open = tuple(aside for key, aside in self.set_aside.items() if key in ends)
         for _ in range(len(ends) + 20):
             if self._errand is None and not self._choose(around, chains, ends, graph):
-                return None
+                return self._look_again(around)
             assert self._errand is not None
             self._steps_on_goal += 1
             command = self._errand.command(around)
             if command is not None and self._steps_on_goal <= self._config.patience_steps:
+                self._looked_again = 0
                 return command
             self._give_up(around, ends)
         return None
+
+    def _look_again(self, around: Surroundings) -> MotionCommand | None:
+        """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do."""
+        self._looked_again += 1
+        if self._looked_again > self._config.second_looks or not around.walls.tentative.any():
+            return None
+        return MotionCommand(0.0, self._config.following.driving.turn_rad)
 
     def _revive(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
         """Forget what was set aside where the end is gone or has moved: there it may be tried again."""

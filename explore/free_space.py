@@ -95,7 +95,8 @@ class FreeSpace:
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
         """Take in one scan at an estimated pose."""
         cell = self.config.cell_m
-        self._reserve(pose_world[:2], scan.range_max_m + 2 * cell)
+        # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
+        self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
         half = int(np.ceil(scan.range_max_m / cell)) + 1
         here = self.cells(pose_world[None, :2])[0]
         r, c = int(here[0]), int(here[1])

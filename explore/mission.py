@@ -41,11 +41,15 @@ class Decider(Protocol):
     """Who chooses where to go: the explorer, or a passenger of a recorded robot."""
 
     set_aside: dict[tuple[int, int], SetAside]
-    still_open: tuple[SetAside, ...]
     goal: Goal | None
     walls_to_follow: tuple[int, ...]
     needs_floor: bool
     """Whether it plans paths; nobody else reads the free space."""
+
+    @property
+    def still_open(self) -> tuple[SetAside, ...]:
+        """The ends that were set aside and are open still."""
+        ...
 
     @property
     def doing(self) -> str:

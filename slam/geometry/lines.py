@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 from .poses import wrap
 
 
-def normals(alpha: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+def normals(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray, "*n 2"]:
     """Return the unit normals n(alpha), pointing into the wall."""
     return np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
 
 
-def directions(alpha: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+def directions(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray, "*n 2"]:
     """Return the unit vectors t = J n(alpha) along the lines, free side on the left."""
     return np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
 

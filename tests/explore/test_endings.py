@@ -1,0 +1,44 @@
+"""How missions end: what a room seen at a glance, and ends behind a slit, leave behind."""
+
+import numpy as np
+import pytest
+import shapely
+
+from explore.mission import MissionConfig, explore_mission
+from explore.strategies import STRATEGIES
+from sim.robot import SimulatedRobot
+from sim.worlds import World
+from slam.backends import BACKENDS
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+
+
+def explored(free, start):
+    world = World("drawn", shapely.orient_polygons(free), np.array(start), {})
+    robot = SimulatedRobot(world, 1, errorless=True)
+    backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
+    steps = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=1500))
+    *_, last = steps
+    return last, robot
+
+
+@pytest.mark.parametrize("size", [1.5, 4.0])
+def test_a_room_that_is_seen_at_a_glance_is_mapped_before_the_mission_ends(size):
+    last, _ = explored(shapely.box(0, 0, size, size), (0.4 * size, 0.35 * size, 0.1))
+    assert last.ended == "complete"
+    assert [chain.is_closed for chain in last.chains] == [True]
+    assert len(last.chains[0].walls) == 4
+
+
+@pytest.mark.parametrize("slit", [1.5, 1.7, 2.5])
+def test_ends_behind_a_slit_too_narrow_for_the_robot_are_remembered_with_their_reasons(slit):
+    """A wall divides the room; through the slit of 0.25 m the robot sees the other half and cannot get there."""
+    divide = shapely.union(shapely.box(2.4, 0.0, 2.5, slit), shapely.box(2.4, slit + 0.25, 2.5, 4.0))
+    last, robot = explored(shapely.box(0, 0, 4, 4).difference(divide), (0.5, 0.5, 0.0))
+    assert last.ended == "complete"
+    assert robot.record.collisions == 0
+    ends = {(end.wall, end.side) for chain in last.chains for end in chain.open_ends}
+    assert ends
+    assert {(aside.wall, aside.side) for aside in last.set_aside} == ends
+    assert all(aside.reason for aside in last.set_aside)
+    assert last.pose_world[0] < 2.4
