@@ -5,6 +5,7 @@ beside a door stay two), and the side from which each was seen (so that two face
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -95,6 +96,12 @@ class _Candidates:
     """Distance along the line between segment and wall, m; negative where they overlap by that much."""
 
 
+@lru_cache(maxsize=256)
+def gate_level(probability: float, dof: int) -> float:
+    """Return the squared Mahalanobis distance that stays below it with this probability."""
+    return float(chi2.ppf(probability, dof))
+
+
 def match(
     segments: Segments,
     walls: KnownWalls,
@@ -116,7 +123,7 @@ def match(
             np.arange(count), NO_MATCHES.doubtful, {},
         )  # fmt: skip
     found = _candidates(segments, walls, joint, config)
-    level = chi2.ppf(config.gate, 2)
+    level = gate_level(config.gate, 2)
     fits = (found.d2 <= level) & (found.gap <= -config.overlap_m)
     best = np.full(count, -1)
     order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
@@ -128,7 +135,7 @@ def match(
     matched[found.segment[chosen]] = True
     firm = ~segments.is_tentative[found.segment]
     beside = _is_beside(found, segments, config)
-    doubt = beside | ((found.d2 <= chi2.ppf(config.doubt, 2)) & (found.gap <= 0.0))
+    doubt = beside | ((found.d2 <= gate_level(config.doubt, 2)) & (found.gap <= 0.0))
     doubtful = np.zeros(count, dtype=bool)
     doubtful[found.segment[doubt]] = True
     return Matches(
@@ -220,7 +227,7 @@ def _compatible(
         H, R = _stack(model, found.line[chosen], len(joint.mean))
         S = H @ joint.cov @ H.T + R
         weighted = np.linalg.solve(S, model.e.ravel())
-        if model.e.ravel() @ weighted <= chi2.ppf(config.gate, 2 * len(chosen)):
+        if model.e.ravel() @ weighted <= gate_level(config.gate, 2 * len(chosen)):
             break
         # What the sum of squares loses when one pair is left out: e' S^-1 of its block of the inverse.
         inverse = np.linalg.inv(S)
@@ -281,4 +288,4 @@ def same_line(joint: Joint, gate: float) -> bool:
     e = np.array([np.sin(alpha_b - alpha_a), d_b + normals(alpha_b) @ shift - d_a])
     D = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, lever, 1.0]])
     S = D @ joint.cov[3:, 3:] @ D.T + 1e-12 * np.eye(2)
-    return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= chi2.ppf(gate, 2))
+    return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= gate_level(gate, 2))
