@@ -79,7 +79,8 @@ def innovations(
 
     e and R are those of the estimate; H is taken at the robot's `position` and the lines' directions `alpha` if given.
     """
-    r_predicted = means[:, 1] + np.sum(normals(means[:, 0]) * (anchors - pose_world[:2]), axis=-1)
+    n = normals(means[:, 0])
+    r_predicted = means[:, 1] + np.sum(n * (anchors - pose_world[:2]), axis=-1)
     epsilon = wrap(lines[:, 0] - (means[:, 0] - pose_world[2]))
     t0 = cov[:, 0, 1] / cov[:, 0, 0]
     cosine, sine = np.cos(epsilon), np.sin(epsilon)
@@ -87,8 +88,8 @@ def innovations(
 
     m = len(lines)
     e = np.stack([epsilon, lines[:, 1] * cosine - t0 * sine - r_predicted], axis=-1)
-    at = means[:, 0] if alpha is None else alpha
-    n, t = normals(at), directions(at)
+    n = n if alpha is None else normals(alpha)
+    t = n @ J.T
     to_anchor = anchors - (pose_world[:2] if position is None else position)
     H_pose = np.zeros((m, 2, 3))
     H_pose[:, 0, 2] = -1.0

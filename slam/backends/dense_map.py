@@ -1,7 +1,8 @@
 """A Gaussian of the pose and of lines that come and go, with every cross-covariance.
 
-P is one Fortran-ordered square of which only the lower triangle holds; BLAS updates it in place. A line has a slot,
-two rows of P; a slot that is free holds zeros, so removing a line moves nothing and a new line takes its place.
+P is one Fortran-ordered square of which the lower triangle and the pose's block hold; BLAS updates it in place. A line
+has a slot, two rows of P; a slot that is free holds zeros, so removing a line moves nothing and a new line takes its
+place.
 """
 
 from collections.abc import Sequence
@@ -40,7 +41,7 @@ class DenseMap:
     @property
     def pose_cov(self) -> Float[np.ndarray, "3 3"]:
         """The pose's covariance."""
-        return self._block(np.arange(POSE))
+        return self._P[:POSE, :POSE].copy("C")
 
     @property
     def means(self) -> Float[np.ndarray, "n 2"]:
@@ -110,6 +111,7 @@ class DenseMap:
         U[self._columns(np.arange(len(self.ids)))[POSE:]] = by_line.reshape(-1, POSE)
         B = self._across(np.arange(POSE)).T + 0.5 * U @ self.pose_cov
         self._P = dsyr2k(1.0, U, B, beta=1.0, c=self._P, lower=1, overwrite_c=1)
+        self._mirror_pose()
 
     def _columns(self, rows: Int[np.ndarray, " m"] | Sequence[int]) -> Int[np.ndarray, " s"]:
         """Return where the pose and some lines stand in x and P."""
@@ -128,6 +130,7 @@ class DenseMap:
         W = dtrsm(1.0, root, PHt, side=1, lower=1, trans_a=1, overwrite_b=1)
         self._x += W @ dtrsv(root, e, lower=1)
         self._P = dsyrk(-1.0, W, beta=1.0, c=self._P, lower=1, overwrite_c=1)
+        self._mirror_pose()
         self._x[2] = wrap(self._x[2])
         self._x[POSE::2] = wrap(self._x[POSE::2])
 
@@ -146,6 +149,9 @@ class DenseMap:
         """Return the part of P of some columns, from the triangle that holds."""
         part = self._P[columns[:, None], columns]
         return np.where(columns[:, None] >= columns, part, part.T)
+
+    def _mirror_pose(self) -> None:
+        self._P[0, 1:POSE], self._P[1, 2] = self._P[1:POSE, 0], self._P[2, 1]
 
     def _reserve(self, lines: int) -> None:
         """Have room for so many lines more."""

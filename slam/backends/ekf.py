@@ -5,6 +5,7 @@ where it takes its Jacobians, which observations move what, what it does to P af
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -147,13 +148,10 @@ class Ekf(Generic[M]):
         self._belief = None
 
     def _new_belief(self) -> Belief:
-        version = self._version
-
-        def query(wanted: Int[np.ndarray, " m"]) -> Joint:
-            if version != self._version:
-                raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
-            return self._map.joint(belief.rows(wanted))
-
         m = self._map
-        belief = Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, query)
-        return belief
+        return Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, partial(self._query, self._version))
+
+    def _query(self, version: int, wanted: Int[np.ndarray, " m"]) -> Joint:
+        if version != self._version:
+            raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
+        return self._map.joint(self.belief.rows(wanted))

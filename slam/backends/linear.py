@@ -27,8 +27,8 @@ class Linear:
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
     """Join the innovations of m sightings (several may be of one line) into one measurement."""
     m = len(rows)
-    lines, place = np.unique(rows, return_inverse=True)
     each = np.arange(m)
+    lines, place = (rows, each) if len(set(rows.tolist())) == m else np.unique(rows, return_inverse=True)
     H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
     H_lines[each, :, place, :] = model.H_line
     R[each, :, each, :] = model.R

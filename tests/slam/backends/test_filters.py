@@ -181,12 +181,13 @@ def one_dimension(name, P, R, at=3.0):
 def test_relocation_and_fusion_use_an_observation_twice_once_pose_and_line_are_correlated():
     """The derived departure: with e seen once, S = P + L + R, full and paper differ by terms of P."""
     P, R, e = 4e-4, 1e-4, -0.01
-    L, S = P + R, 2 * P + 2 * R
+    L, S = P + R, 2 * P + 2 * R  # of the block filter, which takes pose and line for uncorrelated
     full, seen = one_dimension("full-ekf", P, R)
     full.update(seen, seen)
     cov = full.belief.joint(seen.ids).cov
     assert cov[0, 0] == pytest.approx(P, rel=1e-9)
     assert full.belief.pose_world[0] == pytest.approx(0.0, abs=1e-12)
+    assert full.belief.means[0, 1] == pytest.approx(e / 2, rel=1e-6)
     assert cov[4, 4] == pytest.approx(P + R / 2, rel=1e-9)
     block, seen = one_dimension("block-ekf", P, R)
     block.update(seen, seen)

@@ -1,0 +1,94 @@
+"""Cost of one predict and one update with ten lines seen, beside a bare rank-k update of the same size."""
+
+import importlib
+import sys
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+from scipy.linalg.blas import dsyrk
+
+SEEN = 10
+TARGET_MS = {50: 0.3, 200: 13.0}
+"""What the C++ EKF-SLAM of Debian's mrpt-apps takes at 50 and at 202 landmarks."""
+BARE_MS: dict[int, float] = {}
+"""Median of the bare update, by the number of lines."""
+
+
+def unhooked() -> dict[str, Any]:
+    """Import the back ends without the shape checks that pytest weaves in: they cost more than a filter does."""
+    hooks, sys.meta_path = sys.meta_path, [hook for hook in sys.meta_path if "axtyping" not in type(hook).__name__]
+    woven = {name: sys.modules.pop(name) for name in list(sys.modules) if name.split(".")[0] == "slam"}
+    try:
+        parts = [importlib.import_module(f"slam.{part}") for part in ("backends", "backend", "robot", "geometry.lines")]
+    finally:
+        for name in [name for name in sys.modules if name.split(".")[0] == "slam"]:
+            del sys.modules[name]
+        sys.modules.update(woven)
+        sys.meta_path = hooks
+    return {name: value for part in parts for name, value in vars(part).items()}
+
+
+slam = SimpleNamespace(**unhooked())
+EKFS = [name for name in slam.BACKENDS if name.endswith("-ekf")]
+
+
+def step_of(name: str, lines: int) -> tuple[Any, Callable[[], None]]:
+    """Return a back end that knows so many lines, all correlated, and one step that sees ten of them."""
+    rng = np.random.default_rng(0)
+    alpha, r = rng.uniform(-np.pi, np.pi, lines), rng.uniform(1.0, 4.0, lines)
+    t0 = rng.uniform(-1.0, 1.0, lines)
+    turn = np.tile(np.eye(2), (lines, 1, 1))
+    turn[:, 1, 0] = t0
+    cov = turn @ np.diag([1e-4, 1e-5]) @ turn.swapaxes(1, 2)
+    seen_lines = np.stack([alpha, r], axis=-1)
+    backend = slam.BACKENDS[name].make(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
+    ids = backend.grow(seen_lines, cov, r[:, None] * slam.normals(alpha) + t0[:, None] * slam.directions(alpha))
+    rows = np.sort(rng.choice(lines, SEEN, replace=False))
+    seen = slam.Observations(ids[rows], seen_lines[rows], cov[rows])
+    odometry = slam.Odometry(np.zeros(3), np.diag([1e-5, 1e-6, 1e-5]))
+
+    def step() -> None:
+        backend.predict(odometry)
+        backend.update(seen, seen)
+
+    return backend, step
+
+
+@pytest.mark.parametrize("lines", [50, 200, 1000])
+def test_bare_rank_k(benchmark: BenchmarkFixture, lines: int) -> None:
+    """One triangle of a symmetric rank-20 update, in place: the least that an update can cost."""
+    size = 3 + 2 * lines
+    W = np.asfortranarray(1e-6 * np.random.default_rng(0).standard_normal((size, 2 * SEEN)))
+    P = np.eye(size, order="F")
+    benchmark(lambda: dsyrk(-1.0, W, beta=1.0, c=P, lower=1, overwrite_c=1))
+    BARE_MS[lines] = 1e3 * benchmark.stats.stats.median
+
+
+@pytest.mark.parametrize("lines", [50, 200, 1000])
+@pytest.mark.parametrize("name", EKFS)
+def test_one_step(benchmark: BenchmarkFixture, name: str, lines: int) -> None:
+    """A predict and an update; the full filter is to be as fast as the C++ one, and near the bare update when large."""
+    _, step = step_of(name, lines)
+    benchmark(step)
+    if name == "full-ekf" and lines in TARGET_MS:
+        assert benchmark.stats.stats.median < 2e-3 * TARGET_MS[lines]  # a shared machine drifts by up to 2
+    if name == "full-ekf" and lines == 1000 and lines in BARE_MS:
+        assert 1e3 * benchmark.stats.stats.median < 3.0 * BARE_MS[lines]
+
+
+@pytest.mark.parametrize("lines", [50, 200, 1000])
+def test_asking_for_the_joint_of_ten_lines(benchmark: BenchmarkFixture, lines: int) -> None:
+    """A fresh belief, and the joint covariance that gating asks for."""
+    backend, _ = step_of("full-ekf", lines)
+    far = slam.Odometry(np.zeros(3), 1e-9 * np.eye(3))
+
+    def ask() -> None:
+        backend.predict(far)
+        belief = backend.belief
+        belief.joint(belief.ids[:SEEN])
+
+    benchmark(ask)
