@@ -1,10 +1,12 @@
 """All that a factor graph was told, as plain numbers: enough to build the graph again."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
+
+from ..robot import Odometry
 
 Seen = tuple[float, float, float, float, float]
 """One sighting of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
@@ -41,22 +43,26 @@ class Record:
     """By id, ascending."""
     next_id: int = 0
 
-    def add(self, pose: int, line: int, seen: Seen) -> int:
+    def move(self, odometry: Odometry) -> None:
+        """Note a motion; a rest without any error makes no new pose."""
+        if np.any(odometry.motion) or np.any(odometry.cov):
+            self.motions.append(np.array(odometry.motion, dtype=np.float64))
+            self.motion_covs.append(np.array(odometry.cov, dtype=np.float64))
+        self.poses_of_steps.append(len(self.motions))
+
+    def see(self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> int:
         """Note a sighting and return its number."""
         self.seen_from.append(pose)
-        self.seen.append(seen)
+        (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
+        self.seen.append((alpha, r, along, cross, across))
         self.lines[line].sightings.append(len(self.seen) - 1)
         return len(self.seen) - 1
-
-    def sightings(self) -> Iterator[tuple[int, int]]:
-        """Yield (number of sighting, id of its line) of all that hold, in the order in which they came."""
-        yield from sorted((number, line) for line, record in self.lines.items() for number in record.sightings)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return everything as plain arrays, fit for `numpy.savez`."""
         owner = np.full(len(self.seen), -1, dtype=np.int64)
-        for number, line in self.sightings():
-            owner[number] = line
+        for line, record in self.lines.items():
+            owner[record.sightings] = line
         return {
             "format": np.array(FORMAT),
             "prior_pose_world": self.pose_world,
