@@ -25,7 +25,9 @@ class BlockEkf(Ekf[BlockMap]):
             return
         self._move_on()
         if len(moving):
-            self._map.relocate(stack(moving, self._innovations(moving, first)))
+            self._map.relocate(
+                stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
+            )
         left = np.arange(len(rest))
         while len(left):
             rows, once = np.unique(rest[left], return_index=True)
@@ -38,7 +40,7 @@ class BlockEkf(Ekf[BlockMap]):
 
         x_2 = x_1 + H_line^-1 e is the sighting in the map's frame, and its covariance C_2 has the robot's in it.
         """
-        model = self._innovations(rows, seen)
+        model = self._innovations(rows, seen, self._map.pose_world, self._map.means[rows])
         to_line = np.linalg.inv(model.H_line)
         by_pose = model.H_pose @ self._map.pose_cov @ model.H_pose.swapaxes(1, 2)
         difference = (to_line @ model.e[..., None])[..., 0]

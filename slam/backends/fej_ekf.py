@@ -17,10 +17,15 @@ class FejEkf(Ekf[DenseMap]):
     """The full filter with every Jacobian at first estimates: p as it was predicted, alpha as it was first seen."""
 
     def __init__(
-        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        pose_cov: Float[np.ndarray, "3 3"],
+        *,
+        at_wall: bool = True,
+        relinearise: bool = True,
     ) -> None:
         """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(DenseMap(pose_world, pose_cov), at_wall)
+        super().__init__(DenseMap(pose_world, pose_cov), at_wall, relinearise)
         self._position = self._map.pose_world[:2]
         self._alpha = np.zeros(0)
         """Direction of each line when it was first seen, in the order of the map's ids."""
@@ -41,11 +46,16 @@ class FejEkf(Ekf[DenseMap]):
         self._position = motion.pose_world[:2]
         return motion
 
-    def _innovations(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Innovations:
-        pose, means, anchors = self._map.pose_world, self._map.means, self._map.anchors
-        return innovations(
-            pose, anchors[rows], means[rows], seen.lines, seen.cov, self._position, self._alpha[rows]
-        )  # fmt: skip
+    def _innovations(
+        self,
+        rows: Int[np.ndarray, " m"],
+        seen: Observations,
+        pose_world: Float[np.ndarray, "3"],
+        means: Float[np.ndarray, "m 2"],
+    ) -> Innovations:
+        """Compare sightings with what a pose and lines predict, the Jacobian staying at the first estimates."""
+        anchors, first = self._map.anchors[rows], self._alpha[rows]
+        return innovations(pose_world, anchors, means, seen.lines, seen.cov, self._position, first)
 
     def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
         new = grow(self._map.pose_world, lines, centres, self._at_wall, self._position)

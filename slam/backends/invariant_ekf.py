@@ -5,23 +5,43 @@ from jaxtyping import Float, Int
 
 from .dense_map import DenseMap
 from .ekf import Ekf
-from .linear import Linear, carry
+from .linear import POSE, Linear, carry
 
 
 class InvariantEkf(Ekf[DenseMap]):
     """The full filter, with P carried along after each correction: P <- D P D'."""
 
     def __init__(
-        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        pose_cov: Float[np.ndarray, "3 3"],
+        *,
+        at_wall: bool = True,
+        relinearise: bool = True,
     ) -> None:
         """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(DenseMap(pose_world, pose_cov), at_wall)
+        super().__init__(DenseMap(pose_world, pose_cov), at_wall, relinearise)
+        self._carried_to: tuple[np.ndarray, np.ndarray] | None = None
+        """Position (2,) and directions (n,) at which P holds its errors while an update is on its way."""
+
+    def _look_from(self, rows: Int[np.ndarray, " u"], ahead: Float[np.ndarray, " s"]) -> None:
+        """Carry P to where the Jacobian is taken: there H must find its unobservable directions."""
+        position, alpha = self._point()
+        turned = alpha.copy()
+        turned[rows] = ahead[POSE::2]
+        self._map.shear(*carry(position, ahead[:2], alpha, turned, self._map.anchors))
+        self._carried_to = ahead[:2], turned
 
     def _condition(self, model: Linear) -> None:
-        position, alpha = self._map.pose_world[:2], self._map.means[:, 0]
+        position, alpha = self._point()
         super()._condition(model)
+        self._carried_to = None
         after = self._map
         after.shear(*carry(position, after.pose_world[:2], alpha, after.means[:, 0], after.anchors))
+
+    def _point(self) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, " n"]]:
+        """Return the position and directions at which P holds its errors."""
+        return self._carried_to or (self._map.pose_world[:2], self._map.means[:, 0])
 
     def _align(self, rows: Int[np.ndarray, "2"]) -> float:
         """Take the line dropped to the direction of the line kept: else their equality says where the world lies."""

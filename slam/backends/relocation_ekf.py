@@ -30,7 +30,7 @@ class RelocationEkf(Ekf["RelocationMap"]):
         if not len(moving) + len(fused):
             return
         self._move_on()
-        relocation = stack(moving, self._innovations(moving, first))
+        relocation = stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
         pose, moved = self._map.pose_world, self._map.relocated(relocation)
         again = innovations(moved, self._map.anchors[fused], self._map.means[fused], second.lines, second.cov)
         step = moved - pose
