@@ -176,15 +176,15 @@ class Graph:
         record = Record.from_arrays(arrays)
         graph = cls(record.pose_world, record.pose_cov, config)
         graph._record = record
-        graph._start_from(arrays["poses"], arrays["lines"])
+        graph._start_from(arrays["poses"], arrays["lines"], anew=False)
         return graph
 
     # -- inside -----------------------------------------------------------------------------------------------------
 
-    def _start_from(self, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]) -> None:
+    def _start_from(self, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"], anew: bool = True) -> None:
         """Make the graph of the record anew, linearised at these poses and lines (inner frame)."""
         self._move_on()
-        self._solver = Solver(self._config, self._record, poses, lines)
+        self._solver = Solver(self._config, self._record, poses, lines, anew)
         self._ids = np.array([line for line, at in self._record.lines.items() if at.shown], dtype=np.int64)
         self._anchor(np.array([self._record.lines[line].anchor for line in self._ids.tolist()]).reshape(-1, 2))
         self._solver.settle()

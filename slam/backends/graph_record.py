@@ -39,6 +39,8 @@ class Record:
     seen_from: list[int] = field(default_factory=list)
     """Index of the pose of each sighting."""
     seen: list[Seen] = field(default_factory=list)
+    epsilons: list[float] = field(default_factory=list)
+    """By how much each sighting departed from its line where it was linearised, rad."""
     lines: dict[int, LineRecord] = field(default_factory=dict)
     """By id, ascending."""
     next_id: int = 0
@@ -55,6 +57,7 @@ class Record:
         self.seen_from.append(pose)
         (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
         self.seen.append((alpha, r, along, cross, across))
+        self.epsilons.append(0.0)
         self.lines[line].sightings.append(len(self.seen) - 1)
         return len(self.seen) - 1
 
@@ -73,6 +76,7 @@ class Record:
             "seen_from": np.array(self.seen_from, dtype=np.int64),
             "seen": np.array(self.seen, dtype=np.float64).reshape(-1, 5),
             "seen_line": owner,
+            "seen_epsilon": np.array(self.epsilons, dtype=np.float64),
             "line_ids": np.array(list(self.lines), dtype=np.int64),
             "line_anchors": np.array([line.anchor for line in self.lines.values()]).reshape(-1, 2),
             "line_shown": np.array([line.shown for line in self.lines.values()], dtype=bool),
@@ -101,6 +105,7 @@ class Record:
             poses_of_steps=arrays["poses_of_steps"].tolist(),
             seen_from=arrays["seen_from"].tolist(),
             seen=[tuple(row) for row in arrays["seen"].tolist()],
+            epsilons=arrays["seen_epsilon"].tolist(),
             lines=lines,
             next_id=int(arrays["next_id"]),
         )

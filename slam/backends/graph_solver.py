@@ -56,9 +56,17 @@ class Solver:
     """Poses, the lines shown (those whose estimates are asked for, in ascending order of ids) and iSAM2."""
 
     def __init__(
-        self, config: GraphConfig, record: Record, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]
+        self,
+        config: GraphConfig,
+        record: Record,
+        poses: Float[np.ndarray, "p 3"],
+        lines: Float[np.ndarray, "n 2"],
+        anew: bool = True,
     ) -> None:
-        """Make the graph of a record, linearised at `poses` and, in the order of the record, at `lines`."""
+        """Make the graph of a record, linearised at `poses` and, in the order of the record, at `lines`.
+
+        With `anew` the sightings are linearised there too, else as the record has it.
+        """
         self._config, self._record = config, record
         self._isam = gtsam.ISAM2(_params(config))
         self._factors, self._values, self._removals = gtsam.NonlinearFactorGraph(), gtsam.Values(), list[int]()
@@ -86,8 +94,8 @@ class Solver:
         for (line, known), at in zip(record.lines.items(), lines, strict=True):
             self._values.insert(line_key(line), gtsam.OrientedPlane3(plane(at[0], at[1])))
             for number in known.sightings:
-                heading = poses[record.seen_from[number], 2]
-                self.enter_sighting(line, number, wrapped(record.seen[number][0] - at[0] + heading), float(at[0]))
+                epsilon = wrapped(record.seen[number][0] - at[0] + poses[record.seen_from[number], 2])
+                self.enter_sighting(line, number, epsilon if anew else record.epsilons[number], float(at[0]))
         shown = [known.shown for known in record.lines.values()]
         self._show([line for line, known in record.lines.items() if known.shown], lines[np.array(shown, dtype=bool)])
 
@@ -117,7 +125,7 @@ class Solver:
         With `again` it replaces an earlier factor of the same sighting.
         """
         seen = self._record.seen[number]
-        epsilon = min(max(epsilon, -MOST_TURN), MOST_TURN)
+        epsilon = self._record.epsilons[number] = min(max(epsilon, -MOST_TURN), MOST_TURN)
         self._enter(line_factor(self._record.seen_from[number], line, seen, epsilon), number)
         self._loose.note(line, number, seen, alpha, again)
 
@@ -238,6 +246,7 @@ class Solver:
         return np.array(lines).reshape(-1, 2)
 
     def _all(self, linearisation: bool) -> gtsam.Values:
+        self.settle()
         return self._isam.getLinearizationPoint() if linearisation else self._isam.calculateBestEstimate()
 
     def _estimate_lines(self) -> None:
