@@ -2,6 +2,7 @@
 
 import time
 
+import jaxtyping
 import numpy as np
 import pytest
 
@@ -79,6 +80,14 @@ def look(
     z = np.stack([seen, np.sum(centres * normals(seen), axis=-1)], axis=-1)
     z += np.einsum("mij,mj->mi", turn * SIGMAS, rng.standard_normal((len(at), 2)))
     return z, (turn * SIGMAS**2) @ turn.swapaxes(1, 2), centres
+
+
+@pytest.fixture(autouse=True)
+def _unchecked():
+    """Without the shape checks that pytest adds: they would be most of the time."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize(("steps", "lines"), [(500, 75), (5000, 750)])

@@ -191,6 +191,8 @@ class Solver:
     def _push(self, relinearise: bool = False) -> int:
         """Hand over what was collected; return how many variables were linearised anew."""
         last, again = self._order()
+        if relinearise:  # iSAM2 would count these as linearised anew, and one round follow another.
+            again.clear()
         result = self._isam.update(self._factors, self._values, self._removals, last, None, again, relinearise)
         if self._entering:
             for number, slot in zip(self._entering, result.getNewFactorsIndices(), strict=True):
