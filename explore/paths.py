@@ -80,7 +80,7 @@ class Planner:
         cost = float(at_ends[best]) * self._free_space.config.cell_m
         return Path(self._free_space.points(way + self._corner), cost, int(usable[best]))
 
-    def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+    def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Return the centres of those cells (row, column of the whole grid) that the robot's centre may take, m."""
         local = cells - self._corner
         local = local[np.all((local >= 0) & (local < self._costs.shape), axis=1)]

@@ -153,7 +153,7 @@ class EndErrand(Errand):
             self._stage += 1
         return self.looks_done == 0 and self._plan_anywhere(around, whole or self._planner(around, None))
 
-    def _fresh(self, places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+    def _fresh(self, places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Keep the places that are not where an earlier look was made."""
         for visited in self._visited:
             places = places[np.hypot(*(places - visited).T) > 0.12]
