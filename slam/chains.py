@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from .geometry.lines import intersect
+from .geometry.lines import intersect, normals
 from .stochastic_map import StochasticMap
 
 TAIL, HEAD = 0, 1
@@ -22,6 +22,11 @@ class ChainConfig:
     """Largest distance between two ends that are joined while the robot still explores them."""
     set_aside_reach_m: float = 0.35
     """The same for two ends that exploration looked at closely and set aside."""
+    straight_rad: float = float(np.deg2rad(5.0))
+    """Walls that turn less than this into each other make no corner ..."""
+    straight_reach_m: float = 0.07
+    """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
+    the wall between, as far apart as that is thick."""
     corner_reach_m: float = 0.3
     """A corner is the intersection of the two lines where that lies this near to both ends, else their middle."""
 
@@ -69,12 +74,13 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    successor = _links(ends, ids, set_aside, config)
+    successor = _links(ends, lines, ids, set_aside, config)
     return tuple(_chain(run, closed, ends, lines, ids, config) for run, closed in _runs(successor))
 
 
 def _links(
     ends: Float[np.ndarray, "n 2 2"],
+    lines: Float[np.ndarray, "n 2"],
     ids: Int[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
     config: ChainConfig,
@@ -87,6 +93,9 @@ def _links(
     aside = np.array([[(int(i), side) in set_aside for side in (TAIL, HEAD)] for i in ids]).reshape(-1, 2)
     both_aside = aside[head, HEAD] & aside[tail, TAIL]
     allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
+    straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
+    across = np.abs(np.sum(normals(lines[head, 0]) * (ends[tail, TAIL] - ends[head, HEAD]), axis=-1))
+    allowed &= ~straight | (gap <= config.straight_reach_m) | (across > 0.5 * gap)
     order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
     successor = np.full(len(ids), -1)
     taken = np.zeros(len(ids), dtype=bool)
