@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import arc, to_robot, wrap
+from slam.geometry.poses import arc, to_robot
 from slam.robot import MotionCommand, Scan
 
 from .free_space import FreeSpace
@@ -124,9 +124,3 @@ def _is_safe(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], con
     now = float(np.hypot(near[:, 0], near[:, 1]).min())
     limit = config.radius_m + config.margin_m
     return least >= limit or (least >= now and least > config.radius_m)
-
-
-def heading_to(pose_world: Float[np.ndarray, "3"], target_world: Float[np.ndarray, "2"]) -> float:
-    """Return how far the robot has to turn to face a place, rad."""
-    way = target_world - pose_world[:2]
-    return float(wrap(np.arctan2(way[1], way[0]) - pose_world[2]))

@@ -4,6 +4,7 @@ Approach a wall from anywhere, follow it at a set distance to its open end, roun
 always over floor that was seen free; the stand-off yields in narrow passages, the clearance of the body does not.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -48,7 +49,7 @@ class Surroundings:
         return self.walls.belief.pose_world
 
 
-class Errand:
+class Errand(ABC):
     """Drives to a sequence of places, one after the other, each given as a set of points that will do."""
 
     def __init__(self, config: FollowingConfig) -> None:
@@ -77,8 +78,9 @@ class Errand:
             self._blocked()
         return None
 
+    @abstractmethod
     def _plan(self, around: Surroundings) -> bool:
-        raise NotImplementedError
+        """Set out for the present place or a later one; False when no way is left to any."""
 
     def _arrived(self) -> None:
         self._stage += 1

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.driving import DrivingConfig, Pilot, heading_to, returns
+from explore.driving import DrivingConfig, Pilot, returns
 from explore.free_space import FreeSpace
 from explore.paths import Path, PathConfig, Planner
 from slam.geometry.poses import arc, compose
@@ -121,12 +121,3 @@ def test_a_robot_that_faces_the_wrong_way_turns_on_the_spot_the_short_way():
     right = pilot_to(np.array([-1.0, -0.2]), pose, grid).command(pose, free, grid)
     assert left == MotionCommand(0.0, CONFIG.turn_rad)
     assert right == MotionCommand(0.0, -CONFIG.turn_rad)
-
-
-def test_the_heading_to_a_place_is_the_turn_that_faces_it():
-    rng = np.random.default_rng(4)
-    for _ in range(50):
-        pose, target = rng.uniform(-3, 3, 3), rng.uniform(-5, 5, 2)
-        turned = pose[2] + heading_to(pose, target)
-        way = (target - pose[:2]) / np.hypot(*(target - pose[:2]))
-        np.testing.assert_allclose([np.cos(turned), np.sin(turned)], way, atol=1e-12)
