@@ -60,6 +60,8 @@ class Pilot:
     def is_obstructed(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> bool:
         """Return whether a return of this scan lies on the next metre of the path."""
         ahead = self._points[self._at : self._at + 20]
+        # What is beside the robot already is no matter of the path: `command` gets away from it.
+        ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.step_m]
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
         return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.radius_m
 
@@ -76,7 +78,7 @@ class Pilot:
             command = MotionCommand(share * forward, turn)
             if _is_safe(command, points, self._config):
                 return self._careful(command, pose_world, free_space)
-        return MotionCommand(0.0, turn) if abs(turn) > 0.02 else None
+        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the farthest point of the path within the lookahead to which the straight way is clear."""
@@ -109,6 +111,22 @@ def returns(scan: Scan) -> Float[np.ndarray, "m 2"]:
     hit = np.isfinite(scan.ranges_m)
     bearing, distance = scan.bearings_rad[hit], scan.ranges_m[hit]
     return np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
+
+
+def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> MotionCommand | None:
+    """Return a short step, forwards or backwards, that leads out of the margin of a return; None outside of it."""
+    gaps = np.hypot(points_robot[:, 0], points_robot[:, 1])
+    if not len(gaps) or gaps.min() > config.radius_m + 2.0 * config.margin_m:
+        return None
+    commands = [
+        MotionCommand(way, turn) for way in (config.careful_m, -config.careful_m) for turn in (-0.17, 0.0, 0.17)
+    ]
+    ends = np.stack([arc(command.forward_m, command.turn_rad)[:2] for command in commands])
+    gap = points_robot - ends[:, None]
+    least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
+    best = int(np.argmax(least))
+    leads_out = least[best] > gaps.min() + 0.2 * config.careful_m and _is_safe(commands[best], points_robot, config)
+    return commands[best] if leads_out else None
 
 
 def _is_safe(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> bool:
