@@ -51,10 +51,8 @@ def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
     return np.array(poses)
 
 
-def summarise(
-    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, ending: Ending
-) -> dict[str, Any]:
-    """Return every key of summary.json; null where there is nothing to measure."""
+def run_keys(scenario: Scenario, ending: Ending) -> dict[str, Any]:
+    """Return the keys of summary.json that say which run it was and how it ended."""
     config = scenario.config
     return {
         "world": scenario.world.name,
@@ -65,6 +63,16 @@ def summarise(
         "errorless": config.errorless,
         "status": ending.status,
         "reason": ending.reason,
+    }
+
+
+def summarise(
+    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, ending: Ending
+) -> dict[str, Any]:
+    """Return every key of summary.json; null where there is nothing to measure."""
+    config = scenario.config
+    return {
+        **run_keys(scenario, ending),
         "steps": len(log),
         "path_length_m": float(log.path_length_m[-1]),
         "path_length_true_m": scenario.robot.record.path_length_m,

@@ -13,7 +13,7 @@ from slam.backend import Joint
 from .association import Votes
 from .records import Log, Recorder
 from .scenario import Scenario, TrialConfig, build
-from .scores import Ending, summarise
+from .scores import Ending, run_keys, summarise
 from .truth import truth_of
 
 INTERRUPTED = 130
@@ -94,16 +94,8 @@ def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage swept pose_rmse_m"
         " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches step_ms"
     )
-    config = scenario.config
     return {
-        "world": scenario.world.name,
-        "backend": config.backend,
-        "strategy": config.strategy,
-        "seed": config.seed,
-        "p0": config.p0,
-        "errorless": config.errorless,
-        "status": ending.status,
-        "reason": ending.reason,
+        **run_keys(scenario, ending),
         "steps": 0,
         "collisions": scenario.robot.record.collisions,
         **dict.fromkeys(keys.split()),
