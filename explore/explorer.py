@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import networkx as nx
@@ -13,11 +12,9 @@ from slam.chains import Chain, OpenEnd
 from slam.robot import MotionCommand
 
 from .goal import Goal, SetAside
-from .looks import ideal_places, places_near
 from .navigation import route
-from .paths import Planner
-from .strategies import Situation, Strategy
-from .unseen import unseen_borders
+from .strategies import Choice, Place, Situation, Strategy
+from .strategies.nearest import nearest_unseen
 from .visibility import followed_wall
 from .wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
 
@@ -43,12 +40,15 @@ class Explorer:
     """Holds the present goal and the memory of what was given up."""
 
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
-        self._strategy, self._start, self._config = strategy, start_world, config
+        self._strategy = strategy
+        self._start, self._config = start_world, config
+        self._step = -1
         self._errand: Errand | None = None
+        self._choice: Choice | None = None
+        self._sweeping = False
         self._steps_on_goal = 0
-        self._attempts: list[Float[np.ndarray, 2]] = []
-        self._unreached: dict[tuple[int, int], int] = {}
-        self._skipped_places: list[Float[np.ndarray, 2]] = []
+        self._attempts = _Spots(0.3)
+        self._visited = _Spots(0.3)
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self._looked_again = 0
         self._open: frozenset[tuple[int, int]] = frozenset()
@@ -57,9 +57,21 @@ class Explorer:
         self.walls_to_follow: tuple[int, ...] = ()
 
     @property
+    def strategy(self) -> Strategy:
+        """Who chooses where to go; may be exchanged while the robot drives, which drops the present goal."""
+        return self._strategy
+
+    @strategy.setter
+    def strategy(self, strategy: Strategy) -> None:
+        self._strategy = strategy
+        self._drop()
+
+    @property
     def doing(self) -> str:
-        """What the robot is about, in words."""
-        return self._errand.doing if self._errand is not None else ""
+        """What the robot is about and why, in words."""
+        if self._errand is None or self._choice is None:
+            return ""
+        return f"{self._errand.doing} ({self._choice.reason})"
 
     @property
     def still_open(self) -> tuple[SetAside, ...]:
@@ -74,10 +86,11 @@ class Explorer:
 
     def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
         """Return the next step, or None when there is nowhere left to go."""
+        self._step += 1
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._open = frozenset(ends)
         self._revive(ends)
-        self._abandon(ends)
+        self._abandon(around, ends)
         for _ in range(len(ends) + 20):
             if self._errand is None and not self._choose(around, chains, ends, graph):
                 return self._look_again(around)
@@ -87,7 +100,7 @@ class Explorer:
             if command is not None and self._steps_on_goal <= self._config.patience_steps:
                 self._looked_again = 0
                 return command
-            self._give_up(around, ends)
+            self._give_up()
         return None
 
     def _look_again(self, around: Surroundings) -> MotionCommand | None:
@@ -106,19 +119,21 @@ class Explorer:
             if np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m:
                 del self.set_aside[key]
 
-    def _abandon(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
-        """Drop the goal if it is no longer an open end; a place to look at, as soon as there is an end to explore."""
+    def _abandon(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
+        """Drop a goal that is no open end any longer or no longer holds; a sweep, as soon as there is an end."""
+        if self._choice is None:
+            return
+        holds = self._choice.holds(around) and not (self._sweeping and self._candidates(ends))
         if isinstance(self._errand, EndErrand):
-            end = ends.get((self._errand.end.wall, self._errand.end.side))
-            if end is None or (end.wall, end.side) in self.set_aside:
-                self._errand = self.goal = None
-            else:
-                self._errand.follow(end)
-        elif self._errand is not None and self._candidates(ends):
-            self._errand = self.goal = None
+            key = (self._errand.end.wall, self._errand.end.side)
+            holds = holds and key in ends and key not in self.set_aside
+            if holds:
+                self._errand.follow(ends[key])
+        if not holds:
+            self._drop()
 
-    def _candidates(self, ends: dict[tuple[int, int], OpenEnd]) -> list[OpenEnd]:
-        return [end for key, end in ends.items() if key not in self.set_aside]
+    def _candidates(self, ends: dict[tuple[int, int], OpenEnd]) -> tuple[OpenEnd, ...]:
+        return tuple(end for key, end in ends.items() if key not in self.set_aside)
 
     def _choose(
         self,
@@ -127,72 +142,51 @@ class Explorer:
         ends: dict[tuple[int, int], OpenEnd],
         graph: nx.DiGraph[int],
     ) -> bool:
-        self._steps_on_goal = 0
-        candidates = self._candidates(ends)
-        if candidates:
-            followed = followed_wall(around.walls)
-            situation = Situation(
-                around.walls, chains, tuple(candidates), self._start, followed,
-                lambda some: self._nearest(around, some),
-            )  # fmt: skip
-            choice = self._strategy.choose(situation)
-            if choice is None:
-                # No ideal place is known yet for any end: go where the straight way is shortest and see.
-                gaps = [np.hypot(*(end.position_world - around.pose_world[:2])) for end in candidates]
-                end, reason = candidates[int(np.argmin(gaps))], "no way to stand before any open end is known; nearest"
-            else:
-                end, reason = choice.end, choice.reason
-            self.walls_to_follow = route(graph, followed, end.wall)
-            self._errand = EndErrand(end, self.walls_to_follow, self._config.following)
-            self.goal = Goal("open-end", end.wall, end.side, end.position_world, reason)
-            return True
-        return self._sweep(around)
-
-    def _nearest(self, around: Surroundings, ends: Sequence[OpenEnd]) -> tuple[int, float] | None:
-        """Which end can be stood before after the shortest drive, and how far that is, m."""
+        """Ask the strategy where to go, and set out; False when there is nowhere left."""
         following = self._config.following
-        for window in (following.window_m, None):
-            planner = Planner(around.free_space, around.pose_world[:2], following.paths, window)
-            places, owners = [], []
-            for row, end in enumerate(ends):
-                if window is not None and np.max(np.abs(end.position_world - around.pose_world[:2])) > window:
-                    continue
-                for ideal in ideal_places(end, around.walls, following.looks)[:2]:
-                    found = places_near(ideal, end, around.free_space, planner, following.looks)[:1]
-                    places.append(found)
-                    owners += [row] * len(found)
-            path = planner.to(np.concatenate(places)) if owners else None
-            if path is not None:
-                return owners[path.reached], path.cost
-        return None
-
-    def _sweep(self, around: Surroundings) -> bool:
-        """Go to the nearest floor that borders on unseen floor."""
-        if not self._config.sweep and len(around.walls):
+        situation = Situation(
+            around, chains, self._candidates(ends), graph, self._start, followed_wall(around.walls), self._step,
+            lambda place: self._visited.count(place) >= 2, following.paths, following.looks,
+        )  # fmt: skip
+        choice = self.strategy.choose(situation)
+        self._sweeping = choice is None and not situation.open_ends
+        if choice is None:
+            choice = self._sweep(situation) if self._sweeping else _straight_to_nearest(situation)
+        if choice is None:
             return False
-        borders = unseen_borders(around.free_space, around.pose_world[:2], self._config.following.paths)
-        borders = [b for b in borders if not self._was_skipped(b.mean(axis=0))]
-        if not borders:
-            return False
-        places = np.concatenate(borders)
-        why = "unseen floor is left" if len(around.walls) else "no wall is in sight yet"
-        self._errand = PlaceErrand(places, f"to where {why}", self._config.following)
-        nearest = places[int(np.argmin(np.hypot(*(places - around.pose_world[:2]).T)))]
-        self.goal = Goal("unseen", None, None, nearest, f"{why}: {len(borders)} borders of seen floor")
-        self.walls_to_follow = ()
+        self._set_out(choice, situation)
         return True
 
-    def _was_skipped(self, place: Float[np.ndarray, 2]) -> bool:
-        return sum(np.hypot(*(place - other)) < 0.3 for other in self._skipped_places) >= 2
+    def _set_out(self, choice: Choice, situation: Situation) -> None:
+        self._choice, self._steps_on_goal = choice, 0
+        target, following = choice.target, self._config.following
+        if isinstance(target, OpenEnd):
+            self.walls_to_follow = route(situation.graph, situation.current_wall, target.wall)
+            self._errand = EndErrand(target, self.walls_to_follow, following)
+            self.goal = Goal("open-end", target.wall, target.side, target.position_world, choice.reason)
+        else:
+            self.walls_to_follow = ()
+            self._errand = PlaceErrand(target.points_world, f"to where {target.what}", following)
+            self.goal = Goal(target.kind, None, None, target.centre_world, choice.reason)
 
-    def _give_up(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
+    def _sweep(self, situation: Situation) -> Choice | None:
+        """Go to the nearest floor that borders on unseen floor."""
+        if not len(situation.map):
+            return nearest_unseen(situation, "no wall is in sight yet")
+        return nearest_unseen(situation, "every chain is done, unseen floor is left") if self._config.sweep else None
+
+    def _drop(self) -> None:
+        self._errand = self._choice = self.goal = None
+
+    def _give_up(self) -> None:
         """Set the goal aside with the reason."""
-        errand = self._errand
+        errand, choice = self._errand, self._choice
         assert errand is not None
-        self._errand = self.goal = None
+        assert choice is not None
+        self._drop()
         if not isinstance(errand, EndErrand):
-            if errand.trouble or errand.looks_done == 0 or self._steps_on_goal > self._config.patience_steps:
-                self._skipped_places.append(around.pose_world[:2].copy())
+            assert isinstance(choice.target, Place)
+            self._visited.add(choice.target.centre_world)
             return
         end = errand.end
         if self._steps_on_goal > self._config.patience_steps:
@@ -202,7 +196,28 @@ class Explorer:
         else:
             reason = errand.trouble
         self.set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
-        self._attempts.append(end.position_world)
+        self._attempts.add(end.position_world)
 
     def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
-        return sum(np.hypot(*(place - other)) < 0.3 for other in self._attempts) >= self._config.attempts
+        return self._attempts.count(place) >= self._config.attempts
+
+
+class _Spots:
+    """Counts what happened near a place."""
+
+    def __init__(self, reach_m: float) -> None:
+        self._reach_m = reach_m
+        self._places = np.zeros((0, 2))
+
+    def add(self, place: Float[np.ndarray, 2]) -> None:
+        self._places = np.vstack([self._places, place])
+
+    def count(self, place: Float[np.ndarray, 2]) -> int:
+        return int(np.count_nonzero(np.hypot(*(self._places - place).T) < self._reach_m))
+
+
+def _straight_to_nearest(situation: Situation) -> Choice:
+    """No way to stand before any open end is known yet: go where the straight way is shortest and see."""
+    gaps = [np.hypot(*(end.position_world - situation.around.pose_world[:2])) for end in situation.open_ends]
+    end = situation.open_ends[int(np.argmin(gaps))]
+    return Choice(end, "no way to stand before any open end is known; nearest")

@@ -11,7 +11,7 @@ class Goal:
     """An open end to visit, or a place to look at."""
 
     kind: str
-    """`open-end`, `unseen` (floor not yet seen) or `start` (the way home)."""
+    """`open-end`, `unseen` (floor not yet seen), `known-walls` (walls known well) or `start` (the way home)."""
     wall: int | None
     """Id of the wall whose open end it is; None for a place."""
     side: int | None

@@ -86,11 +86,6 @@ class Planner:
         local = local[np.all((local >= 0) & (local < self._costs.shape), axis=1)]
         return self._free_space.points(local[self._costs[tuple(local.T)] > 0] + self._corner)
 
-    def reachable_cells(self) -> Int[np.ndarray, "n 2"]:
-        """Return the cells (row, column of the whole grid) that the robot's centre can get to."""
-        costs, _ = MCP_Geometric(self._costs).find_costs([tuple(self._start.tolist())])
-        return np.argwhere(np.isfinite(costs)) + self._corner
-
     def clear_ahead(self, start_world: Float[np.ndarray, "2"], end_world: Float[np.ndarray, "2"]) -> bool:
         """Return whether the straight way between two places leads over passable cells only."""
         length = float(np.hypot(*(end_world - start_world)))

@@ -1,5 +1,6 @@
 """Next to actual position: the open end closest to the robot (paper, section 3.3 and figure 5)."""
 
+from .nearest import nearest_end
 from .strategy import Choice, Situation
 
 
@@ -8,11 +9,9 @@ class NearestRobot:
 
     def choose(self, situation: Situation) -> Choice | None:
         """Return the nearest open end by driving distance."""
-        found = situation.nearest(situation.candidates)
-        if found is None:
+        metres = situation.end_metres
+        best = nearest_end(situation, metres)
+        if best is None:
             return None
-        row, metres = found
-        return Choice(
-            situation.candidates[row],
-            f"nearest of {len(situation.candidates)} open ends, {metres:.1f} m to drive",
-        )
+        reason = f"nearest of {len(metres)} open ends, {metres[best]:.1f} m to drive"
+        return Choice(situation.open_ends[best], reason)

@@ -1,44 +1,109 @@
 """The protocol that every exploration strategy keeps: from what is known to a goal and the reason for it."""
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
+import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
 from slam.chains import Chain, OpenEnd
 from slam.stochastic_map import StochasticMap
 
+from ..driving_field import DrivingField
+from ..looks import LooksConfig, ideal_places
+from ..paths import PathConfig
+from ..unseen import unseen_borders
+from ..wall_following import Surroundings
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Somewhere to stand; any of its points will do."""
+
+    points_world: Float[np.ndarray, "n 2"]
+    what: str
+    """What it is, in words: the robot drives `to where {what}`."""
+    kind: str = "unseen"
+    """The kind of `Goal` that it makes."""
+
+    @property
+    def centre_world(self) -> Float[np.ndarray, 2]:
+        """The middle of its points, m."""
+        return self.points_world.mean(axis=0)
+
 
 @dataclass(frozen=True)
 class Situation:
-    """What a strategy may read: the map and its covariance, never the truth."""
+    """What a strategy may read: the map and its covariance, the floor seen free, never the truth.
 
-    map: StochasticMap
+    What costs time is computed when it is first asked for.
+    """
+
+    around: Surroundings
     chains: tuple[Chain, ...]
-    candidates: tuple[OpenEnd, ...]
-    """The open ends that exploration has not set aside; at least one."""
-    start_world: Float[np.ndarray, "2"]
+    open_ends: tuple[OpenEnd, ...]
+    """The open ends that exploration has not set aside; there may be none."""
+    graph: nx.DiGraph[int]
+    """The visibility graph: an edge from one wall to another means that this was seen while that was followed."""
+    start_world: Float[np.ndarray, 2]
     """Where the robot began, m."""
     current_wall: int | None
-    """Id of the wall that the robot followed last."""
-    nearest: Callable[[Sequence[OpenEnd]], tuple[int, float] | None]
-    """Which of some open ends is the shortest drive away, and how far, m; None if the way to none is known."""
+    """Id of the wall that the robot follows."""
+    step: int
+    """Number of the step, from 0."""
+    was_in_vain: Callable[[Float[np.ndarray, 2]], bool]
+    """Whether going to a place was of no use before."""
+    paths: PathConfig
+    looks: LooksConfig
+
+    @property
+    def map(self) -> StochasticMap:
+        """The walls, and through `map.belief` their covariance."""
+        return self.around.walls
+
+    @cached_property
+    def field(self) -> DrivingField:
+        """How far it is to drive from the robot to anywhere."""
+        return DrivingField(self.around.free_space, self.around.pose_world[:2], self.paths)
+
+    @cached_property
+    def end_metres(self) -> Float[np.ndarray, " n"]:
+        """How far it is to drive to where each open end can be looked at, m; infinite where no way is known."""
+        places = [ideal_places(end, self.map, self.looks)[:2] for end in self.open_ends]
+        return self.field.metres(np.reshape(places, (-1, 2))).reshape(-1, 2).min(axis=1)
+
+    @cached_property
+    def unseen(self) -> tuple[Place, ...]:
+        """The borders between floor that can be driven to and floor that was never seen, the useless ones left out."""
+        borders = unseen_borders(self.around.free_space, self.field.reachable())
+        places = (Place(border, "unseen floor is left") for border in borders)
+        return tuple(place for place in places if not self.was_in_vain(place.centre_world))
+
+
+def _always(around: Surroundings) -> bool:
+    return True
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One of the candidates and why."""
+    """Where to go and why."""
 
-    end: OpenEnd
+    target: OpenEnd | Place
     reason: str
+    holds: Callable[[Surroundings], bool] = _always
+    """Asked at every step on the way: the goal is dropped once it answers no. (An end that is no longer open is dropped
+    anyway.)"""
 
 
 @runtime_checkable
 class Strategy(Protocol):
-    """Chooses the open end to explore next."""
+    """Chooses where to explore next; it may keep a memory between choices."""
 
     def choose(self, situation: Situation) -> Choice | None:
-        """Return the choice, or None where no candidate can be driven to now."""
+        """Return the choice, or None where there is nothing it would drive to now."""
         ...

@@ -1,0 +1,89 @@
+"""Every strategy explores to the end, gives its reasons, and can be exchanged while the robot drives."""
+
+import numpy as np
+import pytest
+import shapely
+
+from explore.explorer import Explorer, ExplorerConfig
+from explore.free_space import FreeSpace
+from explore.mission import MissionConfig, explore_mission
+from explore.strategies import STRATEGIES, Strategy
+from explore.visibility import VisibilityGraph
+from explore.wall_following import Surroundings
+from sim.robot import SimulatedRobot
+from sim.worlds import World
+from slam.backends import BACKENDS
+from slam.mapper import Mapper
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
+
+
+def two_rooms():
+    """Return two rooms with a door between them, and a block in the second."""
+    free = (
+        shapely.box(0, 0, 6, 3).difference(shapely.box(2.9, 1.1, 3.0, 3.0)).difference(shapely.box(4.2, 1.2, 4.8, 1.8))
+    )
+    return World("drawn", shapely.orient_polygons(free), np.array([0.8, 1.9, 0.2]), {})
+
+
+def robot_and_backend(world, errorless):
+    return SimulatedRobot(world, 1, errorless), BACKENDS["full-ekf"].make(world.start.copy(), P0.copy())
+
+
+@pytest.mark.parametrize("errorless", [True, False])
+@pytest.mark.parametrize("name", list(STRATEGIES))
+def test_every_strategy_closes_all_chains_without_touching_a_wall(name, errorless):
+    robot, backend = robot_and_backend(two_rooms(), errorless)
+    steps = list(explore_mission(robot, backend, STRATEGIES[name].make(), MissionConfig(max_steps=1500)))
+    assert steps[-1].ended == "complete"
+    assert robot.record.collisions == 0
+    assert sum(chain.is_closed for chain in steps[-1].chains) == 2
+    for step in steps[:-1]:
+        if step.goal is not None:
+            assert step.goal.reason
+            assert step.goal.reason in step.reason
+
+
+@pytest.mark.parametrize("name", list(STRATEGIES))
+def test_what_is_in_the_registry_keeps_the_protocol_and_shares_no_memory(name):
+    one, other = STRATEGIES[name].make(), STRATEGIES[name].make()
+    assert isinstance(one, Strategy)
+    assert one is not other
+    assert STRATEGIES[name].description
+
+
+class Asked:
+    """A strategy that counts how often it was asked."""
+
+    def __init__(self, inner):
+        self.inner, self.times = inner, 0
+
+    def choose(self, situation):
+        self.times += 1
+        return self.inner.choose(situation)
+
+
+def test_a_strategy_that_is_exchanged_on_the_way_is_asked_from_then_on():
+    robot, backend = robot_and_backend(two_rooms(), errorless=True)
+    first, second = (Asked(STRATEGIES[name].make()) for name in ("nearest-robot", "frontier"))
+    mapper, graph, floor = Mapper(backend), VisibilityGraph(), FreeSpace()
+    explorer = Explorer(first, backend.belief.pose_world[:2].copy(), ExplorerConfig())
+    for index in range(1500):
+        scan = robot.sense()
+        update = mapper.step(scan, explorer.set_aside.keys())
+        floor.integrate(update.map.belief.pose_world, scan)
+        graph.observe(update.map, update.chains, None, [])
+        if index == 30:
+            asked, goal = first.times, explorer.goal
+            explorer.strategy = second
+        command = explorer.command(Surroundings(update.map, floor, scan), update.chains, graph.graph)
+        if index == 30:
+            assert second.times == 1
+            assert explorer.goal is not goal
+        if command is None:
+            break
+        mapper.predict(robot.drive(command))
+    assert first.times == asked > 0
+    assert second.times > 1
+    assert all(chain.is_closed for chain in update.chains)
