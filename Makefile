@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test check bench docs
+.PHONY: setup demo test check bench docs smoke compare
 
 setup: .venv/made
 
@@ -30,3 +30,9 @@ bench: setup
 docs: setup
 	$(BIN)/chainslam explore paper-fig9 --seed 1 --out results/docs
 	mkdir -p docs/pictures && cp results/docs/map.png docs/pictures/fig9.png
+
+smoke: setup
+	$(BIN)/chainslam compare --preset smoke --out results/smoke
+
+compare: setup
+	$(BIN)/chainslam compare --preset paper --out results/paper

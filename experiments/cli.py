@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import tyro
 
+from .compare_command import Compare
 from .explore_command import Explore
 from .listings import Backends, Strategies, Worlds
 from .replay_command import Replay
@@ -29,6 +30,7 @@ class Command(Protocol):
 COMMANDS: dict[str, Callable[..., Any]] = {
     "explore": Explore,
     "replay": Replay,
+    "compare": Compare,
     "worlds": Worlds,
     "backends": Backends,
     "strategies": Strategies,

@@ -16,7 +16,11 @@ def write(path: Path, content: bytes) -> None:
     """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        temporary.write_bytes(content)
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            # Without this a power cut may leave the new name with nothing under it.
+            os.fsync(file.fileno())
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)

@@ -13,9 +13,10 @@ from explore.mission import ride_mission
 from explore.step import Step
 from sim.replay import RecordedRobot, Recording, RecordingError, read_log, recording_of
 from sim.robot import TrueRecord
+from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.extraction import extract
-from slam.mapper import Mapper, MapperConfig
+from slam.mapper import Mapper, MapperConfig, Matcher
 from slam.matching import match
 from slam.robot import MotionCommand, Odometry, Scan
 from slam.walls import WallsConfig
@@ -58,6 +59,14 @@ def read_run(log: Path) -> RecordedRun:
     """Read `log.npz` and the `config.json` beside it; raises UsageError, in one line, for anything else."""
     try:
         arrays = read_log(log)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    return run_of(arrays, lambda: _trial_beside(log))
+
+
+def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:
+    """Return the run in the arrays of a `log.npz`; raises UsageError, in one line, where they make none."""
+    try:
         recording = recording_of(arrays)
     except RecordingError as error:
         raise UsageError(str(error)) from error
@@ -65,7 +74,7 @@ def read_run(log: Path) -> RecordedRun:
     if missing:
         raise UsageError(f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run")
     return RecordedRun(
-        _trial_beside(log), recording, arrays["start_pose"], arrays["start_cov"], arrays["true_poses"],
+        trial(), recording, arrays["start_pose"], arrays["start_cov"], arrays["true_poses"],
         arrays["true_face_of_beam"],
     )  # fmt: skip
 
@@ -115,11 +124,16 @@ def replay(
     backend: str,
     options: ReplayOptions = ReplayOptions(),
     watch: Callable[[Step], None] = lambda step: None,
+    world: World | None = None,
+    around: Callable[[Matcher], Matcher] = lambda matcher: matcher,
 ) -> TrialResult:
-    """Map a recording with one back end; raises UsageError before anything is computed."""
+    """Map a recording with one back end; raises UsageError before anything is computed.
+
+    `world` saves loading it again; `around` may wrap the matcher, to listen to it.
+    """
     config = replace(run.trial, backend=backend, strategy=STRATEGY_OF_REPLAYS)
     check(config)
-    world = load_world(config.world, config.start, config.scale)
+    world = world or load_world(config.world, config.start, config.scale)
     recording = run.recording
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))
@@ -142,7 +156,7 @@ def replay(
             scenario.backend,
             scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper),
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extract,
-            match if oracle is None else oracle,
+            around(match if oracle is None else oracle),
         )
         return ride_mission(scenario.robot, len(recording), scenario.backend, scenario.config.mission, mapper)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from explore.step import Step
 from slam.backend import Joint
@@ -126,7 +126,9 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
         "chains_open": len(step.chains) - int(log.closed_chains[-1]),
         "coverage": coverage(samples, aligned[firm], near),
         "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
-        "map_anees": None if errorless else map_anees(votes, step, joint, log.true_world[-1], firm & (labels >= 0)),
+        "map_anees": None
+        if errorless
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & (labels >= 0)),
         "duplicate_lines": duplicate_lines(walls, labels, firm),
         "false_matches": votes.false_matches(),
         "distances": label_distances(corners(walls, step.chains), scenario.world.labels, to_true, joint),
@@ -135,22 +137,24 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
 
 def map_anees(
     votes: Votes,
-    step: Step,
+    ids: Int[np.ndarray, " n"],
     joint: Joint | None,
     true_pose_world: Float[np.ndarray, "3"],
     among: Bool[np.ndarray, " n"],
+    with_pose: bool = False,
 ) -> float | None:
     """Return the joint NEES of the chosen walls over its dimension, in the invariant error; null where it has none.
 
-    Each wall is held against the true face from which most of its beams came; duplicates stay, and a covariance
-    that is not positive definite gives null instead of a pseudo-inverse.
+    `with_pose` takes pose and walls together, 3 + 2 m dimensions. Each wall is held against the true face from which
+    most of its beams came; duplicates stay, and a covariance that is not positive definite gives null instead of a
+    pseudo-inverse.
     """
     rows = np.flatnonzero(among)
     if joint is None or not len(rows):
         return None
-    lines = votes.truth.lines[np.maximum(votes.faces_of(step.map.ids), 0)]
+    lines = votes.truth.lines[np.maximum(votes.faces_of(ids), 0)]
     error, cov = joint_error(joint, true_pose_world, lines)
-    index = (3 + 2 * rows[:, None] + np.arange(2)).ravel()
+    index = np.concatenate([np.arange(3 * with_pose), (3 + 2 * rows[:, None] + np.arange(2)).ravel()])
     try:
         return float(nees(error[None, index], cov[None][:, index[:, None], index])[0]) / len(index)
     except np.linalg.LinAlgError:

@@ -1,0 +1,1 @@
+"""Campaigns: many trials, three questions, one table."""

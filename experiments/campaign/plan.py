@@ -1,0 +1,153 @@
+"""The plan of a campaign: which trials there are, in which order, and the name of each."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from explore.strategies import STRATEGIES
+from sim.worlds import WORLDS
+from slam.backends import BACKENDS
+
+from ..replay import Association
+from ..scenario import P0, TrialConfig, UsageError, check, choose
+
+CLOSED, RECORDING = "closed", "recording"
+ARMS = (CLOSED, "replay-own", "replay-true")
+"""Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
+Replay with the true association: the algebra alone."""
+PAPER_BACKENDS = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf", "graph")
+PAPER_STRATEGIES = tuple(s for s in ("nearest-robot", "same-chain", "nearest-start") if s in STRATEGIES)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All that decides the tables of a campaign: the same values give the same bytes, times apart."""
+
+    worlds: tuple[str, ...]
+    backends: tuple[str, ...]
+    strategies: tuple[str, ...]
+    trials: int
+    """Seeds 1 to this, in every cell."""
+    arms: tuple[str, ...] = ARMS
+    driver: str = "full-ekf"
+    """The back end that drives the recordings: one for each world, strategy and seed, shared by all that replay it."""
+    p0: P0 = "small"
+    max_steps: int = 5000
+    """A trial is stopped, and counts as a failure, after this many scans."""
+
+
+@dataclass(frozen=True, order=True)
+class Trial:
+    """One row of the table of trials."""
+
+    world: str
+    """A bundled name or a file."""
+    strategy: str
+    """Of a replay: that of its recording."""
+    backend: str
+    arm: str
+    """One of `ARMS`, or `RECORDING` for a drive that is only there to be replayed."""
+    seed: int
+
+    @property
+    def recording(self) -> "Trial":
+        """The drive that a replay plays back, whoever drives it."""
+        return Trial(self.world, self.strategy, "", RECORDING, self.seed)
+
+    @property
+    def association(self) -> Association | None:
+        """Whose matches a replay uses; None in a closed loop."""
+        return "own" if self.arm == "replay-own" else "true" if self.arm == "replay-true" else None
+
+    @property
+    def path(self) -> Path:
+        """Where its result stands, inside the campaign's folder and without a suffix."""
+        folder = Path(world_key(self.world)) / self.strategy
+        return folder / self.backend / self.arm / f"{self.seed:05d}"
+
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "smoke": {
+        "worlds": ("paper-fig8",),
+        "backends": ("block-ekf", "full-ekf"),
+        "strategies": tuple(s for s in ("nearest-robot", "nearest-start") if s in STRATEGIES),
+        "trials": 3,
+    },
+    "paper": {
+        "worlds": ("paper-fig8", "paper-fig9"),
+        "backends": PAPER_BACKENDS,
+        "strategies": PAPER_STRATEGIES,
+        "trials": 20,
+    },
+    "full": {
+        "worlds": tuple(WORLDS),
+        "backends": tuple(BACKENDS),
+        "strategies": tuple(STRATEGIES),
+        "trials": 400,
+    },
+}
+"""What `--preset` stands for; anything named beside it goes before."""
+
+
+def trials(campaign: Campaign) -> list[Trial]:
+    """Return every trial of the tables, in the one order of the tables: world, strategy, back end, arm, seed."""
+    cells = product(campaign.worlds, campaign.strategies, campaign.backends, campaign.arms)
+    return [Trial(*cell, seed) for cell in cells for seed in range(1, campaign.trials + 1)]
+
+
+def recordings(campaign: Campaign) -> list[Trial]:
+    """Return the drives that the replays of a campaign play back, in order."""
+    if not any(arm != CLOSED for arm in campaign.arms):
+        return []
+    seeds = range(1, campaign.trials + 1)
+    return [
+        Trial(w, s, "", RECORDING, seed) for w, s in product(campaign.worlds, campaign.strategies) for seed in seeds
+    ]
+
+
+def config_of(campaign: Campaign, trial: Trial) -> TrialConfig:
+    """Return the settings of one trial; those of a recording are its driver's."""
+    backend = trial.backend or campaign.driver
+    return TrialConfig(
+        trial.world, backend, trial.strategy, trial.seed, campaign.p0, False, max_steps=campaign.max_steps
+    )
+
+
+def world_key(world: str) -> str:
+    """Return the name of a world in tables and folders: a bundled name, or a file's name without its suffix."""
+    return world if world in WORLDS else Path(world).stem
+
+
+def check_campaign(campaign: Campaign) -> None:
+    """Raise UsageError, in one line, for a campaign that cannot be run as it stands."""
+    lists = {
+        "worlds": campaign.worlds,
+        "backends": campaign.backends,
+        "strategies": campaign.strategies,
+        "arms": campaign.arms,
+    }
+    for name, given in lists.items():
+        if not given:
+            raise UsageError(f"expected at least one of the {name}, found none: name some with --{name}")
+        doubles = sorted({item for item in given if given.count(item) > 1})
+        if doubles:
+            raise UsageError(f"expected each of the {name} once, found {doubles[0]} twice: drop one")
+    for arm in campaign.arms:
+        choose("arm", arm, ARMS)
+    keys = [world_key(world) for world in campaign.worlds]
+    if len(set(keys)) < len(keys):
+        raise UsageError(f"expected worlds of different names, found {', '.join(keys)}: rename a file")
+    if campaign.trials < 1:
+        raise UsageError(f"expected at least 1 trial, found --trials {campaign.trials}: raise it")
+    choose("back end (--driver)", campaign.driver, BACKENDS)
+    for world, strategy, backend in product(campaign.worlds, campaign.strategies, campaign.backends):
+        choose("strategy", strategy, STRATEGIES)
+        check(config_of(campaign, Trial(world, strategy, backend, CLOSED, 1)))
+
+
+def world_digests(campaign: Campaign) -> dict[str, str]:
+    """Return the SHA-256 of each world that is a file: the same name with other walls is another campaign."""
+    files = [Path(world) for world in campaign.worlds if world not in WORLDS]
+    return {path.stem: sha256(path.read_bytes()).hexdigest() for path in files}

@@ -1,0 +1,133 @@
+"""Runs what is missing of a campaign, on the cores of this machine or on a cluster; the results are the same."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import Any
+
+from joblib import Parallel, delayed
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ..scenario import UsageError
+from .plan import CLOSED, Trial, config_of, recordings, trials
+from .store import Store
+from .work import Done, Job, failed, pack, perform
+
+STRIKES = 3
+"""A trial whose process dies this often is recorded as failed."""
+Executor = Callable[[Iterable[Job]], Iterator[Done]]
+"""Performs jobs, in any order, taking each one up only when there is room for it."""
+
+
+def run_campaign(store: Store, executor: Executor) -> None:
+    """Perform every trial that has no result yet, recordings first; what is done stays done whatever happens."""
+    drives = _drives(store)
+    driven = {job.trial for job in drives}
+    rest = [t for t in trials(store.campaign) if not store.has(t) and t not in driven]
+    # Replays of one recording follow each other, so that a process reads it once.
+    rest.sort(key=lambda t: (store.campaign.worlds.index(t.world), t.strategy, t.seed))
+    columns = (
+        TextColumn("{task.description}"), BarColumn(bar_width=32), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(),
+    )  # fmt: skip
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        total = len(drives) + len(rest)
+        task = bar.add_task("trials", total=total)
+        for jobs in (iter(drives), (_job(store, trial) for trial in rest)):
+            for done in executor(jobs):
+                store.save(done)
+                bar.advance(task)
+
+
+def _drives(store: Store) -> list[Job]:
+    """Return the drives that recordings are missing from; the driver's own closed loop serves as one."""
+    campaign, jobs = store.campaign, []
+    own = campaign.driver in campaign.backends and CLOSED in campaign.arms
+    for recording in recordings(campaign):
+        trial = recording
+        if own:
+            trial = Trial(recording.world, recording.strategy, campaign.driver, CLOSED, recording.seed)
+        if not store.has(recording) or (own and not store.has(trial)):
+            jobs.append(Job(trial, config_of(campaign, recording), keep_log=True))
+    return jobs
+
+
+def _job(store: Store, trial: Trial) -> Job:
+    if trial.association is None:
+        return Job(trial, config_of(store.campaign, trial))
+    recording = trial.recording
+    return Job(trial, config_of(store.campaign, recording), store.path(recording).read_bytes())
+
+
+def on_cores(count: int | None) -> Executor:
+    """Return an executor over processes of this machine: `count` of them, or one for each core."""
+    workers = count or len(os.sched_getaffinity(0))
+
+    def execute(jobs: Iterable[Job]) -> Iterator[Done]:
+        waiting, strikes = iter(jobs), dict[Trial, int]()
+        again: list[Job] = []
+        while True:
+            at_work: dict[Trial, Job] = {}
+
+            def taken(at_work: dict[Trial, Job] = at_work, first: tuple[Job, ...] = tuple(again)) -> Iterator[Job]:
+                for job in (*first, *waiting):
+                    at_work[job.trial] = job
+                    yield job
+
+            try:
+                parallel = Parallel(workers, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+                for done in parallel(delayed(perform)(job) for job in taken()):
+                    del at_work[done.trial]
+                    yield done
+                return
+            except TerminatedWorkerError:
+                again = []
+                for trial, job in at_work.items():
+                    strikes[trial] = strikes.get(trial, 0) + 1
+                    if strikes[trial] < STRIKES:
+                        again.append(job)
+                    else:
+                        yield lost(job, f"its process died {STRIKES} times")
+
+    return execute
+
+
+def lost(job: Job, reason: str) -> Done:
+    """Return what stands for a trial of which nothing came back."""
+    return Done(job.trial, pack(failed(job, reason)))
+
+
+def on_dask(address: str) -> Executor:
+    """Return an executor over the workers of a Dask scheduler; raises UsageError where there is none."""
+    try:
+        from distributed import Client, KilledWorker, as_completed
+    except ImportError as error:
+        raise UsageError("expected the package distributed, found none: pip install chainslam[dask]") from error
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"expected a Dask scheduler at {address}, found none: start `dask scheduler` first") from error
+
+    def execute(jobs: Iterable[Job]) -> Iterator[Done]:
+        waiting, sent = iter(jobs), dict[Any, Job]()
+
+        def send(count: int) -> list[Any]:
+            new = {client.submit(perform, job, pure=False): job for job in islice(waiting, count)}
+            sent.update(new)
+            return list(new)
+
+        room = as_completed(send(2 * max(sum(client.nthreads().values()), 1)), loop=client.loop)
+        for future in room:
+            job = sent.pop(future)
+            try:
+                done = future.result()
+            except KilledWorker as error:
+                done = lost(job, f"its worker died: {error}")
+            for more in send(1):
+                room.add(more)
+            yield done
+
+    return execute

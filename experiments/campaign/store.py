@@ -1,0 +1,130 @@
+"""A campaign's folder: a file for each trial, written whole or not at all, so that whatever stops it can go on."""
+
+import fcntl
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..explore_command import prepare
+from ..files import json_bytes, write
+from ..results import config_record
+from ..scenario import UsageError
+from .plan import Campaign, Trial, config_of, world_digests
+from .score import Record
+from .work import Done, unpack
+
+CONFIG = "config.json"
+
+
+@dataclass(frozen=True)
+class Store:
+    """Where the results of a campaign stand."""
+
+    folder: Path
+    campaign: Campaign
+
+    def path(self, trial: Trial) -> Path:
+        """Return the file of a trial, or of the recording that a drive leaves."""
+        if trial.arm == "recording":
+            return self.folder / "recordings" / trial.path.parts[0] / trial.strategy / f"{trial.seed:05d}" / "log.npz"
+        return self.folder / "trials" / trial.path.with_suffix(".npz")
+
+    def has(self, trial: Trial) -> bool:
+        """Return whether the trial is done."""
+        return self.path(trial).exists()
+
+    def save(self, done: Done) -> None:
+        """Write what a job left, the recording before the record: a record means that all is there."""
+        if done.log is not None:
+            path = self.path(done.trial.recording)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # So that the recording is one that `chainslam replay` takes, too.
+            config = config_of(self.campaign, done.trial.recording)
+            write(path.with_name(CONFIG), json_bytes({"trial": asdict(config)}))
+            write(path, done.log)
+        if done.trial.arm != "recording":
+            path = self.path(done.trial)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(path, done.record)
+
+    def record(self, trial: Trial) -> Record:
+        """Return what a trial left; raises UsageError where its file is none."""
+        path = self.path(trial)
+        try:
+            return unpack(path.read_bytes())
+        except Exception as error:
+            raise UsageError(f"expected a trial's result, found {path} unreadable: delete it and run again") from error
+
+
+@contextmanager
+def opened(folder: Path, campaign: Campaign) -> Iterator[Store]:
+    """Make or take up a campaign's folder for as long as the block runs.
+
+    Raises UsageError for a folder of another campaign, and for one that another process is working in.
+    """
+    prepare(folder)
+    with (folder / ".lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UsageError(f"expected a folder to itself, found another campaign at work in {folder}") from error
+        _settle(folder, campaign)
+        for leftover in folder.rglob(".*.part"):
+            leftover.unlink()
+        yield Store(folder, campaign)
+
+
+def read_campaign(folder: Path) -> Campaign:
+    """Return the campaign whose results stand in a folder; raises UsageError where there is none."""
+    try:
+        said: dict[str, Any] = json.loads((folder / CONFIG).read_text())["campaign"]
+        values: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in said.items()
+        }
+        return Campaign(**values)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"expected the folder of a campaign, found no {CONFIG} of one in {folder}: name what `compare --out` made"
+        ) from error
+
+
+def _settle(folder: Path, campaign: Campaign) -> None:
+    """Write the config, or hold it against the one that is there."""
+    path = folder / CONFIG
+    try:
+        digests = world_digests(campaign)
+    except OSError as error:
+        raise UsageError(f"expected readable worlds, found {error.filename} ({error.strerror})") from error
+    now = plain({"campaign": asdict(campaign), "worlds_sha256": digests})
+    made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
+    made_with = {"versions": made["versions"], "commit": made["commit"]}
+    if not path.exists():
+        if any(child.name != ".lock" for child in folder.iterdir()):
+            raise UsageError(f"expected an empty folder or a campaign's, found {folder} with other files: name another")
+        write(path, json_bytes(now | made_with))
+        return
+    try:
+        before: dict[str, Any] = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise UsageError(f"expected a campaign's {CONFIG}, found another in {folder}: name another folder") from error
+    different = [key for key in now["campaign"] if before.get("campaign", {}).get(key) != now["campaign"][key]]
+    different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
+    if different:
+        raise UsageError(
+            f"expected the campaign that {folder} holds, found other {', '.join(different)}: name another --out"
+        )
+    if {key: before.get(key) for key in made_with} != plain(made_with):
+        print(
+            f"chainslam: {folder} was begun by other sources or packages; its trials are kept as they are",
+            file=sys.stderr,
+        )
+        write(path, json_bytes(before | {"resumed_with": [*before.get("resumed_with", []), made_with]}))
+
+
+def plain(value: Any) -> Any:
+    """Return a value as it comes back from a JSON file."""
+    return json.loads(json_bytes(value))

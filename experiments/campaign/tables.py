@@ -1,0 +1,150 @@
+"""The tables of a campaign, made from the files of its trials in one fixed order."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from jaxtyping import Float
+
+from slam.consistency import chi2_band
+
+from ..files import csv_bytes, write
+from ..measurements import Z_95
+from .plan import Trial, trials
+from .score import END, Record
+from .store import Store
+
+FIRST = (
+    *("world", "backend", "strategy", "seed", "mode", "association", "status", "reason", "steps", "path_length_m"),
+    *("drive_time_s", "open_ends", "contours_closed", "contours_reachable", "lines", "coverage", "swept"),
+    *("collisions", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band", "map_anees"),
+    *("duplicate_lines", "false_matches"),
+)
+"""Columns that scripts rely on; the others follow in the order in which they were first met."""
+TIMINGS = "step_ms_"
+"""What the names of all columns begin with that differ from run to run."""
+KEYS = ("world", "strategy", "backend", "mode", "association")
+PLAIN = (str, int, float, bool)
+
+Row = dict[str, Any]
+
+
+def trial_row(record: Record) -> Row:
+    """Return the plain values of a trial's summary, and how its intervals of distances fared."""
+    summary = record.summary
+    row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
+    row.pop("traceback", None)
+    row.pop("step_ms", None)
+    row["set_aside"] = len(summary.get("set_aside") or ())
+    off, sigma = distance_errors(record)
+    row["distances"] = len(off)
+    row["distances_in_95"] = float(np.mean(np.abs(off) <= Z_95 * sigma)) if len(off) else None
+    row |= {f"{TIMINGS}{key}": value for key, value in (summary.get("step_ms") or {}).items()}
+    return row
+
+
+def distance_errors(record: Record) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Return mapped less true distance, and its standard deviation, for all pairs of known corners of a trial, m."""
+    names = ("distance_m", "distance_true_m", "distance_sigma_m")
+    mapped, true, sigma = (record.arrays.get(name, np.zeros(0)) for name in names)
+    return mapped - true, sigma
+
+
+def mark_rows(record: Record) -> list[Row]:
+    """Return the scores of a trial at equal metres driven.
+
+    `state` tells what the robot was doing then: `driving`, `finished` (complete before; its last state counts) or
+    `failed` (it ended before without being complete, and there is nothing to score).
+    """
+    summary = record.summary
+    marks = summary.get("marks") or {}
+    names = {key: summary[key] for key in (*KEYS, "seed", "status")}
+    complete = summary["status"] == "complete"
+    rows = []
+    for mark in ("10", "20", "33", END):
+        at = marks.get(mark)
+        state = "driving" if at is not None else "finished" if complete else "failed"
+        if mark == END:
+            state = "finished" if complete else "failed"
+        scores = at if at is not None else marks.get(END) if complete else None
+        rows.append({**names, "metres": mark, "state": state, **(scores or {})})
+    return rows
+
+
+def step_rows(records: Sequence[Record]) -> list[Row]:
+    """Return the statistics of one cell over its trials, step by step, as long as a trial goes on."""
+    longest = max((len(r.arrays.get("pose_nees", ())) for r in records), default=0)
+    names = ("path_length_m", "pose_nees", "pose_trace", "pose_error_m", "heading_error_rad", "heading_sigma_rad")
+    stacked = {name: np.full((len(records), longest), np.nan) for name in names}
+    for row, record in enumerate(records):
+        for name in names:
+            values = record.arrays.get(name, np.zeros(0))
+            stacked[name][row, : len(values)] = values
+    going = np.isfinite(stacked["path_length_m"])
+    rows = []
+    for k in range(longest):
+        column = {name: stacked[name][going[:, k], k] for name in names}
+        nees = column["pose_nees"][np.isfinite(column["pose_nees"])]
+        low, high = chi2_band(3, runs=max(len(nees), 1))
+        anees = float(nees.mean()) / 3.0 if len(nees) else None
+        rows.append(
+            {
+                **{key: records[0].summary[key] for key in KEYS},
+                "step": k,
+                "trials": int(going[:, k].sum()),
+                "path_length_m": float(column["path_length_m"].mean()),
+                "pose_anees": anees,
+                "band_low": low / 3.0,
+                "band_high": high / 3.0,
+                "pose_nees_median": float(np.median(nees)) if len(nees) else None,
+                "pose_error_rms_m": float(np.sqrt(np.mean(column["pose_error_m"] ** 2))),
+                "heading_error_rms_rad": float(np.sqrt(np.mean(column["heading_error_rad"] ** 2))),
+                "heading_sigma_rms_rad": float(np.sqrt(np.mean(column["heading_sigma_rad"] ** 2))),
+                "pose_trace": float(column["pose_trace"].mean()),
+            }
+        )
+    return rows
+
+
+def parquet_bytes(rows: Sequence[Row], header: Sequence[str]) -> bytes:
+    """Return a table as Parquet, the same bytes for the same rows."""
+    buffer = BytesIO()
+    columns = {name: pa.array([row.get(name) for row in rows]) for name in header}
+    pq.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+def header_of(rows: Sequence[Row], first: Sequence[str] = ()) -> list[str]:
+    """Return the names of all columns, in the order in which they are first met."""
+    return list(dict.fromkeys((*first, *(key for row in rows for key in row))))
+
+
+def write_table(store: Store, name: str, rows: Sequence[Row], first: Sequence[str] = ()) -> None:
+    """Write one table as CSV and as Parquet."""
+    header = header_of(rows, first)
+    write(store.folder / f"{name}.csv", csv_bytes(header, [[row.get(key) for key in header] for row in rows]))
+    write(store.folder / f"{name}.parquet", parquet_bytes(rows, header))
+
+
+def cells(store: Store) -> list[list[Trial]]:
+    """Return the trials, cell by cell."""
+    by_cell: dict[tuple[str, ...], list[Trial]] = {}
+    for trial in trials(store.campaign):
+        by_cell.setdefault((trial.world, trial.strategy, trial.backend, trial.arm), []).append(trial)
+    return list(by_cell.values())
+
+
+def write_tables(store: Store) -> None:
+    """Write every table of a campaign that is done."""
+    rows, marks, steps = [], [], []
+    for cell in cells(store):
+        records = [store.record(trial) for trial in cell]
+        rows += [trial_row(record) for record in records]
+        marks += [row for record in records for row in mark_rows(record)]
+        steps += step_rows(records)
+    write_table(store, "trials", rows, FIRST)
+    write_table(store, "marks", marks)
+    write_table(store, "steps", steps)

@@ -1,0 +1,149 @@
+"""One trial's work: a pure function of its job, wherever it runs."""
+
+import json
+import traceback
+from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from sim.worlds import World
+
+from ..files import json_bytes, npz_bytes
+from ..replay import RecordedRun, ReplayOptions, replay, run_of
+from ..results import log_arrays
+from ..scenario import TrialConfig, build, load_world
+from ..trial import TrialResult, default_mission, run_scenario
+from ..truth import truth_of
+from .innovation import InnovationEar
+from .observer import Observer
+from .plan import Trial, world_key
+from .score import Record, record_of
+
+SUMMARY = "summary_json"
+"""The name under which a trial's file holds its summary."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A trial and all that it needs."""
+
+    trial: Trial
+    config: TrialConfig
+    """Of the trial, or of the recording that it replays."""
+    log: bytes | None = None
+    """The recording's file, for a replay."""
+    keep_log: bool = False
+    """Whether this drive is played back by replays."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a job leaves: the contents of its files."""
+
+    trial: Trial
+    record: bytes
+    log: bytes | None = None
+
+
+def perform(job: Job) -> Done:
+    """Run one trial; whatever goes wrong in it becomes its record, with the reason, and the campaign goes on."""
+    log = None
+    try:
+        if job.trial.association is None:
+            record, log = _drive(job)
+        else:
+            record = _replay(job)
+    except Exception as error:  # the trial failed; a campaign of thousands must not end with it
+        record = failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
+    if job.keep_log and log is None:
+        log = npz_bytes({"reason": record.summary["reason"]})
+    return Done(job.trial, pack(record), log)
+
+
+def failed(job: Job, reason: str, trace: str = "") -> Record:
+    """Return the record of a trial that left nothing but a reason."""
+    config = job.config
+    summary = {
+        "seed": config.seed,
+        "p0": config.p0,
+        "errorless": config.errorless,
+        "status": "failed",
+        "reason": reason,
+        "traceback": trace,
+    }
+    return Record(_named(job.trial, summary), {})
+
+
+def pack(record: Record) -> bytes:
+    """Return a record as the bytes of an archive without pickles."""
+    return npz_bytes({SUMMARY: json_bytes(record.summary).decode(), **record.arrays})
+
+
+def unpack(content: bytes) -> Record:
+    """Return the record in the bytes of an archive; raises ValueError or OSError for anything else."""
+    with np.load(BytesIO(content), allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    return Record(json.loads(str(arrays.pop(SUMMARY))), arrays)
+
+
+def _named(trial: Trial, summary: dict[str, Any]) -> dict[str, Any]:
+    """Return a summary under the trial's own names: a replay's strategy is that of its recording."""
+    names = {
+        "world": world_key(trial.world),
+        "backend": trial.backend,
+        "strategy": trial.strategy,
+        "mode": "closed" if trial.association is None else "replay",
+        "association": trial.association or "own",
+    }
+    return names | {key: value for key, value in summary.items() if key not in names}
+
+
+@lru_cache(maxsize=2)
+def _world(name: str) -> World:
+    return load_world(name)
+
+
+@lru_cache(maxsize=2)
+def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
+    """Return a recording; replays of one recording follow each other, so that it is mostly read once."""
+    with np.load(BytesIO(log), allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    if "reason" in arrays:
+        raise RuntimeError(f"nothing was recorded: {arrays['reason']}")
+    return run_of(arrays, lambda: config)
+
+
+def _drive(job: Job) -> tuple[Record, bytes | None]:
+    scenario = build(job.config, _world(job.config.world))
+    walls = truth_of(scenario.world, job.config.robot).walls
+    observer = Observer(walls, lambda index: scenario.robot.record.faces_of_beams[index])
+    result = run_scenario(scenario, observer, default_mission)
+    record = _finish(job, result, observer, None)
+    log = result.log
+    return record, npz_bytes(log_arrays(result, log)) if job.keep_log and log is not None else None
+
+
+def _replay(job: Job) -> Record:
+    assert job.log is not None, "expected a recording to replay"
+    run = _recording(job.log, job.config)
+    world = _world(job.config.world)
+    association = job.trial.association
+    assert association is not None, "expected the arm of a replay"
+    observer = Observer(truth_of(world, job.config.robot).walls, lambda index: run.true_face_of_beam[index])
+    ear = InnovationEar(job.config.mission.mapper.firm_heading_rad) if association == "true" else None
+    result = replay(
+        run, job.trial.backend, ReplayOptions(association), observer, world,
+        ear.around if ear is not None else lambda matcher: matcher,
+    )  # fmt: skip
+    return _finish(job, result, observer, ear)
+
+
+def _finish(job: Job, result: TrialResult, observer: Observer, ear: InnovationEar | None) -> Record:
+    if result.ending.exit_status == 130:
+        raise KeyboardInterrupt
+    record = record_of(result, observer, ear)
+    summary = record.summary | ({"traceback": result.ending.traceback} if result.ending.traceback else {})
+    return Record(_named(job.trial, summary), record.arrays)

@@ -1,0 +1,82 @@
+"""`chainslam compare`: a campaign of many trials, and the comparison that comes of it."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign
+from .campaign.runner import on_cores, on_dask, run_campaign
+from .campaign.store import opened
+from .campaign.tables import write_tables
+from .replay import Association
+from .scenario import P0, UsageError, load_world
+
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them honestly.
+
+    The same command goes on where it was stopped.
+    """
+
+    out: Path
+    """Folder for the results."""
+    preset: Literal["smoke", "paper", "full"] | None = None
+    """A campaign by name; options named beside it go before."""
+    worlds: tuple[str, ...] | None = None
+    """Bundled names or files."""
+    backends: tuple[str, ...] | None = None
+    """The estimators (see `chainslam backends`)."""
+    strategies: tuple[str, ...] | None = None
+    """Exploration strategies (see `chainslam strategies`)."""
+    trials: int | None = None
+    """Seeds 1 to this, in every cell."""
+    modes: tuple[Literal["closed", "replay"], ...] = ("closed", "replay")
+    """Closed loop, or one recording for each world, strategy and seed through all back ends."""
+    association: tuple[Association, ...] = ("own", "true")
+    """Whose matches the replays use: the back end's own gate, the truth, or each."""
+    driver: str = "full-ekf"
+    """The back end that drives the recordings."""
+    p0: P0 = "small"
+    """Covariance of the start."""
+    max_steps: int = 5000
+    """A trial is stopped, and counts as a failure, after this many scans."""
+    jobs: int | None = None
+    """Number of processes; all cores by default. The results are the same."""
+    dask: str | None = None
+    """Address of a Dask scheduler whose workers run the trials, in place of `--jobs`."""
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign that the options describe; raises UsageError where they leave something open."""
+        given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
+        chosen = (PRESETS[self.preset] if self.preset else {}) | {k: v for k, v in given.items() if v is not None}
+        missing = [f"--{name}" for name in given if name not in chosen]
+        if missing:
+            raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
+        arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
+        arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
+        return Campaign(**chosen, arms=tuple(arms), driver=self.driver, p0=self.p0, max_steps=self.max_steps)
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError before anything is computed."""
+        campaign = self.campaign
+        check_campaign(campaign)
+        if self.jobs is not None and self.jobs < 1:
+            raise UsageError(f"expected at least 1 process, found --jobs {self.jobs}: raise it")
+        for world in campaign.worlds:
+            load_world(world)
+        executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
+        with opened(self.out, campaign) as store:
+            try:
+                run_campaign(store, executor)
+            except KeyboardInterrupt:
+                print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
+                      file=sys.stderr)  # fmt: skip
+                return INTERRUPTED
+            write_tables(store)
+        print(f"results in {self.out}")
+        return 0

@@ -1,0 +1,147 @@
+"""The final table is the same however a campaign came to its end: jobs, kill -9, resume, Dask, lost workers."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments.campaign.plan import Campaign, trials
+from experiments.campaign.runner import on_cores, run_campaign
+from experiments.campaign.store import opened, read_campaign
+from experiments.campaign.tables import TIMINGS, write_tables
+from experiments.cli import main
+
+ROOT = Path(__file__).parents[3]
+CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot",), 2, max_steps=15)
+WORDS = [
+    "--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf",
+    "--strategies", "nearest-robot", "--trials", "2", "--max-steps", "15",
+]  # fmt: skip
+TABLES = ("trials", "marks", "steps")
+
+
+def run(folder, campaign=CAMPAIGN, jobs=1):
+    with opened(folder, campaign) as store:
+        run_campaign(store, on_cores(jobs))
+        write_tables(store)
+    return folder
+
+
+def tables(folder):
+    """Every CSV table without its timings, and the untimed Parquet tables byte for byte."""
+    found = {}
+    for name in TABLES:
+        with (folder / f"{name}.csv").open() as file:
+            rows = list(csv.reader(file))
+        kept = [k for k, column in enumerate(rows[0]) if not column.startswith(TIMINGS)]
+        found[name] = [[row[k] for k in kept] for row in rows]
+    return found | {f"{name}.parquet": (folder / f"{name}.parquet").read_bytes() for name in ("marks", "steps")}
+
+
+def start(folder, *more):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "experiments.cli", "compare", *WORDS, "--out", str(folder), *more]
+    return subprocess.Popen(command, env=environment, start_new_session=True, stdout=subprocess.DEVNULL)
+
+
+def wait_for(folder, files):
+    deadline = time.monotonic() + 120.0
+    while len(list(folder.rglob("trials/**/*.npz"))) < files:
+        assert time.monotonic() < deadline, "expected some trials in two minutes"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("undisturbed") / "campaign")
+
+
+def test_killed_and_resumed_it_leaves_the_same_table_and_redoes_only_what_is_missing(undisturbed, tmp_path):
+    folder = tmp_path / "campaign"
+    process = start(folder, "--jobs", "2")
+    wait_for(folder, 3)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    done = {path: path.stat().st_mtime_ns for path in folder.rglob("*.npz")}
+    assert not (folder / "trials.csv").exists()
+    (folder / "trials" / ".00001.npz.1.part").write_bytes(b"half")
+    assert start(folder, "--jobs", "2").wait() == 0
+    assert tables(folder) == tables(undisturbed)
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert not list(folder.rglob(".*.part"))
+
+
+def test_interrupted_it_says_so_and_keeps_what_is_done(undisturbed, tmp_path):
+    folder = tmp_path / "campaign"
+    process = start(folder, "--jobs", "2")
+    wait_for(folder, 1)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait() == 130
+    assert list(folder.rglob("trials/**/*.npz"))
+    assert tables(run(folder)) == tables(undisturbed)
+
+
+def test_a_trial_that_fails_is_recorded_with_its_reason_and_the_rest_goes_on(tmp_path, monkeypatch):
+    from experiments.campaign import work
+
+    drive = work._drive
+
+    def broken(job):
+        if job.trial.seed == 1:
+            raise RuntimeError("the estimator lost its mind")
+        return drive(job)
+
+    monkeypatch.setattr(work, "_drive", broken)
+    with opened(tmp_path / "campaign", replace(CAMPAIGN, max_steps=5)) as store:
+        run_campaign(store, on_cores(1))
+        write_tables(store)
+        found = [store.record(trial).summary for trial in trials(store.campaign)]
+    assert all(("lost its mind" in s["reason"]) == (s["seed"] == 1) for s in found)
+    assert {s["status"] for s in found if s["seed"] == 1} == {"failed"}
+    assert len(tables(tmp_path / "campaign")["trials"]) == 1 + len(found) == 13
+
+
+def test_another_campaign_in_the_same_folder_is_refused_in_one_line(undisturbed, tmp_path, capsys):
+    assert read_campaign(undisturbed) == CAMPAIGN
+    files = {"other campaign": undisturbed, "no campaign": tmp_path}
+    (tmp_path / "thesis.txt").write_text("mine")
+    for folder in files.values():
+        words = [word if word != "15" else "16" for word in WORDS]
+        assert main(["compare", *words, "--out", str(folder)]) == 2
+        said = capsys.readouterr().err.strip()
+        assert said.startswith("chainslam: expected")
+        assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ["--worlds", "nowhere"],
+        ["--backends", "magic"],
+        ["--strategies", "magic"],
+        ["--trials", "0"],
+        ["--driver", "magic"],
+        ["--jobs", "0"],
+        ["--modes", "open"],
+        ["--backends", "full-ekf", "full-ekf"],
+        ["--dask", "127.0.0.1:9"],
+        ["--preset", "magic"],
+    ],
+    ids=lambda c: "".join(c[:2]),
+)
+def test_bad_words_get_one_line_and_status_2(change, tmp_path, capsys):
+    words = dict.fromkeys(["--worlds", "--backends", "--strategies", "--trials"])
+    words |= {"--worlds": ["paper-fig4"], "--backends": ["full-ekf"], "--strategies": ["nearest-robot"]}
+    words |= {"--trials": ["1"], change[0]: change[1:]}
+    arguments = [word for name, values in words.items() for word in (name, *values)]
+    assert main(["compare", *arguments, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.strip()
+    assert said.startswith("chainslam: ")
+    assert "\n" not in said
+    assert not (tmp_path / "out").exists()
