@@ -107,7 +107,7 @@ def on_dask(address: str) -> Executor:
     except ImportError as error:
         raise UsageError("expected the package distributed, found none: pip install chainslam[dask]") from error
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client = Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError) as error:
         raise UsageError(f"expected a Dask scheduler at {address}, found none: start `dask scheduler` first") from error
 
