@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test check bench docs smoke compare
+.PHONY: setup demo test check bench docs smoke compare random
 
 setup: .venv/made
 
@@ -26,6 +26,9 @@ check: setup
 
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
+
+random: setup
+	$(BIN)/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
 
 docs: setup
 	$(BIN)/chainslam explore paper-fig9 --seed 1 --out results/docs

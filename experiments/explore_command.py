@@ -19,7 +19,7 @@ class Explore:
     """Explore a world until every chain of walls is closed, and write the map beside how good it is."""
 
     world: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="WORLD")]
-    """A bundled world (see `chainslam worlds`) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
+    """A name (see `chainslam worlds`; random:SEED for any SEED) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
     backend: str = "full-ekf"
     """The estimator (see `chainslam backends`)."""
     strategy: str = "nearest-robot"
@@ -76,7 +76,7 @@ class Explore:
 
 def default_folder(world: str, trial: TrialConfig) -> Path:
     """Return the folder for a run that names none: the same run comes to the same place."""
-    parts = [world, trial.backend, trial.strategy, str(trial.seed)]
+    parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
     parts += [trial.p0] if trial.p0 != "small" else []
     parts += ["errorless"] if trial.errorless else []
     return Path("results") / "-".join(parts)

@@ -3,17 +3,17 @@
 from dataclasses import dataclass
 
 from explore.strategies import STRATEGIES
-from sim.worlds import WORLDS
+from sim.worlds import listing
 from slam.backends import BACKENDS
 
 
 @dataclass(frozen=True)
 class Worlds:
-    """List the bundled worlds."""
+    """List the bundled worlds and families of worlds."""
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
-        return _print({name: world.about for name, world in WORLDS.items()})
+        return _print(listing())
 
 
 @dataclass(frozen=True)

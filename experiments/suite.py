@@ -102,14 +102,15 @@ def run(suite: Suite) -> list[dict[str, Any]]:
     trials = suite.trials()
     check(trials[0])
     rows: list[dict[str, Any]] = [{} for _ in trials]
-    for done, (index, row) in enumerate(_results(trials, suite.jobs), start=1):
+    for done, (index, row) in enumerate(results(trials, suite.jobs), start=1):
         rows[index] = row
         if sys.stderr.isatty():
             print(f"\r{done} of {len(trials)}", end="", file=sys.stderr, flush=True)
     return rows
 
 
-def _results(trials: list[TrialConfig], jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:
+def results(trials: list[TrialConfig], jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Run trials in several processes and yield index and row of each as it ends."""
     if jobs <= 1:
         yield from ((index, one(trial)) for index, trial in enumerate(trials))
         return

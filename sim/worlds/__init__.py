@@ -2,7 +2,7 @@
 
 from .contour import Contour
 from .drawing import WorldError
-from .registry import WORLDS, load
+from .registry import WORLDS, listing, load
 from .world import World
 
-__all__ = ["WORLDS", "Contour", "World", "WorldError", "load"]
+__all__ = ["WORLDS", "Contour", "World", "WorldError", "listing", "load"]

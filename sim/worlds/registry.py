@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
 from .files import read_bytes, read_json_map
+from .random_building import read_seed
 from .raster import read_image, read_ros_map
 from .solid import build
 from .svg import read_svg
@@ -35,6 +36,23 @@ WORLDS: dict[str, Bundled] = {
     "hall": Bundled("hall.svg", "a hall of 16 m x 12 m, larger than the sensor's range, with pillars"),
 }
 
+
+@dataclass(frozen=True)
+class Family:
+    """Worlds without number: NAME:WHICH."""
+
+    read: Callable[[str], Drawing]
+    """From WHICH to a drawing."""
+    example: str
+    about: str
+
+
+FAMILIES: dict[str, Family] = {
+    "random": Family(
+        read_seed, "random:1", "rooms, corridors, halls and slanted walls by chance; any seed after the colon"
+    ),
+}
+
 READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
     ".json": lambda path, scale: read_json_map(read_bytes(path), scale),
     ".geojson": lambda path, scale: read_json_map(read_bytes(path), scale),
@@ -45,12 +63,18 @@ READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
 """Reader by file name extension; each takes the path and the scale that the caller states, or None."""
 
 
+def listing() -> dict[str, str]:
+    """Return what each world is, by a name that `load` takes; a family is listed by an example."""
+    families = {family.example: family.about for family in FAMILIES.values()}
+    return {name: world.about for name, world in WORLDS.items()} | families
+
+
 def load(
     name_or_path: str | Path,
     start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
     scale: float | None = None,
 ) -> World:
-    """Return a bundled world or one drawn in a file.
+    """Return a bundled world, one of a family, or one drawn in a file.
 
     `start` (x m, y m, heading rad; heading may be left out) overrides the drawing's own. `scale` is metres per pixel
     of a bare image (0.05 where not given) or metres per user unit of an SVG file. Raises WorldError, in one line.
@@ -72,11 +96,14 @@ def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
         raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
     if text in WORLDS:
         return text, read_svg((HERE / WORLDS[text].file).read_bytes())
+    family, colon, which = text.partition(":")
+    if colon and family in FAMILIES:
+        return text, FAMILIES[family].read(which)
     path = Path(text)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise WorldError(
-            f"expected one of {', '.join(WORLDS)} or a file ending in {', '.join(READERS)}, found {shorten(text)}:"
+            f"expected one of {', '.join(listing())} or a file ending in {', '.join(READERS)}, found {shorten(text)}:"
             " choose one of these"
         )
     return path.stem, reader(path, scale)

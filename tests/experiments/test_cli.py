@@ -20,6 +20,7 @@ def test_listings_start_each_line_with_a_name(listing, capsys):
         ["explore"],
         ["explore", "no-such-world"],
         ["explore", "no-such-world.json"],
+        ["explore", "random:seven"],
         ["explore", "paper-fig8", "--backend", "magic"],
         ["explore", "paper-fig8", "--strategy", "magic"],
         ["explore", "paper-fig8", "--p0", "huge"],
