@@ -19,7 +19,7 @@ class Explore:
     """Explore a world until every chain of walls is closed, and write the map beside how good it is."""
 
     world: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="WORLD")]
-    """A name (see `chainslam worlds`; random:SEED for any SEED) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
+    """A name (see `chainslam worlds`) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
     backend: str = "full-ekf"
     """The estimator (see `chainslam backends`)."""
     strategy: str = "nearest-robot"

@@ -6,7 +6,7 @@
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from .files import json_bytes
 from .scenario import TrialConfig, UsageError, check
 from .suite import results, table
 
@@ -72,34 +71,40 @@ def run(study: RandomStudy) -> Iterator[dict[str, Any]]:
     """
     trials = study.trials()
     check(trials[0])
-    wanted = {_key(trial.world, trial): trial for trial in trials}
-    for row in _read(study.out):
-        trial = wanted.pop(_key(row["file"], row), None)
-        if trial is not None:
+    wanted = {_key(asdict(trial) | {"file": trial.world}): trial for trial in trials}
+    kept, rows = _read(study.out)
+    for row in rows:
+        if wanted.pop(_key(row), None) is not None:
             yield row
-    study.out.parent.mkdir(parents=True, exist_ok=True)
     left = list(wanted.values())
+    study.out.parent.mkdir(parents=True, exist_ok=True)
     with study.out.open("ab") as file:
+        file.truncate(kept)
         for index, row in results(left, study.jobs):
             row |= {key: getattr(left[index], key) for key in ("backend", "strategy", "errorless")}
-            file.write(json.dumps(json.loads(json_bytes(row))).encode() + b"\n")
+            file.write(json.dumps(row).encode() + b"\n")
             file.flush()
             yield row
 
 
-def _key(world: str, of: Any) -> tuple[Any, ...]:
-    get = of.get if isinstance(of, dict) else lambda name: getattr(of, name)
-    return (world, *(get(name) for name in ("seed", "backend", "strategy", "errorless")))
+def _key(row: dict[str, Any]) -> tuple[Any, ...]:
+    """Return what makes a run this one and no other."""
+    return tuple(row[name] for name in ("file", "seed", "backend", "strategy", "errorless"))
 
 
-def _read(path: Path) -> list[dict[str, Any]]:
+def _read(path: Path) -> tuple[int, list[dict[str, Any]]]:
+    """Return the length of the whole lines of a file, and their rows; a line without an end was cut short."""
     if not path.exists():
-        return []
+        return 0, []
+    content = path.read_bytes()
+    kept = content.rfind(b"\n") + 1
     try:
-        rows = [json.loads(line) for line in path.read_text().splitlines()]
-        return [row for row in rows if row["file"] and row["status"]]
-    except (ValueError, KeyError, TypeError, OSError) as error:
+        rows = [json.loads(line) for line in content[:kept].splitlines()]
+        for row in rows:
+            _key(row)
+    except (ValueError, KeyError, TypeError) as error:
         raise UsageError(f"expected rows of this study in {path}, found {error!r}: name another --out") from error
+    return kept, rows
 
 
 def main() -> int:
