@@ -59,8 +59,9 @@ def _if_sound(changed: BaseGeometry, floor: shapely.Polygon) -> shapely.Polygon:
 def _narrow_m2(floor: shapely.Polygon) -> float:
     """Return the area that a disc as wide as a passage does not cover, or infinity where it cannot go everywhere."""
     inner = floor.buffer(-0.495 * PASSAGE_M, quad_segs=16)
-    grown = inner.buffer(0.505 * PASSAGE_M, join_style="mitre", mitre_limit=10.0).intersection(floor)
-    return float(floor.area - grown.area) if isinstance(inner, shapely.Polygon) else np.inf
+    # Mitres may cross each other, which buffer(0) mends.
+    grown = inner.buffer(0.505 * PASSAGE_M, join_style="mitre", mitre_limit=10.0).buffer(0)
+    return float(floor.area - grown.intersection(floor).area) if isinstance(inner, shapely.Polygon) else np.inf
 
 
 def _shortest_m(ring: shapely.LinearRing) -> float:

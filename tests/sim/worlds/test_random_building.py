@@ -11,13 +11,13 @@ from sim.worlds.floor_plan import DOOR_M, STYLES, floor_plan
 from sim.worlds.world import SENSOR_RANGE_M
 
 SEEDS = st.integers(0, 2**64 - 1)
-QUICK = settings(max_examples=15, deadline=None, database=None)
+QUICK = settings(max_examples=10, deadline=None, database=None)
 
 
 def opened(shape, width_m):
     """Return a shape without what is narrower than a width, its corners as they were."""
     inner = shape.buffer(-0.5 * width_m, quad_segs=16)
-    return inner.buffer(0.505 * width_m, join_style="mitre", mitre_limit=10).intersection(shape)
+    return inner.buffer(0.505 * width_m, join_style="mitre", mitre_limit=10).buffer(0).intersection(shape)
 
 
 @pytest.fixture(scope="module")
