@@ -12,6 +12,7 @@ import tyro
 from .compare_command import Compare
 from .explore_command import Explore
 from .listings import Backends, Strategies, Worlds
+from .measure_command import Measure
 from .replay_command import Replay
 from .scenario import UsageError, choose
 
@@ -31,6 +32,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "explore": Explore,
     "replay": Replay,
     "compare": Compare,
+    "measure": Measure,
     "worlds": Worlds,
     "backends": Backends,
     "strategies": Strategies,

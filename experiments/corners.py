@@ -9,9 +9,10 @@ from jaxtyping import Float
 
 from slam.backend import Joint
 from slam.chains import Chain
-from slam.geometry.lines import directions, normals
 from slam.geometry.poses import to_world
 from slam.stochastic_map import StochasticMap
+
+from .measurements import corner_jacobian
 
 LABEL_REACH_M = 0.5
 """A named point of the drawing is taken for the mapped corner nearest to it, up to here, after alignment."""
@@ -48,16 +49,14 @@ def corners(walls: StochasticMap, chains: tuple[Chain, ...]) -> list[Corner]:
 def _jacobian(
     walls: StochasticMap, first: int, second: int, position_world: Float[np.ndarray, "2"]
 ) -> Float[np.ndarray, "2 s"] | None:
-    """Differentiate n(alpha)·(x - c) = d for both lines: n·dx = dd - t·(x - c) d_alpha."""
-    alpha = walls.belief.means[[first, second], 0]
-    if abs(np.sin(alpha[1] - alpha[0])) < 0.05:
+    """Return the derivative of a corner by the joint state, None where its walls do not cross."""
+    rows = [first, second]
+    own, crosses = corner_jacobian(walls.belief.means[rows], walls.belief.anchors[rows], position_world)
+    if not crosses:
         return None
-    solve = np.linalg.inv(normals(alpha))
-    off = np.sum(directions(alpha) * (position_world - walls.belief.anchors[[first, second]]), axis=-1)
     jacobian = np.zeros((2, 3 + 2 * len(walls)))
-    for column, row in enumerate((first, second)):
-        jacobian[:, 3 + 2 * row] = -solve[:, column] * off[column]
-        jacobian[:, 4 + 2 * row] = solve[:, column]
+    for row, part in zip(rows, (own[:, :2], own[:, 2:]), strict=True):
+        jacobian[:, 3 + 2 * row : 5 + 2 * row] = part
     return jacobian
 
 

@@ -5,6 +5,8 @@ world, the directions that no scan can observe, then have the same coordinates w
 errors of lines are taken after undoing that motion, so that they are the walls' own (docs/estimation.md).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
@@ -41,6 +43,49 @@ def share_in_band(values: Float[np.ndarray, " n"], dof: int, confidence: float =
     """Return the share of values inside the two-sided chi-square band."""
     low, high = chi2_band(dof, confidence)
     return float(np.mean((values >= low) & (values <= high)))
+
+
+def effective_samples(values: Float[np.ndarray, " n"]) -> float:
+    """Return how many independent draws a correlated series (n,) is worth: n / (1 + 2 sum of its autocorrelations).
+
+    The sum goes over pairs of neighbouring lags as long as a pair is positive (Geyer's initial positive sequence);
+    at least 1, and 1 for a constant series.
+    """
+    n = len(values)
+    off = values - values.mean()
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(off, size)
+    rho = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n]
+    if n < 4 or rho[0] <= 1e-12 * n * float(np.mean(values**2)):
+        return 1.0
+    pairs = (rho[: n - n % 2] / rho[0]).reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0)
+    total = 2.0 * float(pairs[: ends[0] if len(ends) else len(pairs)].sum()) - 1.0
+    return float(np.clip(n / max(total, 1e-9), 1.0, n))
+
+
+def pooled_band(runs: Sequence[Float[np.ndarray, " _"]], dof: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the band in which the ANEES over all steps of all runs lies for an ideal estimate.
+
+    Steps of one run are correlated: each run counts as its `effective_samples`, never as its number of steps.
+    """
+    worth = sum(effective_samples(run) for run in runs)
+    low, high = chi2_band(dof, confidence, max(round(worth), 1))
+    return low / dof, high / dof
+
+
+def bound_margin(
+    poses_world: Float[np.ndarray, "s 3"], covs: Float[np.ndarray, "s 3 3"], initial_cov: Float[np.ndarray, "3 3"]
+) -> float:
+    """Return the smallest eigenvalue of P_k - A P_0 A', over all steps and over tr P_0; negative below the bound.
+
+    A = [I, J (p_k - p_0); 0, 1]. An estimator that gains nothing about where the world lies never falls below 0
+    (docs/estimation.md, "The bound").
+    """
+    A = np.tile(np.eye(3), (len(covs), 1, 1))
+    A[:, :2, 2] = (poses_world[:, :2] - poses_world[0, :2]) @ J.T
+    gap = covs - A @ initial_cov @ np.swapaxes(A, -1, -2)
+    return float(np.linalg.eigvalsh(0.5 * (gap + np.swapaxes(gap, -1, -2))).min() / np.trace(initial_cov))
 
 
 def pose_errors(

@@ -18,7 +18,7 @@ ARMS = (CLOSED, "replay-own", "replay-true")
 """Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
 Replay with the true association: the algebra alone."""
 PAPER_BACKENDS = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf", "graph")
-PAPER_STRATEGIES = tuple(s for s in ("nearest-robot", "same-chain", "nearest-start") if s in STRATEGIES)
+PAPER_STRATEGIES = ("nearest-robot", "same-chain", "nearest-start")
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     "smoke": {
         "worlds": ("paper-fig8",),
         "backends": ("block-ekf", "full-ekf"),
-        "strategies": tuple(s for s in ("nearest-robot", "nearest-start") if s in STRATEGIES),
+        "strategies": ("nearest-robot", "nearest-start"),
         "trials": 3,
     },
     "paper": {

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from slam.backend import Joint
 from slam.chains import Chain
+from slam.consistency import bound_margin
 from slam.geometry.lines import normals
 from slam.geometry.poses import to_world, wrap
 from slam.stochastic_map import StochasticMap
@@ -54,7 +55,11 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
         END: scorer.at(end),
     }
     shift, turn = rpe(log.estimated_world, log.true_world, RPE_STEPS) if len(log) > RPE_STEPS else (None, None)
+    traces = np.trace(log.estimated_cov, axis1=1, axis2=2)
+    start_cov = result.scenario.start_cov
     summary |= {
+        "trace_least": float(traces.min() / np.trace(start_cov)),
+        "bound_margin": bound_margin(log.estimated_world, log.estimated_cov, start_cov),
         "ate_m": ate(log.estimated_world, log.true_world),
         "ate_aligned_m": ate(log.estimated_world, log.true_world, align=True),
         "rpe_m": shift,

@@ -9,10 +9,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from jaxtyping import Float
 
-from slam.consistency import chi2_band
+from slam.consistency import chi2_band, pooled_band
 
-from ..files import csv_bytes, write
+from ..files import csv_bytes, json_bytes, write
 from ..measurements import Z_95
+from .comparison import compare
+from .hypothesis import hypothesis
 from .plan import Trial, trials
 from .score import END, Record
 from .store import Store
@@ -137,14 +139,32 @@ def cells(store: Store) -> list[list[Trial]]:
     return list(by_cell.values())
 
 
+def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
+    """Return what the steps of one cell say: how many lie outside their band, and the band of all steps together."""
+    outside = [row["pose_anees"] < row["band_low"] or row["pose_anees"] > row["band_high"]
+               for row in steps if row["pose_anees"] is not None]  # fmt: skip
+    runs = [r.arrays["pose_nees"] for r in records if np.all(np.isfinite(r.arrays.get("pose_nees", [np.nan])))]
+    low, high = pooled_band(runs, 3) if runs else (None, None)
+    return {
+        "steps_outside_band": float(np.mean(outside)) if outside else None,
+        "pooled_anees": float(np.concatenate(runs).mean()) / 3.0 if runs else None,
+        "pooled_low": low,
+        "pooled_high": high,
+    }
+
+
 def write_tables(store: Store) -> None:
-    """Write every table of a campaign that is done."""
-    rows, marks, steps = [], [], []
+    """Write every table of a campaign that is done, and what they say."""
+    rows, marks, steps, bands = [], [], [], []
     for cell in cells(store):
         records = [store.record(trial) for trial in cell]
         rows += [trial_row(record) for record in records]
         marks += [row for record in records for row in mark_rows(record)]
-        steps += step_rows(records)
+        mine = step_rows(records)
+        steps += mine
+        bands.append(band_scores(records, mine))
     write_table(store, "trials", rows, FIRST)
     write_table(store, "marks", marks)
     write_table(store, "steps", steps)
+    said = compare(store.campaign, rows, marks, bands) | {"hypothesis": hypothesis(marks)}
+    write(store.folder / "comparison.json", json_bytes(said))

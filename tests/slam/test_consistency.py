@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve
@@ -7,10 +9,13 @@ from slam.backend import Joint
 from slam.consistency import (
     _to_invariant,
     anees,
+    bound_margin,
     chi2_band,
+    effective_samples,
     joint_error,
     nees,
     nis,
+    pooled_band,
     pose_covariances,
     pose_errors,
     share_in_band,
@@ -45,6 +50,15 @@ def test_nees_equals_the_quadratic_form_of_scipy():
     expected = [e @ solve(cov, e) for e, cov in zip(errors, covs, strict=True)]
     np.testing.assert_allclose(nees(errors, covs), expected, rtol=1e-10)
     np.testing.assert_allclose(nis(errors, covs), expected, rtol=1e-10)
+
+
+def test_nees_is_that_of_filterpy():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a library that is held against ours, not of ours
+        from filterpy.stats import NEES
+    true, estimated, covs = RNG.normal(size=(9, 3)), RNG.normal(size=(9, 3)), random_covs(9, 3)
+    expected = NEES(true[..., None], estimated[..., None], covs)
+    np.testing.assert_allclose(nees(estimated - true, covs), np.ravel(expected), rtol=1e-10)
 
 
 def test_nees_of_the_exact_model_is_chi_square():
@@ -134,3 +148,43 @@ def test_the_joint_covariance_stays_positive_definite_and_a_robot_alone_is_its_s
     _, moved = joint_error(Joint(truth, cov, anchors), pose, lines)
     assert np.linalg.eigvalsh(moved).min() > 0
     np.testing.assert_allclose(moved[:3, :3], pose_covariances(pose[None], cov[None, :3, :3])[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, 0.95])
+def test_a_correlated_series_is_worth_fewer_samples(rho):
+    """A first-order series with correlation rho is worth n (1 - rho) / (1 + rho) draws."""
+    n, rng = 20_000, np.random.default_rng(2)
+    values, noise = np.zeros(n), rng.normal(size=n)
+    for k in range(1, n):
+        values[k] = rho * values[k - 1] + noise[k]
+    assert effective_samples(values) == pytest.approx(n * (1 - rho) / (1 + rho), rel=0.2)
+
+
+def test_a_constant_or_a_short_series_is_one_draw():
+    assert effective_samples(np.full(50, 3.0)) == effective_samples(np.array([1.0, 2.0])) == 1.0
+
+
+def test_the_pooled_band_holds_an_ideal_estimate_whose_errors_last():
+    """Runs whose NEES hardly changes: with steps for the unit the band would be far too narrow."""
+    rng, held, naive = np.random.default_rng(6), 0, 0
+    for _ in range(200):
+        errors = rng.normal(size=(20, 1, 3)) + 0.05 * rng.normal(size=(20, 100, 3)).cumsum(axis=1) / 10
+        runs = list(np.sum(errors**2, axis=-1))
+        mean = float(np.mean(runs)) / 3.0
+        low, high = pooled_band(runs, 3)
+        held += low <= mean <= high
+        low, high = chi2_band(3, runs=2000)
+        naive += low / 3 <= mean <= high / 3
+    assert naive < 60
+    assert held > 1.5 * naive
+
+
+def test_knowing_nothing_new_about_the_world_stays_on_the_bound_and_knowing_more_falls_below():
+    initial = np.diag([0.01, 0.01, 0.001])
+    poses = np.column_stack([np.linspace(0, 5, 20), np.linspace(0, -3, 20), np.linspace(0, 2, 20)])
+    A = np.tile(np.eye(3), (20, 1, 1))
+    A[:, 0, 2], A[:, 1, 2] = -(poses[:, 1] - poses[0, 1]), poses[:, 0] - poses[0, 0]
+    covs = A @ initial @ np.swapaxes(A, 1, 2)
+    assert bound_margin(poses, covs, initial) == pytest.approx(0.0, abs=1e-12)
+    assert bound_margin(poses, covs + 1e-3 * np.eye(3), initial) >= -1e-12
+    assert bound_margin(poses, 0.99 * covs, initial) < -1e-3

@@ -1,0 +1,67 @@
+"""The paper's hope put to the test: that a careful exploration strategy makes up for a weaker estimator."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY, Measure, Row, difference, select
+from .plan import CLOSED
+from .score import END
+
+CONTENDER = ("nearest-start", "block-ekf")
+MATCHES_WITHIN = 1.1
+"""Two errors match if the 95 % interval of their ratio stays below this; they do not if it stays above."""
+DECISIVE = "33"
+"""Metres driven at which the verdict is taken: the length of the paper's first experiment."""
+MEASURES = (
+    Measure("wall_rmse_m", True),
+    Measure("pose_error_m", True, 1e-4),
+    Measure("pose_anees_so_far", True),
+    Measure("uncovered", False),
+)
+
+
+def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
+    """Return whether the contender matches the baseline at equal metres driven; None where either was not run."""
+    closed = [row | {"uncovered": _uncovered(row)} for row in select(marks, mode=CLOSED)]
+    contender = select(closed, strategy=CONTENDER[0], backend=CONTENDER[1])
+    baseline = select(closed, strategy=BASELINE_STRATEGY, backend=BASELINE_BACKEND)
+    if not contender or not baseline:
+        return None
+    found: dict[str, Any] = {
+        "contender": "{} with {}".format(*CONTENDER),
+        "baseline": f"{BASELINE_STRATEGY} with {BASELINE_BACKEND}",
+        "matches_within": MATCHES_WITHIN,
+        "decisive_mark": DECISIVE,
+        "marks": {},
+    }
+    for mark in ("10", "20", "33", END):
+        first, second = (_alive(select(rows, metres=mark)) for rows in (contender, baseline))
+        found["marks"][mark] = {
+            "contender": _states(contender, mark),
+            "baseline": _states(baseline, mark),
+            **{m.name: difference(first, second, m) for m in MEASURES},
+        }
+    ratio = found["marks"][DECISIVE]["wall_rmse_m"]
+    found["verdict"] = verdict(ratio["low"], ratio["high"])
+    return found
+
+
+def verdict(low: float | None, high: float | None) -> str:
+    """Return `matches`, `does not match` or `undecided` for the interval of a ratio of errors."""
+    if low is None or high is None:
+        return "undecided"
+    return "matches" if high <= MATCHES_WITHIN else "does not match" if low > MATCHES_WITHIN else "undecided"
+
+
+def _alive(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with every run that has scores at its mark counted as one that completed."""
+    return [row | {"status": "failed" if row["state"] == "failed" else "complete"} for row in rows]
+
+
+def _states(rows: Sequence[Row], mark: str) -> dict[str, int]:
+    states = [row["state"] for row in select(rows, metres=mark)]
+    return {state: states.count(state) for state in ("driving", "finished", "failed")}
+
+
+def _uncovered(row: Row) -> float | None:
+    return None if row.get("coverage") is None else 1.0 - row["coverage"]
