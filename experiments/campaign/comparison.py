@@ -160,7 +160,7 @@ def cell_scores(rows: Sequence[Row]) -> Row:
     return scores
 
 
-def _mean(values: Iterable[float | None]) -> float | None:
+def _mean(values: Iterable[float | int | None]) -> float | None:
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else None
 
