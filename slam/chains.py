@@ -63,18 +63,20 @@ class Chain:
 def connect(
     walls: StochasticMap,
     set_aside: Collection[tuple[int, int]] = (),
+    passed: Collection[tuple[int, int]] = (),
     config: ChainConfig = ChainConfig(),
 ) -> tuple[Chain, ...]:
     """Join heads to tails, nearest first, and return the chains in the order of their oldest wall.
 
     Free side on the left throughout, so a head joins only a tail. `set_aside` holds (wall id, side) of ends that
-    were looked at closely: two of these may join across a wider gap (a missed short face).
+    were looked at closely: two of these may join across a wider gap (a missed short face), unless it is among those
+    that beams have `passed`, (id of the head's wall, id of the tail's).
     """
     rows = np.flatnonzero(~walls.tentative)
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    successor = _links(ends, lines, ids, set_aside, config)
+    successor = _links(ends, lines, ids, set_aside, passed, config)
     return tuple(_chain(run, closed, ends, lines, ids, config) for run, closed in _runs(successor))
 
 
@@ -83,6 +85,7 @@ def _links(
     lines: Float[np.ndarray, "n 2"],
     ids: Int[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
+    passed: Collection[tuple[int, int]],
     config: ChainConfig,
 ) -> Int[np.ndarray, " n"]:
     """Return the row of each wall's successor, -1 for none: greedily, nearest ends first."""
@@ -92,6 +95,7 @@ def _links(
     head, tail, gap = near["i"], near["j"], near["v"]
     aside = np.array([[(int(i), side) in set_aside for side in (TAIL, HEAD)] for i in ids]).reshape(-1, 2)
     both_aside = aside[head, HEAD] & aside[tail, TAIL]
+    both_aside &= np.array([pair not in passed for pair in zip(ids[head], ids[tail], strict=True)], dtype=bool)
     allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
     straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
     across = np.abs(np.sum(normals(lines[head, 0]) * (ends[tail, TAIL] - ends[head, HEAD]), axis=-1))

@@ -9,6 +9,8 @@ from jaxtyping import Float, Int
 from .backend import Backend, Joint, Observations
 from .chains import Chain, ChainConfig, connect
 from .extraction import extract
+from .faint import FaintConfig, FaintLines
+from .gaps import Gaps, GapsConfig
 from .geometry.lines import distance_to_segments
 from .matching import KnownWalls, Matches, MatchingConfig, match, relocate, same_line
 from .pieces import sure_pieces
@@ -25,6 +27,8 @@ class MapperConfig:
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     chains: ChainConfig = field(default_factory=ChainConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
+    faint: FaintConfig = field(default_factory=FaintConfig)
+    gaps: GapsConfig = field(default_factory=GapsConfig)
     firm_heading_rad: float = float(np.deg2rad(6.0))
     """A segment with a larger sigma of direction is matched and stored but moves no estimate: where a line's direction
     keeps changing by many degrees, so does the direction in which it fixes the robot, and every change adds
@@ -61,6 +65,8 @@ class Mapper:
         self._extract = extractor
         self._match = matcher
         self._walls = Walls(config.walls)
+        self._faint = FaintLines(config.faint)
+        self._gaps = Gaps(config.gaps)
 
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by what the wheels report."""
@@ -87,7 +93,9 @@ class Mapper:
         self._merge(matches, owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         walls = self._walls.map(self.backend.belief)
-        return MapUpdate(segments, matches, owners, walls, connect(walls, set_aside, self.config.chains))
+        self._gaps.see(walls, scan)
+        chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
+        return MapUpdate(segments, matches, owners, walls, chains)
 
     def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
         """Return matches safe enough to relocate the robot by.
@@ -122,11 +130,13 @@ class Mapper:
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
         fresh = np.setdiff1d(matches.unmatched, matches.doubtful)
-        fresh = fresh[~segments.is_tentative[fresh]]
+        faint, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
+        believed = faint[self._faint.see(self.backend.belief.pose_world, segments.take(faint))]
+        fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = _seen_centres(segments, fresh)
             owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
-        forgotten = self._walls.see(self.backend.belief, scan, segments, owners)
+        forgotten = self._walls.see(self.backend.belief, scan, segments, owners, owners[believed])
         if len(forgotten):
             self.backend.remove(forgotten.tolist())
         return owners

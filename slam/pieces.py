@@ -16,7 +16,7 @@ class PiecesConfig:
 
     sure_gap_m: float = 0.35
     """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    corner_leap_m: float = 0.15
+    corner_leap_m: float = 0.07
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 

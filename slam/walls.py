@@ -65,15 +65,24 @@ class Walls:
         return StochasticMap(belief, self._extents.copy(), self._sightings.copy(), tentative)
 
     def see(
-        self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]
+        self,
+        belief: Belief,
+        scan: Scan,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        believed: Int[np.ndarray, " b"],
     ) -> Int[np.ndarray, " f"]:
-        """Stretch the walls over the segments that they own, and return ids of walls not worth keeping."""
+        """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
+
+        `believed` are new walls that were seen often before they became walls.
+        """
         self._scans += 1
         self._append(belief.ids[len(self._ids) :])
         used = np.flatnonzero(owners >= 0)
         rows = np.searchsorted(self._ids, owners[used])
         self._stretch(belief, scan, segments, used, rows)
         self._sightings[np.unique(rows)] += 1
+        self._sightings[np.searchsorted(self._ids, believed)] = self._config.trusted_sightings
         self._last_seen[rows] = self._scans
         self._weigh(belief, scan, segments, owners)
         stale = self._scans - self._last_seen > self._config.patience_steps

@@ -1,0 +1,64 @@
+"""Lines of few beams become walls when they stay where they are, seen from several places."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slam.faint import FaintConfig, FaintLines
+from slam.geometry.lines import through
+from slam.geometry.poses import to_robot
+from slam.segments import EndKind, Segments
+
+SIGMA_M = 0.005
+
+
+def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generator) -> Segments:
+    """Return one face as a segment of three beams, its two ends off by noise, with the covariance of that."""
+    ends = to_robot(face_world, pose_world)
+    n = np.array([np.cos(through(ends[None])[0, 0]), np.sin(through(ends[None])[0, 0])])
+    noisy = ends + SIGMA_M * rng.standard_normal((2, 1)) * n
+    line, length = through(noisy[None]), float(np.hypot(*(ends[1] - ends[0])))
+    along = float(noisy.mean(axis=0) @ np.array([-np.sin(line[0, 0]), np.cos(line[0, 0])]))
+    var_alpha, var_across = 2 * SIGMA_M**2 / length**2, SIGMA_M**2 / 2
+    # The line's distance from the robot's origin changes with its direction by the lever to its middle.
+    cov = np.array([[[var_alpha, along * var_alpha], [along * var_alpha, var_across + along**2 * var_alpha]]])
+    kinds = np.full((1, 2), int(EndKind.OPEN))
+    return Segments(line, cov, noisy[None], np.array([[0, 2]]), np.array([3]), kinds)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6))
+def test_a_face_seen_from_three_places_is_believed_and_from_one_place_never(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(-np.pi, np.pi)
+    face = 0.06 * np.array([[-np.sin(turn), np.cos(turn)]]) * np.array([[-1.0], [1.0]])
+    free_side = -np.array([np.cos(turn), np.sin(turn)])
+    poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(3)]
+    moving, standing = FaintLines(FaintConfig(gate=0.99999)), FaintLines(FaintConfig(gate=0.99999))
+    believed = [len(moving.see(pose, look(face, pose, rng))) for pose in poses]
+    assert believed == [0, 0, 1]
+    assert not any(len(standing.see(poses[0], look(face, poses[0], rng))) for _ in range(10))
+
+
+def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
+    rng = np.random.default_rng(3)
+    faint = FaintLines()
+    for k in range(15):
+        face = np.array([[1.0 + 0.08 * k, 0.05], [1.0 + 0.08 * k, -0.05]])[::-1]
+        pose = np.array([0.0, 0.06 * k, 0.0])
+        assert not len(faint.see(pose, look(face, pose, rng)))
+
+
+def test_a_line_unseen_for_long_is_forgotten() -> None:
+    rng = np.random.default_rng(4)
+    faint = FaintLines(FaintConfig(patience_steps=5))
+    face, nothing = (
+        np.array([[1.0, 0.05], [1.0, -0.05]])[::-1],
+        look(np.eye(2), np.zeros(3), rng).take(np.zeros(0, int)),
+    )
+    poses = [np.array([0.0, 0.1 * k, 0.0]) for k in range(4)]
+    for pose in poses[:2]:
+        faint.see(pose, look(face, pose, rng))
+    for _ in range(7):
+        faint.see(poses[1], nothing)
+    assert not len(faint.see(poses[2], look(face, poses[2], rng)))
