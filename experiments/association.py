@@ -27,6 +27,9 @@ class Votes:
     """For each line id ever fused, the number of its beams from each face."""
     fused: list[tuple[int, int]] = field(default_factory=list)
     """(line id, true wall) of each segment fused, `UNLABELLED` where its beams came from several walls."""
+    merges: int = 0
+    false_merges: int = 0
+    """Of these, lines labelled with two different walls."""
 
     def add(self, segments: Segments, owners: Int[np.ndarray, " s"], face_of_beam: Int[np.ndarray, " k"]) -> None:
         """Count the beams of the segments of one scan; `owners` holds line ids, -1 where one was not used."""
@@ -42,6 +45,15 @@ class Votes:
             walls = np.bincount(self.truth.walls[faces]) if len(faces) else np.zeros(1)
             clear = len(faces) > 0 and walls.max() >= ONE_FACE_SHARE * len(span)
             self.fused.append((owner, int(walls.argmax()) if clear else UNLABELLED))
+
+    def merge(self, keep: int, drop: int) -> None:
+        """Give a line the beams and segments of another that the map has merged into it."""
+        kept, dropped = (self.walls_of(np.array([line]))[0] for line in (keep, drop))
+        self.merges += 1
+        self.false_merges += bool(UNLABELLED not in (kept, dropped) and kept != dropped)
+        if drop in self.beams:
+            self.beams[keep] = self.beams.get(keep, 0) + self.beams.pop(drop)
+            self.fused = [(keep if owner == drop else owner, wall) for owner, wall in self.fused]
 
     def face_of(self, line_id: int) -> int:
         """Return the face that stands for a line: of the wall with most of its beams, the face with most; or -1."""

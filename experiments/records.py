@@ -68,6 +68,8 @@ class Recorder:
             )
         belief = step.map.belief
         self.last, self.joint = step, None
+        for keep, drop in step.merged:
+            self.votes.merge(keep, drop)
         self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1])
         self._rows.append(
             {

@@ -164,9 +164,9 @@ def replay(
 
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
-    """Return a mapper that never forgets or cuts a wall: with the true association nothing needs mending."""
+    """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
     walls = WallsConfig(
         trusted_sightings=config.walls.trusted_sightings, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0,
         claims=_NEVER,
     )  # fmt: skip
-    return replace(config, walls=walls)
+    return replace(config, walls=walls, duplicates=None)

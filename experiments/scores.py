@@ -131,6 +131,8 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
         else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & (labels >= 0)),
         "duplicate_lines": duplicate_lines(walls, labels, firm),
         "false_matches": votes.false_matches(),
+        "merges": votes.merges,
+        "false_merges": votes.false_merges,
         "distances": label_distances(corners(walls, step.chains), scenario.world.labels, to_true, joint),
     }
 

@@ -115,7 +115,7 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
         yield Step(
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
             update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
-            decider.still_open, command, path_length, time.perf_counter() - began, ended, reason,
+            decider.still_open, command, path_length, time.perf_counter() - began, ended, reason, update.merged,
         )  # fmt: skip
         if command is None:
             return

@@ -51,6 +51,8 @@ class Step:
     """`complete` or `stopped` at the last step, else None."""
     reason: str
     """What the robot is doing and why; at the last step, why it ended."""
+    merged: tuple[tuple[int, int], ...] = ()
+    """Ids (kept, dropped) of the walls that this scan showed to be one."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, 3]:

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from .backend import Backend, Joint, Observations
 from .chains import Chain, ChainConfig, connect
+from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import extract
 from .faint import FaintConfig, FaintLines
 from .gaps import Gaps, GapsConfig
@@ -29,6 +30,8 @@ class MapperConfig:
     walls: WallsConfig = field(default_factory=WallsConfig)
     faint: FaintConfig = field(default_factory=FaintConfig)
     gaps: GapsConfig = field(default_factory=GapsConfig)
+    duplicates: DuplicatesConfig | None = field(default_factory=DuplicatesConfig)
+    """None where one wall may stand in the map twice."""
     firm_heading_rad: float = float(np.deg2rad(6.0))
     """A segment with a larger sigma of direction is matched and stored but moves no estimate: where a line's direction
     keeps changing by many degrees, so does the direction in which it fixes the robot, and every change adds
@@ -45,6 +48,8 @@ class MapUpdate:
     """For each segment the id of the wall that it was fused into or began; -1 where it was not used."""
     map: StochasticMap
     chains: tuple[Chain, ...]
+    merged: tuple[tuple[int, int], ...]
+    """Ids (kept, dropped) of the entries that were found to be one wall."""
 
 
 Matcher = Callable[..., Matches]
@@ -90,12 +95,12 @@ class Mapper:
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, self._firm(matches, segments))
         owners = self._store(scan, segments, matches)
-        self._merge(matches, owners)
+        merged = self._merge(matches, owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         walls = self._walls.map(self.backend.belief)
         self._gaps.see(walls, scan)
         chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
-        return MapUpdate(segments, matches, owners, walls, chains)
+        return MapUpdate(segments, matches, owners, walls, chains, merged)
 
     def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
         """Return matches safe enough to relocate the robot by.
@@ -141,15 +146,28 @@ class Mapper:
             self.backend.remove(forgotten.tolist())
         return owners
 
-    def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> None:
-        """Make one of two walls that one segment lies on, if the joint covariance agrees."""
+    def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> tuple[tuple[int, int], ...]:
+        """Make one of two walls that one segment lies on, or that lie along each other, if the joint covariance agrees.
+
+        `owners` is brought up to date. Returns the ids (kept, dropped).
+        """
+        merged: list[tuple[int, int]] = []
+
+        def merge(keep: int, drop: int) -> None:
+            self._walls.merge(self.backend.belief, keep, drop)
+            self.backend.merge(keep, drop)
+            owners[owners == drop] = keep
+            merged.append((keep, drop))
+
         for pair in {tuple(sorted(map(int, bridge))) for bridge in matches.bridges}:
-            keep, drop = pair
             belief = self.backend.belief
             if np.all(np.isin(pair, belief.ids)) and same_line(belief.joint(pair), self.config.matching.gate):
-                self._walls.merge(belief, keep, drop)
-                self.backend.merge(keep, drop)
-                owners[owners == drop] = keep
+                merge(*pair)
+        if self.config.duplicates is not None:
+            touched = set(owners[owners >= 0].tolist())
+            while twice := duplicate_of(self._walls.map(self.backend.belief), touched, self.config.duplicates):
+                merge(*twice)
+        return tuple(merged)
 
 
 def _both(clear: Matches, again: Matches) -> Matches:

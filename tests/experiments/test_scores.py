@@ -78,6 +78,22 @@ def test_a_line_is_labelled_by_its_beams_and_a_wrong_fusion_is_counted(truth):
     assert 9 not in votes.beams
 
 
+def test_lines_that_were_merged_are_labelled_together_and_a_wrong_merge_is_counted(truth):
+    votes = Votes(truth)
+    beams = np.full(180, -1)
+    beams[10:30], beams[30:40], beams[50:60] = 0, 0, 1
+    for line, (first, last) in {7: (10, 29), 8: (30, 39), 9: (50, 59)}.items():
+        votes.add(one_segment(first, last), np.array([line]), beams)
+    votes.merge(7, 8)
+    assert (votes.merges, votes.false_merges, votes.false_matches()) == (1, 0, 0)
+    assert votes.beams[7].tolist()[:2] == [30, 0]
+    votes.merge(7, 9)
+    assert (votes.merges, votes.false_merges, votes.false_matches()) == (2, 1, 1)
+    # A line of which no beam was ever counted proves nothing.
+    votes.merge(7, 12)
+    assert (votes.merges, votes.false_merges) == (3, 1)
+
+
 def test_a_segment_across_the_seam_counts_its_own_beams(truth):
     votes = Votes(truth)
     beams = np.full(180, 1)

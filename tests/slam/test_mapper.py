@@ -175,3 +175,23 @@ def test_extents_and_ends_follow_the_line_they_are_measured_along():
     np.testing.assert_allclose(off, np.repeat(r[:, None], 2, axis=1), atol=1e-12)
     along = last.map.ends_world[:, 1] - last.map.ends_world[:, 0]
     np.testing.assert_allclose(np.hypot(*along.T), last.map.extents[:, 1] - last.map.extents[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_walls_that_were_entered_twice_are_merged(backend):
+    """Matching is blind for two scans, so that all walls are entered again."""
+    scans = {"at": 0}
+
+    def blind(segments, walls, joint, config, *, clear_only=False):
+        scans["at"] += clear_only
+        if scans["at"] in (3, 4):
+            every, none = np.arange(len(segments)), NO_MATCHES
+            return Matches(none.pairs, none.distances, none.bridges, every, none.doubtful, {})
+        return match(segments, walls, joint, config, clear_only=clear_only)
+
+    updates = list(walk(SQUARE, PLACES * 2, backend, matcher=blind))
+    last = updates[-1]
+    assert sum(len(update.merged) for update in updates) >= 4
+    assert len(last.map) == 4
+    assert [chain.is_closed for chain in last.chains] == [True]
+    assert set(last.walls_of_segments.tolist()) <= {-1, *last.map.ids.tolist()}

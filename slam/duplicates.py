@@ -1,0 +1,74 @@
+"""One wall that stands in the map twice: found by where the entries lie, believed by their joint covariance."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .backend import Joint
+from .geometry.lines import directions, normals
+from .matching import same_line
+from .stochastic_map import StochasticMap
+
+
+@dataclass(frozen=True)
+class DuplicatesConfig:
+    """When two entries of a map may be one wall."""
+
+    gate: float = 0.99
+    """Probability level of the chi-square gate on the difference of the two lines."""
+    turn_rad: float = float(np.deg2rad(5.0))
+    """Largest difference in direction; the other face of a wall differs by pi."""
+    across_m: float = 0.05
+    """Largest distance of the shorter one from the other's line, at both its ends: a wall's thickness or a niche is
+    0.1 m deep, however little is known about where the two stand."""
+    touch_m: float = 0.03
+    """Along the line they overlap, or stand no farther apart than this."""
+
+
+def duplicate_of(
+    walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig = DuplicatesConfig()
+) -> tuple[int, int] | None:
+    """Return the ids (older, younger) of two entries of one wall, one of them among `touched`, or None.
+
+    The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
+    uncertainty between the two, is what the bounds of geometry are for.
+    """
+    pairs = lying_along(walls, touched, config)
+    if not len(pairs):
+        return None
+    ids = np.unique(pairs)
+    joint = walls.belief.joint(ids)
+    for pair, rows in zip(pairs.tolist(), np.searchsorted(ids, pairs), strict=True):
+        if same_line(_of_two(joint, rows), config.gate):
+            return pair[0], pair[1]
+    return None
+
+
+def lying_along(walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig) -> Int[np.ndarray, "p 2"]:
+    """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position."""
+    firm = np.flatnonzero(~walls.tentative)
+    ours = firm[np.isin(walls.ids[firm], list(touched))]
+    alpha = walls.belief.means[:, 0]
+    near = np.argwhere(np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad))
+    pairs = np.stack([ours[near[:, 0]], firm[near[:, 1]]], axis=-1)
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    ends, length = walls.ends_world, walls.extents[:, 1] - walls.extents[:, 0]
+    order = np.argsort(length[pairs], axis=1)
+    shorter, longer = np.take_along_axis(pairs, order, axis=1).T
+    off = ends[shorter] - ends[longer, :1]
+    across = np.abs(_dot(off, normals(alpha[longer]))).max(axis=1)
+    along = _dot(off, directions(alpha[longer]))
+    apart = np.maximum(along[:, 0] - length[longer], -along[:, 1])
+    return walls.ids[pairs[(across <= config.across_m) & (apart <= config.touch_m)]]
+
+
+def _dot(points: Float[np.ndarray, "p 2 2"], vectors: Float[np.ndarray, "p 2"]) -> Float[np.ndarray, "p 2"]:
+    return np.einsum("pei,pi->pe", points, vectors)
+
+
+def _of_two(joint: Joint, rows: Int[np.ndarray, "2"]) -> Joint:
+    """Return the pose and two of the lines."""
+    index = np.concatenate([np.arange(3), (3 + 2 * rows[:, None] + np.arange(2)).ravel()])
+    return Joint(joint.mean[index], joint.cov[np.ix_(index, index)], joint.anchors[rows])
