@@ -73,6 +73,8 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("pose NEES in the 95 % band", _number(summary["pose_nees_in_band"])),
         ("map ANEES (1 is ideal)", _number(summary["map_anees"])),
     ]
+    if home := summary["return_to_start"]:
+        rows.append(("from the start: believed, true", f"{home['distance_m']:.2f} m, {home['distance_true_m']:.2f} m"))
     rows += [
         (f"distance {pair}", f"{_number(d['mapped_m'])} m (true {d['true_m']:.2f} m)")
         for pair, d in list(summary["distances"].items())[:6]

@@ -8,6 +8,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from explore.limits import Limits
 from explore.mission import MissionConfig
 from explore.strategies import STRATEGIES, Strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
@@ -49,8 +50,16 @@ class TrialConfig:
     """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
     scale: float | None = None
     """Metres per pixel or drawing unit, for files that do not state it."""
+    max_path_m: float | None = None
+    time_limit_s: float | None = None
+    """On the robot's own clock."""
     robot: RobotConfig = field(default_factory=RobotConfig)
     mission: MissionConfig = field(default_factory=MissionConfig)
+
+    @property
+    def limits(self) -> Limits:
+        """What ends the run early."""
+        return Limits(self.max_steps, self.max_path_m, self.time_limit_s)
 
 
 @runtime_checkable
@@ -108,6 +117,9 @@ def check(config: TrialConfig) -> None:
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")
     if config.max_steps < 1:
         raise UsageError(f"expected at least 1 step, found --max-steps {config.max_steps}: raise it")
+    for option, limit in (("--max-path", config.max_path_m), ("--time-limit", config.time_limit_s)):
+        if limit is not None and not limit > 0:
+            raise UsageError(f"expected a limit above 0, found {option} {limit:g}: raise it")
 
 
 def build(config: TrialConfig, world: World | None = None) -> Scenario:

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from explore.homing import HOME_M
+from explore.outcome import Outcome
 from explore.step import Step
 from slam.backend import Joint
 from slam.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
@@ -18,16 +20,27 @@ from .records import Log
 from .scenario import Scenario
 from .swept import swept
 
+EXIT_STATUS = {Outcome.FAILED: 1, Outcome.INTERRUPTED: 130}
+"""What the command ends in; 0 for every other outcome."""
+
 
 @dataclass(frozen=True)
 class Ending:
     """How a run ended."""
 
-    status: str
-    """`complete`, `stopped` or `failed`."""
+    outcome: Outcome
     reason: str
-    exit_status: int
     traceback: str = ""
+
+    @property
+    def status(self) -> str:
+        """`complete`, `stopped` or `failed`."""
+        return self.outcome.status
+
+    @property
+    def exit_status(self) -> int:
+        """What the command ends in."""
+        return EXIT_STATUS.get(self.outcome, 0)
 
 
 def pose_nees(log: Log) -> Float[np.ndarray, " s"]:
@@ -78,6 +91,7 @@ def summarise(
         "path_length_true_m": scenario.robot.record.path_length_m,
         "drive_time_s": scenario.robot.record.drive_time_s,
         "collisions": scenario.robot.record.collisions,
+        "return_to_start": _return(log) if config.mission.return_to_start else None,
         "open_ends": int(log.open_ends[-1]),
         "set_aside": [
             {"wall": int(end.wall), "side": int(end.side), "position_m": end.position_world.tolist(), "why": end.reason}
@@ -87,6 +101,12 @@ def summarise(
         **_pose_scores(log, config.errorless),
         "step_ms": _step_ms(log),
     }
+
+
+def _return(log: Log) -> dict[str, Any]:
+    """Return how far from its start the robot is at the end, m: as it believes, and truly."""
+    believed, true = (float(np.hypot(*(p[-1] - p[0])[:2])) for p in (log.estimated_world, log.true_world))
+    return {"reached": believed <= HOME_M, "distance_m": believed, "distance_true_m": true}
 
 
 def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:

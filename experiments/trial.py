@@ -2,21 +2,23 @@
 
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from explore.certificate import Certificate, certify
+from explore.limits import limited
 from explore.mission import explore_mission
+from explore.outcome import Outcome
 from explore.step import Step
 from sim.worlds import World
 from slam.backend import Joint
 
 from .association import Votes
+from .certificate import certificate_record
 from .records import Log, Recorder
-from .scenario import Scenario, TrialConfig, build
+from .scenario import Scenario, TrialConfig, UsageError, build
 from .scores import Ending, run_keys, summarise
 from .truth import truth_of
-
-INTERRUPTED = 130
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class TrialResult:
     last: Step | None
     joint: Joint | None
     """Pose and all lines at the last step."""
+    certificate: Certificate | None
     summary: dict[str, Any]
 
 
@@ -39,7 +42,8 @@ Mission = Callable[[Scenario], Iterator[Step]]
 def default_mission(scenario: Scenario) -> Iterator[Step]:
     """Return the closed loop over the simulated robot."""
     assert scenario.strategy is not None, "expected a strategy to explore by"
-    return explore_mission(scenario.robot, scenario.backend, scenario.strategy, scenario.config.mission)
+    config = replace(scenario.config.mission, max_steps=scenario.config.max_steps)
+    return explore_mission(scenario.robot, scenario.backend, scenario.strategy, config)
 
 
 def run_trial(
@@ -64,35 +68,37 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     recorder.close()
     if recorder.last is None:
         summary = _bare_summary(scenario, ending)
-        return TrialResult(scenario, ending, None, recorder.votes, None, None, summary)
-    log = recorder.log()
-    summary = summarise(scenario, log, recorder.votes, recorder.last, recorder.joint, ending)
-    return TrialResult(scenario, ending, log, recorder.votes, recorder.last, recorder.joint, summary)
+        return TrialResult(scenario, ending, None, recorder.votes, None, None, None, summary)
+    log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
+    certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep)
+    summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending)
+    summary |= {"certificate": certificate_record(certificate)}
+    return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary)
 
 
 def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
-    limit = scenario.config.max_steps
     try:
-        for step in mission(scenario):
+        for step in limited(mission(scenario), scenario.config.limits):
             recorder.add(step)
             watch(step)
-            if step.ended is not None:
-                return Ending(step.ended, step.reason, 1 if step.ended == "failed" else 0)
-            if len(recorder) >= limit:
-                return Ending("stopped", f"the limit of {limit} steps (--max-steps)", 0)
+            if step.outcome is not None:
+                return Ending(step.outcome, step.reason)
     except KeyboardInterrupt:
-        return Ending("stopped", "interrupted by Ctrl-C", INTERRUPTED)
+        return Ending(Outcome.INTERRUPTED, "interrupted by Ctrl-C")
+    except UsageError:
+        raise
     except Exception as error:  # a run that fails keeps what it has computed; the trace goes beside the results
         words = " ".join(str(error).split())
-        return Ending("failed", f"{type(error).__name__}: {words}", 1, traceback.format_exc())
-    return Ending("stopped", "the mission ended without saying why", 0)
+        return Ending(Outcome.FAILED, f"{type(error).__name__}: {words}", traceback.format_exc())
+    return Ending(Outcome.FAILED, "the mission ended without saying why")
 
 
 def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a single step: null for all that was not measured."""
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage swept pose_rmse_m"
-        " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges false_merges step_ms"
+        " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges false_merges"
+        " return_to_start certificate step_ms"
     )
     return {
         **run_keys(scenario, ending),

@@ -13,6 +13,7 @@ from slam.robot import MotionCommand
 
 from .goal import Goal, SetAside
 from .navigation import route
+from .outcome import Outcome
 from .strategies import Choice, Place, Situation, Strategy
 from .strategies.nearest import nearest_unseen
 from .visibility import followed_wall
@@ -79,8 +80,13 @@ class Explorer:
         return tuple(aside for key, aside in self.set_aside.items() if key in self._open)
 
     @property
-    def closing_words(self) -> str:
+    def outcome(self) -> Outcome:
         """Why there is nowhere left to go."""
+        return Outcome.ENDS_LEFT if self.still_open else Outcome.ALL_CLOSED
+
+    @property
+    def closing_words(self) -> str:
+        """The same in words."""
         left = len(self.still_open)
         return "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
 

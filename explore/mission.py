@@ -18,6 +18,9 @@ from slam.robot import MotionCommand, Odometry, Robot
 from .explorer import Explorer, ExplorerConfig
 from .free_space import FreeSpace, FreeSpaceConfig
 from .goal import Goal, SetAside
+from .homing import Homing
+from .limits import Limits, limited
+from .outcome import Outcome
 from .passenger import Passenger
 from .step import Step
 from .strategies import Strategy
@@ -34,17 +37,33 @@ class MissionConfig:
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     max_steps: int = 100_000
     """A mission that takes longer ends as `stopped`."""
+    return_to_start: bool = False
+    """Once there is nothing left to explore, drive back to where the mission began."""
 
 
 @runtime_checkable
 class Decider(Protocol):
     """Who chooses where to go: the explorer, or a passenger of a recorded robot."""
 
-    set_aside: dict[tuple[int, int], SetAside]
-    goal: Goal | None
-    walls_to_follow: tuple[int, ...]
-    needs_floor: bool
-    """Whether it plans paths; nobody else reads the free space."""
+    @property
+    def set_aside(self) -> dict[tuple[int, int], SetAside]:
+        """The ends that exploration gave up, by (wall id, side)."""
+        ...
+
+    @property
+    def goal(self) -> Goal | None:
+        """The open end or the place that the robot is about."""
+        ...
+
+    @property
+    def walls_to_follow(self) -> tuple[int, ...]:
+        """The walls along which the goal is approached."""
+        ...
+
+    @property
+    def needs_floor(self) -> bool:
+        """Whether it plans paths; nobody else reads the free space."""
+        ...
 
     @property
     def still_open(self) -> tuple[SetAside, ...]:
@@ -57,8 +76,13 @@ class Decider(Protocol):
         ...
 
     @property
-    def closing_words(self) -> str:
+    def outcome(self) -> Outcome:
         """Why there is nothing left to do."""
+        ...
+
+    @property
+    def closing_words(self) -> str:
+        """The same in words."""
         ...
 
     def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
@@ -77,8 +101,10 @@ def explore_mission(
 
     A `mapper` made elsewhere (with oracles in place of extraction or matching) takes the place of the usual one.
     """
-    explorer = Explorer(strategy, backend.belief.pose_world[:2].copy(), config.explorer)
-    return _mission(robot, mapper or Mapper(backend, config.mapper), explorer, config)
+    start = backend.belief.pose_world[:2].copy()
+    explorer = Explorer(strategy, start, config.explorer)
+    decider = Homing(explorer, start, config.explorer.following) if config.return_to_start else explorer
+    return limited(_mission(robot, mapper or Mapper(backend, config.mapper), decider, config), Limits(config.max_steps))
 
 
 def ride_mission(
@@ -89,7 +115,8 @@ def ride_mission(
     mapper: Mapper | None = None,
 ) -> Iterator[Step]:
     """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step."""
-    return _mission(robot, mapper or Mapper(backend, config.mapper), Passenger(scans), config)
+    steps = _mission(robot, mapper or Mapper(backend, config.mapper), Passenger(scans), config)
+    return limited(steps, Limits(config.max_steps))
 
 
 def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConfig) -> Iterator[Step]:
@@ -104,18 +131,16 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
             free_space.integrate(update.map.belief.pose_world, scan)
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
-        ended, command = None, None
-        if index + 1 >= config.max_steps:
-            ended, reason = "stopped", f"the limit of {config.max_steps} steps"
-        else:
-            command = decider.command(Surroundings(update.map, free_space, scan), update.chains, graph.graph)
-            reason = decider.doing
-            if command is None:
-                ended, reason = "complete", decider.closing_words
+        command = decider.command(Surroundings(update.map, free_space, scan), update.chains, graph.graph)
+        outcome, reason = None, decider.doing
+        if command is None:
+            outcome, reason = decider.outcome, decider.closing_words
+            if outcome is Outcome.ALL_CLOSED and not update.chains:
+                outcome, reason = Outcome.NO_WALL, "no wall was found"
         yield Step(
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
             update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
-            decider.still_open, command, path_length, time.perf_counter() - began, ended, reason, update.merged,
+            decider.still_open, command, path_length, time.perf_counter() - began, outcome, reason, update.merged,
         )  # fmt: skip
         if command is None:
             return

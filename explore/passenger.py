@@ -8,6 +8,7 @@ from slam.chains import Chain
 from slam.robot import MotionCommand
 
 from .goal import Goal, SetAside
+from .outcome import Outcome
 from .wall_following import Surroundings
 
 
@@ -22,6 +23,7 @@ class Passenger:
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()
         self.doing = "riding along"
+        self.outcome = Outcome.RECORDING_ENDED
         self.closing_words = "the recording has ended"
 
     def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:

@@ -16,6 +16,7 @@ from slam.stochastic_map import StochasticMap
 
 from .free_space import FreeSpace
 from .goal import Goal, SetAside
+from .outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,17 @@ class Step:
     """By the wheels, so far."""
     seconds: float
     """Wall-clock time of this step, sense to command."""
-    ended: str | None
-    """`complete` or `stopped` at the last step, else None."""
+    outcome: Outcome | None
+    """Why the mission is over, at its last step, else None."""
     reason: str
     """What the robot is doing and why; at the last step, why it ended."""
     merged: tuple[tuple[int, int], ...] = ()
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
+
+    @property
+    def ended(self) -> str | None:
+        """`complete` or `stopped` at the last step, else None."""
+        return None if self.outcome is None else self.outcome.status
 
     @property
     def pose_world(self) -> Float[np.ndarray, 3]:

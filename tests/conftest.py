@@ -1,4 +1,4 @@
-"""What the tests of exploration share."""
+"""What all tests share."""
 
 import jaxtyping
 import pytest

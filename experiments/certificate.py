@@ -1,0 +1,47 @@
+"""The certificate of a mission as plain values, for summary.json and map.geojson."""
+
+from typing import Any
+
+import shapely
+
+from explore.certificate import Certificate, Contour, LeftOpen, LeftUnseen
+
+
+def certificate_record(certificate: Certificate) -> dict[str, Any]:
+    """Return a certificate as it stands in summary.json; areas in m^2, null where no free space was kept."""
+    unseen = certificate.unseen
+    return {
+        "outcome": str(certificate.outcome),
+        "contours": [
+            {**contour_record(contour), "polygon": shapely.get_coordinates(contour.polygon).tolist()}
+            for contour in certificate.contours
+        ],
+        "open_ends": [
+            {**open_end_record(end), "position_m": end.position_world.tolist()} for end in certificate.open_ends
+        ],
+        "unseen_borders": None
+        if unseen is None
+        else [{**unseen_record(border), "position_m": border.cells_world.mean(axis=0).tolist()} for border in unseen],
+        "floor_m2": certificate.floor_m2,
+        "unseen_m2": certificate.unseen_m2,
+    }
+
+
+def contour_record(contour: Contour) -> dict[str, Any]:
+    """Return what is said of one contour besides its polygon."""
+    return {
+        "chain": contour.chain,
+        "contour": "island" if contour.is_island else "room",
+        "walls": list(contour.walls),
+        "area_m2": float(contour.polygon.area),
+    }
+
+
+def open_end_record(end: LeftOpen) -> dict[str, Any]:
+    """Return what is said of one open end besides its position."""
+    return {"wall": end.wall, "side": end.side, "why": end.why}
+
+
+def unseen_record(border: LeftUnseen) -> dict[str, Any]:
+    """Return what is said of one border of unseen floor besides its place."""
+    return {"length_m": border.length_m, "why": border.why}

@@ -1,0 +1,169 @@
+"""What a mission can vouch for at its end: the contours it closed, the ends it left and why, the floor it never saw."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from jaxtyping import Bool, Float
+from PIL import Image, ImageDraw
+from shapely.geometry.polygon import orient
+
+from slam.chains import Chain
+from slam.stochastic_map import StochasticMap
+
+from .free_space import FreeSpace
+from .outcome import Outcome
+from .paths import PathConfig
+from .step import Step
+from .unseen import unseen_borders
+
+LEAST_BORDER_CELLS = 4
+"""Narrower borders are not worth a visit: they are gaps between beams."""
+WALL_FRINGE_M = 0.1
+"""Floor this near to a closed contour counts as seen: two cells, into which walls and their errors reach."""
+
+LEAST_AREA_M2 = 1e-4
+"""What surrounds less has no inside."""
+
+
+@dataclass(frozen=True)
+class Contour:
+    """A closed chain as an area."""
+
+    chain: int
+    """Index of the chain."""
+    walls: tuple[int, ...]
+    is_island: bool
+    """Whether the robot drives around it; else it is a room, and the robot drives inside."""
+    polygon: shapely.Polygon
+    """Valid, without holes, counter-clockwise, world frame, m."""
+
+
+@dataclass(frozen=True)
+class LeftOpen:
+    """An open end that is left."""
+
+    wall: int
+    side: int
+    position_world: Float[np.ndarray, "2"]
+    why: str
+
+
+@dataclass(frozen=True)
+class LeftUnseen:
+    """A border between floor that can be driven to and floor that was never seen."""
+
+    cells_world: Float[np.ndarray, "n 2"]
+    """The cells on the near side, m."""
+    length_m: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The end of a mission, with its reasons."""
+
+    outcome: Outcome
+    contours: tuple[Contour, ...]
+    open_ends: tuple[LeftOpen, ...]
+    unseen: tuple[LeftUnseen, ...] | None
+    """None where nobody kept the free space (a recorded robot)."""
+    floor_m2: float
+    """Area inside the closed rooms, without their islands; 0 where no room is closed."""
+    unseen_m2: float | None
+    """What of it no scan has seen, the fringe of the walls left out; None where no room is closed, or as `unseen`."""
+
+
+def certify(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> Certificate:
+    """Return what the last step of a mission can vouch for; `sweep` says whether unseen floor was to be visited.
+
+    It reads the free space as it is now, so ask before the mission goes on.
+    """
+    found = contours(step.map, step.chains)
+    floor = floor_of(found)
+    kept = step.free_space.evidence.size > 0
+    return Certificate(
+        outcome,
+        found,
+        left_open(step, outcome),
+        left_unseen(step, outcome, paths, sweep) if kept else None,
+        float(floor.area),
+        unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
+    )
+
+
+def contours(walls: StochasticMap, chains: tuple[Chain, ...]) -> tuple[Contour, ...]:
+    """Return the closed chains as areas; free side on the left, so a room is run through counter-clockwise."""
+    found = []
+    for index, chain in enumerate(chains):
+        if not chain.is_closed:
+            continue
+        # A slab of two walls has no area between its two corners, only between its four ends.
+        ends = walls.ends_world[walls.belief.rows(chain.walls)].reshape(-1, 2)
+        for ring in (chain.corners_world, ends):
+            polygon = _valid(ring)
+            if polygon is not None:
+                found.append(Contour(index, chain.walls, _turns_right(ring), polygon))
+                break
+    return tuple(found)
+
+
+def _turns_right(ring: Float[np.ndarray, "n 2"]) -> bool:
+    """Return whether a ring is run through clockwise, by the sign of the area that it surrounds."""
+    after = np.roll(ring, -1, axis=0)
+    return bool(np.sum(ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) < 0.0)
+
+
+def _valid(ring: Float[np.ndarray, "n 2"]) -> shapely.Polygon | None:
+    """Return the (largest) area that a ring surrounds; None where it surrounds none."""
+    if len(ring) < 3:
+        return None
+    parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapely.Polygon(ring))))
+    areas = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > LEAST_AREA_M2]
+    return orient(shapely.Polygon(max(areas, key=lambda part: part.area).exterior), 1.0) if areas else None
+
+
+def floor_of(found: tuple[Contour, ...]) -> shapely.Polygon | shapely.MultiPolygon:
+    """Return the inside of the closed rooms without their islands."""
+    rooms = shapely.union_all([contour.polygon for contour in found if not contour.is_island])
+    islands = shapely.union_all([contour.polygon for contour in found if contour.is_island])
+    floor = rooms.difference(islands)
+    return shapely.MultiPolygon([p for p in shapely.get_parts(floor) if isinstance(p, shapely.Polygon)])
+
+
+def left_open(step: Step, outcome: Outcome) -> tuple[LeftOpen, ...]:
+    """Return the open ends of the last map, each with the reason why it is one."""
+    reasons = {(end.wall, end.side): end.reason for end in step.set_aside}
+    otherwise = "not explored yet" if outcome.status != "complete" else "seen at the end"
+    return tuple(
+        LeftOpen(end.wall, end.side, end.position_world, reasons.get((end.wall, end.side), otherwise))
+        for chain in step.chains
+        for end in chain.open_ends
+    )
+
+
+def left_unseen(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen, ...]:
+    """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
+    why = "not visited yet" if outcome.status != "complete" else "visited in vain, or the way was blocked"
+    why = why if sweep else "unseen floor was not to be visited"
+    borders = unseen_borders(step.free_space, step.pose_world[:2], paths, LEAST_BORDER_CELLS)
+    cell = step.free_space.config.cell_m
+    return tuple(LeftUnseen(border, len(border) * cell, why) for border in borders)
+
+
+def unseen_area(free_space: FreeSpace, floor: shapely.Polygon | shapely.MultiPolygon) -> float:
+    """Return how much of a floor no scan has seen, m2, by cells."""
+    image = Image.new("1", free_space.shape[::-1])
+    brush = ImageDraw.Draw(image)
+    parts = [part for part in shapely.get_parts(floor) if isinstance(part, shapely.Polygon) and not part.is_empty]
+    for rings, inside in (([p.exterior for p in parts], 1), ([hole for p in parts for hole in p.interiors], 0)):
+        for ring in rings:
+            cells = _continuous_cells(free_space, shapely.get_coordinates(ring))
+            brush.polygon([(float(x), float(y)) for y, x in cells], fill=inside)
+    unknown: Bool[np.ndarray, "h w"] = free_space.evidence == 0
+    return int(np.count_nonzero(unknown & np.asarray(image))) * free_space.config.cell_m**2
+
+
+def _continuous_cells(free_space: FreeSpace, points_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+    """Return points as fractions of (row, column), whole numbers at the centres of cells."""
+    return ((points_world - free_space.origin_world) / free_space.config.cell_m - 0.5)[:, ::-1]

@@ -1,0 +1,28 @@
+"""Why a mission is over, as one of a few names; the words beside it say which end, which limit, which fault."""
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """Why a mission is over."""
+
+    ALL_CLOSED = "all-closed"
+    """Every chain of the map is closed."""
+    ENDS_LEFT = "ends-left"
+    """No open end that is left can be reached or closed; each has its reason."""
+    NO_WALL = "no-wall"
+    """Nothing was found that could be explored."""
+    RECORDING_ENDED = "recording-ended"
+    """A recorded robot was ridden to the end of its recording."""
+    STEP_LIMIT = "step-limit"
+    PATH_LIMIT = "path-limit"
+    TIME_LIMIT = "time-limit"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"
+
+    @property
+    def status(self) -> str:
+        """`complete`: no reachable open end is left; `stopped`: somebody or a limit ended it; or `failed`."""
+        if self in (Outcome.ALL_CLOSED, Outcome.ENDS_LEFT, Outcome.NO_WALL, Outcome.RECORDING_ENDED):
+            return "complete"
+        return "failed" if self is Outcome.FAILED else "stopped"

@@ -1,0 +1,151 @@
+"""Limits, the way home, and the certificate that a mission leaves."""
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from explore.certificate import certify, contours, floor_of, unseen_area
+from explore.explorer import Explorer, ExplorerConfig
+from explore.free_space import FreeSpace
+from explore.homing import Homing
+from explore.limits import Limits, limited
+from explore.mission import MissionConfig, explore_mission
+from explore.outcome import Outcome
+from explore.paths import PathConfig
+from explore.strategies import STRATEGIES
+from explore.wall_following import Surroundings
+from sim.robot import SimulatedRobot
+from sim.worlds import World
+from slam.backend import Belief
+from slam.backends import BACKENDS
+from slam.chains import Chain
+from slam.geometry.lines import normals, through
+from slam.stochastic_map import StochasticMap
+
+ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))
+START = np.array([0.7, 0.7, 0.3])
+
+
+def begun():
+    world = World("drawn", ROOM, START, {})
+    backend = BACKENDS["full-ekf"].make(START.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
+    return SimulatedRobot(world, 1, errorless=True), backend
+
+
+def steps(**changes):
+    robot, backend = begun()
+    return explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(**changes)), robot
+
+
+def closed_map(ring):
+    """Return the map and the chain of one closed ring of points."""
+    faces = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+    lines, anchors = through(faces), faces.mean(axis=1)
+    d = lines[:, 1] - np.sum(normals(lines[:, 0]) * anchors, axis=-1)
+    half = 0.5 * np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+    belief = Belief(
+        np.zeros(3), np.eye(3), np.arange(len(ring)), anchors, np.stack([lines[:, 0], d], axis=-1), lambda ids: None
+    )
+    walls = StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(len(ring), 5), np.zeros(len(ring), bool))
+    return walls, Chain(tuple(range(len(ring))), np.roll(ring, -1, axis=0), ())
+
+
+@pytest.mark.usefixtures("_unchecked")
+@pytest.mark.parametrize(
+    ("limits", "outcome", "word"),
+    [
+        (Limits(steps=7), Outcome.STEP_LIMIT, "7 steps"),
+        (Limits(path_m=0.5), Outcome.PATH_LIMIT, "0.5 m"),
+        (Limits(time_s=3.0), Outcome.TIME_LIMIT, "3 s"),
+    ],
+    ids=str,
+)
+def test_a_limit_ends_a_mission_at_the_first_step_that_reaches_it(limits, outcome, word):
+    mission, _ = steps()
+    *before, last = limited(mission, limits)
+    assert (last.outcome, last.ended, last.command) == (outcome, "stopped", None)
+    assert word in last.reason
+    assert all(step.outcome is None and limits.reached(step) is None for step in before)
+    reached = {"step": last.index + 1 == 7, "path": last.path_length_m >= 0.5, "time": last.time_s >= 3.0}
+    assert reached[outcome.split("-")[0]]
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_the_island():
+    mission, robot = steps(return_to_start=True)
+    *_, last = mission
+    assert last.outcome is Outcome.ALL_CLOSED
+    assert "back at the start" in last.reason
+    assert np.hypot(*(robot.true_pose - START)[:2]) <= 0.2
+    certificate = certify(last, last.outcome, PathConfig(), sweep=True)
+    assert sorted(contour.is_island for contour in certificate.contours) == [False, True]
+    assert all(contour.polygon.is_valid for contour in certificate.contours)
+    assert certificate.floor_m2 == pytest.approx(ROOM.area, abs=0.05)
+    assert certificate.open_ends == ()
+    assert certificate.unseen == ()
+    assert certificate.unseen_m2 == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_what_a_stopped_mission_has_not_seen_yet_is_told():
+    mission, _ = steps(max_steps=2)
+    *_, last = mission
+    certificate = certify(last, last.outcome, PathConfig(), sweep=True)
+    assert {end.why for end in certificate.open_ends} == {"not explored yet"}
+    assert len(certificate.open_ends) == sum(len(chain.open_ends) for chain in last.chains) > 0
+    assert certificate.unseen
+    assert {border.why for border in certificate.unseen} == {"not visited yet"}
+    assert all(border.length_m >= 0.2 for border in certificate.unseen)
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_a_start_that_cannot_be_reached_again_is_told():
+    mission, _ = steps()
+    *_, last = mission
+    explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
+    homing = Homing(explorer, np.array([2.0, 2.0]), ExplorerConfig().following)
+    around = Surroundings(last.map, last.free_space, last.scan)
+    assert homing.command(around, last.chains, nx.DiGraph()) is None
+    assert "the start cannot be reached" in homing.closing_words
+
+
+@settings(max_examples=60, deadline=None)
+@example([(-3.2109375, 0.0), (1.0, 2.0)])
+@given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=2, max_size=9, unique=True))
+def test_a_closed_chain_is_a_valid_polygon_whatever_its_corners(points):
+    ring = np.round(np.array(points), 2)
+    if min(np.hypot(*(ring - np.roll(ring, -1, axis=0)).T)) < 0.05:
+        return
+    walls, chain = closed_map(ring)
+    for contour in contours(walls, (chain,)):
+        assert contour.polygon.is_valid
+        assert contour.polygon.exterior.is_ccw
+        assert contour.polygon.area > 0
+
+
+def test_a_slab_of_two_walls_is_an_island_and_a_turned_room_no_island():
+    slab = np.array([[0.0, 0.0], [2.0, 0.0]])
+    walls, chain = closed_map(slab)
+    walls.belief.means[:, 1] -= 0.05
+    (contour,) = contours(walls, (chain,))
+    assert contour.is_island
+    assert contour.polygon.area == pytest.approx(0.2)
+    walls, chain = closed_map(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]))
+    (room,) = contours(walls, (chain,))
+    assert not room.is_island
+    assert floor_of((room,)).area == pytest.approx(2.0)
+
+
+def test_unseen_floor_is_measured_by_cells():
+    free_space = FreeSpace()
+    robot, _ = begun()
+    free_space.integrate(START, robot.sense())
+    cells = np.argwhere(free_space.evidence == 0)
+    points = free_space.points(cells)
+    floor = shapely.MultiPolygon([ROOM.buffer(-0.1)])
+    plain = np.count_nonzero(shapely.contains_xy(floor, points[:, 0], points[:, 1])) * 0.05**2
+    assert plain > 0.3
+    assert unseen_area(free_space, floor) == pytest.approx(plain, rel=0.15)
