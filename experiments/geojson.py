@@ -1,30 +1,44 @@
-"""The map as GeoJSON: walls, corners and chains with their covariances, in local metres."""
+"""The map as GeoJSON, in local metres: walls and corners with covariances, chains, what is left open or unseen."""
 
 from typing import Any
 
 import numpy as np
+import shapely
 
+from explore.certificate import Certificate, Contour, LeftOpen, LeftUnseen
 from explore.step import Step
 from slam.backend import Joint
 from slam.chains import Chain
 from slam.stochastic_map import StochasticMap
 
+from .certificate import contour_record, open_end_record, unseen_record
 from .corners import Corner, corners
+from .records import Log
 
-FRAME = "local metres of the map's world frame, x right, y up; not WGS 84 degrees"
+FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
 
 
-def map_geojson(step: Step, joint: Joint | None) -> dict[str, Any]:
-    """Return the map of one step; covariances of corners are null without the joint covariance."""
+def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: Log) -> dict[str, Any]:
+    """Return the map of the last step with what the mission can vouch for; covariances are null without `joint`.
+
+    RFC 7946 knows longitudes and latitudes only. A building's map has none, so the file says so twice: in words, and
+    as `"crs": null`, by which the GeoJSON of 2008 states that no reference system may be assumed.
+    """
     walls, chains = step.map, step.chains
     found = corners(walls, chains)
     return {
         "type": "FeatureCollection",
+        "name": "map",
+        "crs": None,
         "coordinate_system": FRAME,
         "features": [
+            *(_contour_feature(contour) for contour in certificate.contours),
+            *(_chain_feature(k, chain, walls) for k, chain in enumerate(chains) if not chain.is_closed),
             *_wall_features(walls, chains, joint),
             *(_corner_feature(k, corner, joint) for k, corner in enumerate(found)),
-            *(_chain_feature(k, chain, walls) for k, chain in enumerate(chains)),
+            *(_open_end_feature(end) for end in certificate.open_ends),
+            *(_unseen_feature(border) for border in certificate.unseen or ()),
+            _trajectory_feature(log),
         ],
     }
 
@@ -72,18 +86,28 @@ def _corner_feature(index: int, corner: Corner, joint: Joint | None) -> dict[str
     )
 
 
+def _contour_feature(contour: Contour) -> dict[str, Any]:
+    """Return a closed chain; the corners of the polygon are those of the chain."""
+    ring = shapely.get_coordinates(contour.polygon)
+    return _feature("Polygon", [ring], kind="chain", closed=True, **contour_record(contour))
+
+
 def _chain_feature(index: int, chain: Chain, walls: StochasticMap) -> dict[str, Any]:
-    properties = {
-        "kind": "chain",
-        "id": index,
-        "walls": chain.walls,
-        "closed": chain.is_closed,
-        "open_ends": [
-            {"wall": end.wall, "side": end.side, "position_m": end.position_world} for end in chain.open_ends
-        ],
-    }
-    if chain.is_closed and len(chain.corners_world) > 2:
-        ring = np.concatenate([chain.corners_world, chain.corners_world[:1]])
-        return _feature("Polygon", [ring], **properties)
+    """Return a chain that is open at both its ends."""
     ends = walls.ends_world[walls.belief.rows((chain.walls[0], chain.walls[-1]))]
-    return _feature("LineString", np.concatenate([ends[:1, 0], chain.corners_world, ends[1:, 1]]), **properties)
+    way = np.concatenate([ends[:1, 0], chain.corners_world, ends[1:, 1]])
+    return _feature("LineString", way, kind="chain", closed=False, chain=index, walls=chain.walls)
+
+
+def _open_end_feature(end: LeftOpen) -> dict[str, Any]:
+    return _feature("Point", end.position_world, kind="open-end", **open_end_record(end))
+
+
+def _unseen_feature(border: LeftUnseen) -> dict[str, Any]:
+    return _feature("MultiPoint", border.cells_world, kind="unseen", **unseen_record(border))
+
+
+def _trajectory_feature(log: Log) -> dict[str, Any]:
+    """Return the estimated way; a run of one step has a way of no length."""
+    way = log.estimated_world[:, :2] if len(log) > 1 else np.repeat(log.estimated_world[:, :2], 2, axis=0)
+    return _feature("LineString", way, kind="trajectory", steps=len(log), path_length_m=log.path_length_m[-1])

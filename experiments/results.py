@@ -13,9 +13,11 @@ from jaxtyping import Float
 
 from slam.consistency import pose_errors
 from slam.geometry.poses import wrap
+from viz.floor_plan import floor_plan
 
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .geojson import map_geojson
+from .occupancy import occupancy_files
 from .picture import picture_of
 from .records import Log
 from .scenario import TrialConfig
@@ -55,17 +57,25 @@ def _files(result: TrialResult) -> dict[str, Callable[[], bytes]]:
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()
     log, last = result.log, result.last
-    if log is None or last is None:
+    certificate = result.certificate
+    if log is None or last is None or certificate is None:
         return files
-    return files | {
+    title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
+    files |= {
         "log.npz": lambda: npz_bytes(log_arrays(result, log)),
         "map.npz": lambda: npz_bytes(map_arrays(result)),
-        "map.geojson": lambda: json_bytes(map_geojson(last, result.joint)),
+        "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
         "steps.csv": lambda: steps_csv(log),
         "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
         "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
+        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title),
         "map.png": lambda: picture_of(result),
     }
+    if last.free_space.evidence.size:
+        # Both come from one pass over the grid; a recorded robot keeps none.
+        files["map.pgm"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[0]
+        files["map.yaml"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[1]
+    return files
 
 
 def config_record(config: TrialConfig) -> dict[str, Any]:
