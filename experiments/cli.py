@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"chainslam: {error}", file=sys.stderr)
         return BAD_USAGE
     except KeyboardInterrupt:
-        print("chainslam: interrupted before anything was computed", file=sys.stderr)
+        print("chainslam: interrupted; files that were written are whole", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # Whoever read the output has left; Python would complain once more while closing it.

@@ -1,10 +1,9 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -22,6 +21,7 @@ from slam.robot import MotionCommand, Odometry, Scan
 from slam.walls import WallsConfig
 
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
+from .saved import read_trial
 from .scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, UsageError, check, load_world
 from .trial import TrialResult, run_scenario
 from .truth import truth_of
@@ -61,7 +61,7 @@ def read_run(log: Path) -> RecordedRun:
         arrays = read_log(log)
     except RecordingError as error:
         raise UsageError(str(error)) from error
-    return run_of(arrays, lambda: _trial_beside(log))
+    return run_of(arrays, lambda: read_trial(log.with_name("config.json")))
 
 
 def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:
@@ -77,19 +77,6 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
         trial(), recording, arrays["start_pose"], arrays["start_cov"], arrays["true_poses"],
         arrays["true_face_of_beam"],
     )  # fmt: skip
-
-
-def _trial_beside(log: Path) -> TrialConfig:
-    path = log.with_name("config.json")
-    try:
-        said: dict[str, Any] = json.loads(path.read_text())["trial"]
-        names = ("world", "backend", "strategy", "seed", "p0", "errorless")
-        start = None if said["start"] is None else tuple(said["start"])
-        return TrialConfig(**{name: said[name] for name in names}, start=start, scale=said["scale"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UsageError(
-            f"expected the run's config.json beside {log.name}, found none that fits: keep a run's files together"
-        ) from error
 
 
 class ReplayedRobot(RecordedRobot):

@@ -1,0 +1,158 @@
+"""How a run is stopped, and how it goes on."""
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.files import json_bytes
+from experiments.interrupts import first_interrupt_waits
+from experiments.saved import from_record, read_trial
+from experiments.scenario import TrialConfig, UsageError
+from explore.explorer import ExplorerConfig
+from explore.mission import MissionConfig
+
+ROOT = Path(__file__).parents[2]
+
+
+def timeless(folder):
+    """Return the bytes of a run's files without the times that its steps took."""
+    contents = {path.name: path.read_bytes() for path in folder.iterdir()}
+    summary = json.loads(contents["summary.json"])
+    contents["summary.json"] = json_bytes({key: value for key, value in summary.items() if key != "step_ms"})
+    rows = list(csv.reader(io.StringIO(contents["steps.csv"].decode())))
+    contents["steps.csv"] = [row[:-1] for row in rows]
+    return contents
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_a_resumed_run_leaves_the_bytes_of_one_that_was_never_stopped(tmp_path, capsys):
+    stopped, whole = tmp_path / "stopped", tmp_path / "whole"
+    explore = ["explore", "paper-fig8", "--seed", "3", "--no-sweep", "--p0", "large"]
+    assert main([*explore, "--max-path", "1.5", "--out", str(stopped)]) == 0
+    before = json.loads((stopped / "summary.json").read_text())
+    assert before["certificate"]["outcome"] == "path-limit"
+    assert 1.5 <= before["path_length_m"] < 1.7
+    assert main(["explore", "--resume", str(stopped), "--max-steps", "45"]) == 0
+    assert main([*explore, "--max-steps", "45", "--out", str(whole)]) == 0
+    assert json.loads((whole / "summary.json").read_text())["steps"] == 45 > before["steps"]
+    assert timeless(stopped) == timeless(whole)
+    # A limit that lies before the end of the saved run costs it nothing.
+    assert main(["explore", "--resume", str(stopped), "--max-steps", "20"]) == 2
+    assert timeless(stopped) == timeless(whole)
+    assert "left as they were" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_a_run_that_cannot_be_driven_again_is_told(tmp_path, capsys):
+    assert main(["explore", "paper-fig8", "--max-steps", "4", "--out", str(tmp_path)]) == 0
+    with np.load(tmp_path / "log.npz") as log:
+        arrays = dict(log)
+    arrays["ranges_m"][2, 5] += 0.5
+    np.savez(tmp_path / "log.npz", **arrays)
+    capsys.readouterr()
+    assert main(["explore", "--resume", str(tmp_path), "--max-steps", "6"]) == 2
+    said = capsys.readouterr().err
+    assert "from step 2 on" in said
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--resume", "nowhere"],
+        ["--resume", ".", "--max-path", "0"],
+        ["paper-fig8", "--resume", "."],
+        ["--resume", ".", "--seed", "2"],
+        ["paper-fig8", "--max-path", "0"],
+        ["paper-fig8", "--time-limit", "-1"],
+        ["paper-fig8", "--time-limit", "nan"],
+        ["--max-steps", "5"],
+    ],
+    ids=" ".join,
+)
+def test_bad_limits_and_bad_resumes_end_in_two_and_one_line(arguments, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config.json").write_bytes(json_bytes({"trial": asdict(TrialConfig("paper-fig8"))}))
+    assert main(["explore", *arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("chainslam: expected ")
+    assert len(said.err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["config.json"]
+
+
+def test_settings_are_read_as_they_were_written(tmp_path):
+    config = TrialConfig(
+        "map.svg", "graph", seed=2**63, start=(1.0, 2.0), max_path_m=3.0,
+        mission=MissionConfig(explorer=ExplorerConfig(sweep=False), return_to_start=True),
+    )  # fmt: skip
+    path = tmp_path / "config.json"
+    path.write_bytes(json_bytes({"trial": asdict(config)}))
+    assert read_trial(path) == config
+    said = json.loads(path.read_text())["trial"]
+    # A file of an older version lacks some settings, one of a newer version has more.
+    assert from_record(TrialConfig, {"world": "rooms", "more": 1}) == TrialConfig("rooms")
+    assert replace(from_record(TrialConfig, said), seed=1) != config
+    for wrong in ({"trial": {**said, "seed": "one"}}, {"trial": []}, {}, {"trial": {**said, "robot": 3}}):
+        path.write_bytes(json_bytes(wrong))
+        with pytest.raises(UsageError, match=r"^expected .* found none that fits: .*$"):
+            read_trial(path)
+
+
+def interrupt_me():
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(1.0)
+
+
+def test_the_first_interrupt_waits_and_the_second_does_not():
+    with first_interrupt_waits() as stop_if_asked:
+        stop_if_asked()
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            stop_if_asked()
+        with pytest.raises(KeyboardInterrupt):
+            interrupt_me()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "experiments.cli", "explore", "hall", "--out", str(out)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        while not out.exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1.5)
+        process.send_signal(signal.SIGINT)
+        if times == 2:
+            # By now the first has ended the mission: the second comes while it is scored and written.
+            time.sleep(0.3)
+            process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
+    assert not list(out.glob(".*"))
+    if times == 1:
+        summary = json.loads((out / "summary.json").read_text())
+        assert (summary["status"], summary["certificate"]["outcome"]) == ("stopped", "interrupted")
+        assert summary["steps"] >= 1
+        with np.load(out / "map.npz") as saved:
+            # Ended between two steps: the joint covariance is that of the map beside it.
+            assert np.all(np.isfinite(saved["cov"]))
+        assert {"map.png", "map.svg", "map.pgm", "map.npz", "log.npz"} <= {path.name for path in out.iterdir()}
