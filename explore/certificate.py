@@ -11,6 +11,7 @@ from shapely.geometry.polygon import orient
 from slam.chains import Chain
 from slam.stochastic_map import StochasticMap
 
+from .driving_field import DrivingField
 from .free_space import FreeSpace
 from .outcome import Outcome
 from .paths import PathConfig
@@ -146,7 +147,8 @@ def left_unseen(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) ->
     """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
     why = "not visited yet" if outcome.status != "complete" else "visited in vain, or the way was blocked"
     why = why if sweep else "unseen floor was not to be visited"
-    borders = unseen_borders(step.free_space, step.pose_world[:2], paths, LEAST_BORDER_CELLS)
+    reachable = DrivingField(step.free_space, step.pose_world[:2], paths).reachable()
+    borders = unseen_borders(step.free_space, reachable, LEAST_BORDER_CELLS)
     cell = step.free_space.config.cell_m
     return tuple(LeftUnseen(border, len(border) * cell, why) for border in borders)
 
