@@ -47,13 +47,16 @@ class Votes:
             self.fused.append((owner, int(walls.argmax()) if clear else UNLABELLED))
 
     def merge(self, keep: int, drop: int) -> None:
-        """Give a line the beams and segments of another that the map has merged into it."""
+        """Count the beams of two lines as one line's from now on, under both ids: the map has made them one."""
         kept, dropped = (self.walls_of(np.array([line]))[0] for line in (keep, drop))
         self.merges += 1
         self.false_merges += bool(UNLABELLED not in (kept, dropped) and kept != dropped)
-        if drop in self.beams:
-            self.beams[keep] = self.beams.get(keep, 0) + self.beams.pop(drop)
-            self.fused = [(keep if owner == drop else owner, wall) for owner, wall in self.fused]
+        theirs, none = self.beams.get(drop), np.zeros(len(self.truth.faces), dtype=np.int64)
+        ours = self.beams.setdefault(keep, none)
+        ours += 0 if theirs is None else theirs
+        # Ids that were merged into the dropped one before go along.
+        same = [line for line, beams in self.beams.items() if theirs is not None and beams is theirs]
+        self.beams.update(dict.fromkeys([drop, *same], ours))
 
     def face_of(self, line_id: int) -> int:
         """Return the face that stands for a line: of the wall with most of its beams, the face with most; or -1."""

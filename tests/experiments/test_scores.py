@@ -90,8 +90,11 @@ def test_lines_that_were_merged_are_labelled_together_and_a_wrong_merge_is_count
     votes.merge(7, 9)
     assert (votes.merges, votes.false_merges, votes.false_matches()) == (2, 1, 1)
     # A line of which no beam was ever counted proves nothing.
-    votes.merge(7, 12)
+    votes.merge(6, 7)
     assert (votes.merges, votes.false_merges) == (3, 1)
+    votes.add(one_segment(50, 59), np.array([6]), beams)
+    assert votes.walls_of(np.array([6, 7, 8, 9])).tolist() == 4 * [truth.walls[0]]
+    assert votes.beams[8].tolist()[:2] == [30, 20]
 
 
 def test_a_segment_across_the_seam_counts_its_own_beams(truth):
