@@ -43,9 +43,9 @@ class Explore:
     """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
     max_steps: int = 100_000
     """The run is stopped after this many scans."""
-    max_path: float | None = None
+    max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
     """The run is stopped once the wheels have counted this many metres."""
-    time_limit: float | None = None
+    time_limit: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """The run is stopped once this many seconds have passed on the robot's own clock: it counts driving and
     scanning, not computing, so that every machine stops at the same step."""
     return_to_start: bool = False
