@@ -3,9 +3,10 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign
+from .campaign.merge import merge
+from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign, trials
 from .campaign.runner import on_cores, on_dask, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
@@ -33,7 +34,9 @@ class Compare:
     strategies: tuple[str, ...] | None = None
     """Exploration strategies (see `chainslam strategies`)."""
     trials: int | None = None
-    """Seeds 1 to this, in every cell."""
+    """How many, with seeds that follow each other, in every cell."""
+    first_seed: int = 1
+    """The seed of the first trial."""
     modes: tuple[Literal["closed", "replay"], ...] = ("closed", "replay")
     """Closed loop, or one recording for each world, strategy and seed through all back ends."""
     association: tuple[Association, ...] = ("own", "true")
@@ -48,6 +51,8 @@ class Compare:
     """Number of processes; all cores by default. The results are the same."""
     dask: str | None = None
     """Address of a Dask scheduler whose workers run the trials, in place of `--jobs`."""
+    merge: tuple[Path, ...] = ()
+    """Folders of campaigns to put together into one, in place of running any."""
 
     @property
     def campaign(self) -> Campaign:
@@ -59,10 +64,20 @@ class Compare:
             raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
         arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
         arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
-        return Campaign(**chosen, arms=tuple(arms), driver=self.driver, p0=self.p0, max_steps=self.max_steps)
+        settings: dict[str, Any] = {
+            "driver": self.driver,
+            "p0": self.p0,
+            "max_steps": self.max_steps,
+            "first_seed": self.first_seed,
+        }
+        return Campaign(**chosen, arms=tuple(arms), **settings)
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
+        if self.merge:
+            merge(self.merge, self.out)
+            print(f"results in {self.out}")
+            return 0
         campaign = self.campaign
         check_campaign(campaign)
         if self.jobs is not None and self.jobs < 1:
@@ -77,6 +92,6 @@ class Compare:
                 print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
                       file=sys.stderr)  # fmt: skip
                 return INTERRUPTED
-            write_tables(store)
+            write_tables(self.out, campaign, trials(campaign), store.record)
         print(f"results in {self.out}")
         return 0

@@ -17,7 +17,9 @@ from .plan import Campaign, Trial, config_of, world_digests
 from .score import Record
 from .work import Done, unpack
 
-CONFIG = "config.json"
+CONFIG, LOCK = "config.json", ".lock"
+MERGED = "merged"
+"""The key under which the config of a merged folder holds the campaigns that went into it."""
 
 
 @dataclass(frozen=True)
@@ -61,35 +63,65 @@ class Store:
 
 
 @contextmanager
+def opened_anew(folder: Path) -> Iterator[None]:
+    """Make a folder that must be empty, and keep it to this process; raises UsageError."""
+    prepare(folder)
+    with _locked(folder):
+        if any(child.name != LOCK for child in folder.iterdir()):
+            raise UsageError(f"expected an empty folder, found files in {folder}: name another with --out")
+        yield
+
+
+@contextmanager
 def opened(folder: Path, campaign: Campaign) -> Iterator[Store]:
     """Make or take up a campaign's folder for as long as the block runs.
 
     Raises UsageError for a folder of another campaign, and for one that another process is working in.
     """
     prepare(folder)
-    with (folder / ".lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise UsageError(f"expected a folder to itself, found another campaign at work in {folder}") from error
+    with _locked(folder):
         _settle(folder, campaign)
         for leftover in folder.rglob(".*.part"):
             leftover.unlink()
         yield Store(folder, campaign)
 
 
-def read_campaign(folder: Path) -> Campaign:
-    """Return the campaign whose results stand in a folder; raises UsageError where there is none."""
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    with (folder / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UsageError(f"expected a folder to itself, found another campaign at work in {folder}") from error
+        yield
+
+
+def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
+    """Return the campaigns whose results stand in a folder, several where it was merged; raises UsageError."""
     try:
-        said: dict[str, Any] = json.loads((folder / CONFIG).read_text())["campaign"]
-        values: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value for name, value in said.items()
-        }
-        return Campaign(**values)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(
-            f"expected the folder of a campaign, found no {CONFIG} of one in {folder}: name what `compare --out` made"
-        ) from error
+        return tuple(_campaign(said) for said in read_config(folder)[MERGED])
+    except (KeyError, TypeError, AttributeError) as error:
+        raise _no_campaign(folder) from error
+
+
+def read_config(folder: Path) -> dict[str, Any]:
+    """Return the config of a campaign's folder; raises UsageError where it has none."""
+    try:
+        said: dict[str, Any] = json.loads((folder / CONFIG).read_text())
+        return said if MERGED in said else said | {MERGED: [said["campaign"]]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise _no_campaign(folder) from error
+
+
+def _campaign(said: dict[str, Any]) -> Campaign:
+    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in said.items()}
+    return Campaign(**values)
+
+
+def _no_campaign(folder: Path) -> UsageError:
+    return UsageError(
+        f"expected the folder of a campaign, found no {CONFIG} of one in {folder}: name what `compare --out` made"
+    )
 
 
 def _settle(folder: Path, campaign: Campaign) -> None:
@@ -103,7 +135,7 @@ def _settle(folder: Path, campaign: Campaign) -> None:
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
     if not path.exists():
-        if any(child.name != ".lock" for child in folder.iterdir()):
+        if any(child.name != LOCK for child in folder.iterdir()):
             raise UsageError(f"expected an empty folder or a campaign's, found {folder} with other files: name another")
         write(path, json_bytes(now | made_with))
         return

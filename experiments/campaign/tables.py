@@ -1,7 +1,9 @@
 """The tables of a campaign, made from the files of its trials in one fixed order."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
+from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,8 @@ from ..files import csv_bytes, json_bytes, write
 from ..measurements import Z_95
 from .comparison import compare
 from .hypothesis import hypothesis
-from .plan import Trial, trials
+from .plan import Campaign, Trial
 from .score import END, Record
-from .store import Store
 
 FIRST = (
     *("world", "backend", "strategy", "seed", "mode", "association", "status", "reason", "steps", "path_length_m"),
@@ -124,19 +125,11 @@ def header_of(rows: Sequence[Row], first: Sequence[str] = ()) -> list[str]:
     return list(dict.fromkeys((*first, *(key for row in rows for key in row))))
 
 
-def write_table(store: Store, name: str, rows: Sequence[Row], first: Sequence[str] = ()) -> None:
+def write_table(path: Path, rows: Sequence[Row], first: Sequence[str] = ()) -> None:
     """Write one table as CSV and as Parquet."""
     header = header_of(rows, first)
-    write(store.folder / f"{name}.csv", csv_bytes(header, [[row.get(key) for key in header] for row in rows]))
-    write(store.folder / f"{name}.parquet", parquet_bytes(rows, header))
-
-
-def cells(store: Store) -> list[list[Trial]]:
-    """Return the trials, cell by cell."""
-    by_cell: dict[tuple[str, ...], list[Trial]] = {}
-    for trial in trials(store.campaign):
-        by_cell.setdefault((trial.world, trial.strategy, trial.backend, trial.arm), []).append(trial)
-    return list(by_cell.values())
+    write(path.with_suffix(".csv"), csv_bytes(header, [[row.get(key) for key in header] for row in rows]))
+    write(path.with_suffix(".parquet"), parquet_bytes(rows, header))
 
 
 def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
@@ -153,18 +146,20 @@ def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
     }
 
 
-def write_tables(store: Store) -> None:
-    """Write every table of a campaign that is done, and what they say."""
+def write_tables(
+    folder: Path, campaign: Campaign, trials: Sequence[Trial], record_of: Callable[[Trial], Record]
+) -> None:
+    """Write every table of some trials, which stand cell by cell, and what they say; `campaign` names the levels."""
     rows, marks, steps, bands = [], [], [], []
-    for cell in cells(store):
-        records = [store.record(trial) for trial in cell]
+    for _, cell in groupby(trials, key=lambda t: (t.world, t.strategy, t.backend, t.arm)):
+        records = [record_of(trial) for trial in cell]
         rows += [trial_row(record) for record in records]
         marks += [row for record in records for row in mark_rows(record)]
         mine = step_rows(records)
         steps += mine
         bands.append(band_scores(records, mine))
-    write_table(store, "trials", rows, FIRST)
-    write_table(store, "marks", marks)
-    write_table(store, "steps", steps)
-    said = compare(store.campaign, rows, marks, bands) | {"hypothesis": hypothesis(marks)}
-    write(store.folder / "comparison.json", json_bytes(said))
+    write_table(folder / "trials", rows, FIRST)
+    write_table(folder / "marks", marks)
+    write_table(folder / "steps", steps)
+    said = compare(campaign, rows, marks, bands) | {"hypothesis": hypothesis(marks)}
+    write(folder / "comparison.json", json_bytes(said))

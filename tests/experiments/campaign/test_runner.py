@@ -13,7 +13,7 @@ import pytest
 
 from experiments.campaign.plan import Campaign, trials
 from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import opened, read_campaign
+from experiments.campaign.store import opened, read_campaigns
 from experiments.campaign.tables import TIMINGS, write_tables
 from experiments.cli import main
 
@@ -29,7 +29,7 @@ TABLES = ("trials", "marks", "steps")
 def run(folder, campaign=CAMPAIGN, jobs=1):
     with opened(folder, campaign) as store:
         run_campaign(store, on_cores(jobs))
-        write_tables(store)
+        write_tables(store.folder, store.campaign, trials(store.campaign), store.record)
     return folder
 
 
@@ -100,7 +100,7 @@ def test_a_trial_that_fails_is_recorded_with_its_reason_and_the_rest_goes_on(tmp
     monkeypatch.setattr(work, "_drive", broken)
     with opened(tmp_path / "campaign", replace(CAMPAIGN, max_steps=5)) as store:
         run_campaign(store, on_cores(1))
-        write_tables(store)
+        write_tables(store.folder, store.campaign, trials(store.campaign), store.record)
         found = [store.record(trial).summary for trial in trials(store.campaign)]
     assert all(("lost its mind" in s["reason"]) == (s["seed"] == 1) for s in found)
     assert {s["status"] for s in found if s["seed"] == 1} == {"failed"}
@@ -108,7 +108,7 @@ def test_a_trial_that_fails_is_recorded_with_its_reason_and_the_rest_goes_on(tmp
 
 
 def test_another_campaign_in_the_same_folder_is_refused_in_one_line(undisturbed, tmp_path, capsys):
-    assert read_campaign(undisturbed) == CAMPAIGN
+    assert read_campaigns(undisturbed) == (CAMPAIGN,)
     files = {"other campaign": undisturbed, "no campaign": tmp_path}
     (tmp_path / "thesis.txt").write_text("mine")
     for folder in files.values():

@@ -1,0 +1,90 @@
+"""Campaigns put together: more seeds, more worlds, more back ends, in one folder with one comparison."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import json_bytes, write
+from ..scenario import UsageError
+from .plan import ARMS, Campaign, Trial, trials
+from .score import Record
+from .store import CONFIG, MERGED, Store, opened_anew, plain, read_campaigns, read_config
+from .tables import write_tables
+
+SHARED = ("driver", "p0", "max_steps")
+"""What campaigns must have in common to be one."""
+
+
+def merge(folders: Sequence[Path], out: Path) -> None:
+    """Write the folder of all trials of some campaigns; raises UsageError where they do not belong together.
+
+    A trial that several of them have must have come out the same in all, times apart.
+    """
+    if len(folders) < 2:
+        raise UsageError(f"expected two or more campaigns to merge, found {len(folders)}: name another")
+    stores = [Store(folder, campaign) for folder in folders for campaign in read_campaigns(folder)]
+    campaigns = [store.campaign for store in stores]
+    for name in SHARED:
+        values = {getattr(campaign, name) for campaign in campaigns}
+        if len(values) > 1:
+            raise UsageError(f"expected campaigns of one {name}, found {sorted(map(str, values))}: merge others")
+    digests: dict[str, Any] = {}
+    for folder in folders:
+        for world, digest in read_config(folder)["worlds_sha256"].items():
+            if digests.setdefault(world, digest) != digest:
+                raise UsageError(f"expected one world {world}, found two that differ: rename one and run it again")
+    levels, found = union(campaigns), dict[Trial, Store]()
+    for store in stores:
+        for trial in trials(store.campaign):
+            _take(found, trial, store)
+    with opened_anew(out):
+        merged = Store(out, levels)
+        for trial, store in found.items():
+            copy = merged.path(trial)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            write(copy, store.path(trial).read_bytes())
+        config = {MERGED: [plain(vars(campaign)) for campaign in campaigns], "worlds_sha256": digests}
+        write(out / CONFIG, json_bytes(config | {"from": [read_config(folder) for folder in folders]}))
+        write_tables(out, levels, in_order(found, levels), merged.record)
+
+
+def union(campaigns: Sequence[Campaign]) -> Campaign:
+    """Return a campaign with all the levels of several, each in the order in which it is first met."""
+    worlds, backends, strategies = (
+        tuple(dict.fromkeys(level for campaign in campaigns for level in getattr(campaign, name)))
+        for name in ("worlds", "backends", "strategies")
+    )
+    arms = tuple(arm for arm in ARMS if any(arm in campaign.arms for campaign in campaigns))
+    return replace(campaigns[0], worlds=worlds, backends=backends, strategies=strategies, arms=arms)
+
+
+def in_order(found: Iterable[Trial], levels: Campaign) -> list[Trial]:
+    """Return trials in the order of the tables."""
+    return sorted(
+        found,
+        key=lambda t: (
+            levels.worlds.index(t.world), levels.strategies.index(t.strategy), levels.backends.index(t.backend),
+            levels.arms.index(t.arm), t.seed,
+        ),
+    )  # fmt: skip
+
+
+def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
+    if not store.has(trial):
+        raise UsageError(f"expected a campaign that is done, found {store.folder} without {trial.path}: run it again")
+    if trial in found and not _same(found[trial].record(trial), store.record(trial)):
+        raise UsageError(f"expected one result of {trial.path}, found two that differ: merge campaigns of one version")
+    found.setdefault(trial, store)
+
+
+def _same(first: Record, second: Record) -> bool:
+    summaries = [{k: v for k, v in record.summary.items() if k != "step_ms"} for record in (first, second)]
+    arrays = [first.arrays, second.arrays]
+    return (
+        summaries[0] == summaries[1]
+        and arrays[0].keys() == arrays[1].keys()
+        and all(np.array_equal(a, arrays[1][name], equal_nan=True) for name, a in arrays[0].items())
+    )

@@ -1,0 +1,63 @@
+"""Two campaigns put together leave the tables of the one that has the seeds of both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.campaign.merge import merge
+from experiments.campaign.plan import Campaign, trials
+from experiments.campaign.runner import on_cores, run_campaign
+from experiments.campaign.store import opened, read_campaigns
+from experiments.campaign.tables import write_tables
+from experiments.cli import main
+from experiments.scenario import UsageError
+
+WHOLE = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, arms=("closed",), max_steps=6)
+LATER = replace(WHOLE, trials=1, first_seed=2)
+
+
+def run(folder, campaign):
+    with opened(folder, campaign) as store:
+        run_campaign(store, on_cores(1))
+        write_tables(folder, campaign, trials(campaign), store.record)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    base = tmp_path_factory.mktemp("merge")
+    parts = {"whole": WHOLE, "first": replace(WHOLE, trials=1), "later": LATER}
+    return {name: run(base / name, campaign) for name, campaign in parts.items()}
+
+
+def untimed(folder):
+    return [(folder / name).read_bytes() for name in ("marks.csv", "steps.csv", "comparison.json")]
+
+
+def test_merged_halves_are_the_whole_and_overlaps_that_agree_are_taken_once(folders, tmp_path):
+    words = ["compare", "--merge", str(folders["later"]), str(folders["first"]), "--out", str(tmp_path / "halves")]
+    assert main(words) == 0
+    assert untimed(tmp_path / "halves") == untimed(folders["whole"])
+    assert len(read_campaigns(tmp_path / "halves")) == 2
+    merge([tmp_path / "halves", folders["whole"]], tmp_path / "again")
+    assert untimed(tmp_path / "again") == untimed(folders["whole"])
+
+
+def test_what_does_not_belong_together_is_refused(folders, tmp_path):
+    other = run(tmp_path / "other", replace(LATER, p0="large"))
+    broken = run(tmp_path / "broken", LATER)
+    path = next(broken.rglob("trials/**/*.npz"))
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    np.savez(path, **arrays | {"pose_trace": 2.0 * arrays["pose_trace"]})
+    for pair, word in (((folders["first"], other), "p0"), ((folders["later"], broken), "differ")):
+        with pytest.raises(UsageError, match=word):
+            merge(pair, tmp_path / "out")
+    path.unlink()
+    with pytest.raises(UsageError, match="run it again"):
+        merge([folders["first"], broken], tmp_path / "out")
+    with pytest.raises(UsageError, match="two or more"):
+        merge([folders["first"]], tmp_path / "out")
+    with pytest.raises(UsageError, match="empty folder"):
+        merge([folders["first"], folders["later"]], folders["whole"])
