@@ -97,9 +97,10 @@ class Explorer:
         self._open = frozenset(ends)
         self._revive(ends)
         self._abandon(around, ends)
+        known = len(self.set_aside)
         for _ in range(len(ends) + 20):
             if self._errand is None and not self._choose(around, chains, ends, graph):
-                return self._look_again(around)
+                return self._look_again(around, len(self.set_aside) > known)
             assert self._errand is not None
             self._steps_on_goal += 1
             command = self._errand.command(around)
@@ -109,10 +110,14 @@ class Explorer:
             self._give_up()
         return None
 
-    def _look_again(self, around: Surroundings) -> MotionCommand | None:
-        """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do."""
+    def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
+        """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do.
+
+        Ends that were given up just now may join others that were: the chains are connected with the next scan.
+        """
         self._looked_again += 1
-        if self._looked_again > self._config.second_looks or not around.walls.tentative.any():
+        again = self._looked_again <= self._config.second_looks and bool(around.walls.tentative.any())
+        if not again and not gave_up:
             return None
         return MotionCommand(0.0, self._config.following.driving.turn_rad)
 

@@ -33,15 +33,17 @@ class LooksConfig:
 
 LOOKS = ("in front of", "past", "round", "close to")
 """The looks in the order in which they are tried."""
+TURNS_RAD = np.deg2rad([10.0, 60.0, 120.0])
+"""How far the first three go round the end, from straight in front of its wall."""
+BEYOND_RAD = float(np.deg2rad(45.0))
+"""Seen from this far round, the face that follows is in sight, though at a flat angle."""
 
 
 def ideal_places(end: OpenEnd, walls: StochasticMap, config: LooksConfig) -> Float[np.ndarray, "4 2"]:
     """Return the four ideal places, one for each of `LOOKS`, world frame, m."""
     alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
-    into, along = normals(alpha), directions(alpha)
-    outward = along if end.side == HEAD else -along
-    turns = np.deg2rad([10.0, 60.0, 120.0])
-    ring = config.standoff_m * (np.sin(turns)[:, None] * outward - np.cos(turns)[:, None] * into)
+    into, outward = normals(alpha), _outward(end, alpha)
+    ring = config.standoff_m * (np.sin(TURNS_RAD)[:, None] * outward - np.cos(TURNS_RAD)[:, None] * into)
     return end.position_world + np.vstack([ring, -config.close_m * into + 0.1 * outward])
 
 
@@ -52,6 +54,23 @@ def places_near(
     points = planner.passable_points(cells_within(free_space, ideal_world, config.slack_m))
     points = points[np.argsort(np.hypot(*(points - ideal_world).T), kind="stable")]
     return points[sees(free_space, points, end.position_world, config.short_m)]
+
+
+def places_beyond(
+    end: OpenEnd, walls: StochasticMap, free_space: FreeSpace, planner: Planner, config: LooksConfig
+) -> Float[np.ndarray, "n 2"]:
+    """Return passable places that see the end from past it, for where nobody can stand near the ideal ones."""
+    alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
+    points = places_that_see(end, free_space, planner, config.near_m, config)
+    offset = points - end.position_world
+    turn = np.arctan2(offset @ _outward(end, alpha), -offset @ normals(alpha))
+    return points[turn > BEYOND_RAD]
+
+
+def _outward(end: OpenEnd, alpha_rad: np.floating) -> Float[np.ndarray, "2"]:
+    """Return the direction in which a wall would go on past its end."""
+    along = directions(alpha_rad)
+    return along if end.side == HEAD else -along
 
 
 def places_that_see(

@@ -16,7 +16,7 @@ from slam.stochastic_map import StochasticMap
 
 from .driving import DrivingConfig, Pilot
 from .free_space import FreeSpace
-from .looks import LOOKS, LooksConfig, ideal_places, lane, places_near, places_that_see
+from .looks import LOOKS, LooksConfig, ideal_places, lane, places_beyond, places_near, places_that_see
 from .paths import PathConfig, Planner
 
 
@@ -150,7 +150,7 @@ class EndErrand(Errand):
             places = self._fresh(
                 places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.looks)
             )
-            if self._drive(whole, places):
+            if self._drive(whole, places) or self._plan_beyond(around, whole):
                 return self._note()
             self._stage += 1
         return self.looks_done == 0 and self._plan_anywhere(around, whole or self._planner(around, None))
@@ -176,6 +176,13 @@ class EndErrand(Errand):
                 self.doing = f"along wall {wall} towards wall {self.end.wall}"
                 return True
         return False
+
+    def _plan_beyond(self, around: Surroundings, planner: Planner) -> bool:
+        """Nobody can stand near the ideal place past the end: one farther off will do."""
+        if LOOKS[self._stage] not in ("past", "round"):
+            return False
+        places = places_beyond(self.end, around.walls, around.free_space, planner, self._config.looks)
+        return self._drive(planner, self._fresh(places))
 
     def _plan_anywhere(self, around: Surroundings, planner: Planner) -> bool:
         """No ideal place can be reached: any place that sees the end will do."""

@@ -51,6 +51,7 @@ class Walls:
         self._sightings = np.zeros(0, dtype=np.int64)
         self._last_seen = np.zeros(0, dtype=np.int64)
         self._against = np.zeros(0, dtype=np.int64)
+        self._overlaid = np.zeros((0, 2), dtype=np.int64)
         self._claimed = np.zeros(0, dtype=np.int64)
         self._scans = 0
 
@@ -81,6 +82,7 @@ class Walls:
         used = np.flatnonzero(owners >= 0)
         rows = np.searchsorted(self._ids, owners[used])
         self._stretch(belief, scan, segments, used, rows)
+        self._uncover(belief, segments, owners, used, rows)
         self._sightings[np.unique(rows)] += 1
         self._sightings[np.searchsorted(self._ids, believed)] = self._config.trusted_sightings
         self._last_seen[rows] = self._scans
@@ -152,12 +154,13 @@ class Walls:
         self._sightings = np.concatenate([self._sightings, np.zeros(m, dtype=np.int64)])
         self._last_seen = np.concatenate([self._last_seen, np.full(m, self._scans)])
         self._against = np.concatenate([self._against, np.zeros(m, dtype=np.int64)])
+        self._overlaid = np.concatenate([self._overlaid, np.zeros((m, 2), dtype=np.int64)])
         self._claimed = np.concatenate([self._claimed, np.zeros(m, dtype=np.int64)])
 
     def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
-        self._sightings = self._sightings[kept]
+        self._sightings, self._overlaid = self._sightings[kept], self._overlaid[kept]
         self._last_seen, self._against, self._claimed = self._last_seen[kept], self._against[kept], self._claimed[kept]
 
     def _stretch(
@@ -181,6 +184,36 @@ class Walls:
                 if beyond > 0 or (sharper and -beyond < self._spacing[row, side]):
                     self._extents[row, side] = along[k, side]
                     self._spacing[row, side] = spacing[k, side]
+
+    def _uncover(
+        self,
+        belief: Belief,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        used: Int[np.ndarray, " m"],
+        rows: Int[np.ndarray, " m"],
+    ) -> None:
+        """Move an end back to the corner that scan after scan shows before it, if another wall runs on from there.
+
+        From afar a wall that turns by a few degrees is taken for one straight wall, and so reaches past the corner.
+        """
+        ends_world = to_world(segments.ends, belief.pose_world)
+        t, anchors = directions(belief.means[rows, 0]), belief.anchors[rows]
+        is_corner = segments.end_kinds == EndKind.CORNER
+        margin = self._config.end_margin_m
+        for side, outward in enumerate((-1, 1)):
+            after = (used + outward) % len(segments)
+            corner, far = (np.sum((ends_world[k, side] - anchors) * t, axis=-1) for k in (used, after))
+            end = self._extents[rows, side]
+            runs_on = is_corner[used, side] & is_corner[after, 1 - side] & (outward * (far - end) > -margin)
+            others = (owners[after] >= 0) & (owners[after] != owners[used])
+            overlaid = runs_on & others & (outward * (end - corner) > margin)
+            scans = self._overlaid[rows, side] + 1
+            self._overlaid[rows, side] = 0
+            self._overlaid[rows[overlaid], side] = scans[overlaid]
+            due = overlaid & (scans >= self._config.contradictions)
+            self._extents[rows[due], side] = corner[due]
+            self._spacing[rows[due], side] = margin
 
 
 def _kept_piece(

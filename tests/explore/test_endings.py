@@ -42,3 +42,21 @@ def test_ends_behind_a_slit_too_narrow_for_the_robot_are_remembered_with_their_r
     assert {(aside.wall, aside.side) for aside in last.set_aside} == ends
     assert all(aside.reason for aside in last.set_aside)
     assert last.pose_world[0] < 2.4
+
+
+@pytest.mark.parametrize("degrees", [6.0, 8.0, 10.0])
+def test_a_wall_that_turns_by_a_few_degrees_is_two_walls_though_it_looks_straight_from_afar(degrees):
+    bend = 0.7 * np.tan(np.deg2rad(degrees))
+    room = shapely.Polygon([(0, 0), (4.5, 0), (4.5, 4.2 - bend), (3.8, 4.2), (0, 4.2)])
+    last, _ = explored(room, (3.0, 0.5, 0.3))
+    assert [chain.is_closed for chain in last.chains] == [True]
+    assert len(last.chains[0].walls) == 5
+
+
+@pytest.mark.parametrize("depth", [0.15, 0.3])
+def test_a_stub_beside_a_wall_is_looked_at_from_both_sides(depth):
+    """Straight past its end stands a wall, so that the robot can look at its far side only from farther off."""
+    room = shapely.box(0, 0, 4, 3).difference(shapely.box(2.0, 0.0, 2.2, depth))
+    last, _ = explored(room, (0.6, 0.6, 0.3))
+    assert [chain.is_closed for chain in last.chains] == [True]
+    assert len(last.chains[0].walls) == 8
