@@ -16,20 +16,21 @@ from .corners import Corner, corners
 from .records import Log
 
 FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
+LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
 
 
 def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: Log) -> dict[str, Any]:
     """Return the map of the last step with what the mission can vouch for; covariances are null without `joint`.
 
     RFC 7946 knows longitudes and latitudes only. A building's map has none, so the file says so twice: in words, and
-    as `"crs": null`, by which the GeoJSON of 2008 states that no reference system may be assumed.
+    as the `crs` of the GeoJSON of 2008, which GDAL (and so QGIS) reads as a local system in metres.
     """
     walls, chains = step.map, step.chains
     found = corners(walls, chains)
     return {
         "type": "FeatureCollection",
         "name": "map",
-        "crs": None,
+        "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
         "coordinate_system": FRAME,
         "features": [
             *(_contour_feature(contour) for contour in certificate.contours),

@@ -44,7 +44,7 @@ def test_the_certificate_is_in_the_summary(explored, world):
 def test_geojson_holds_valid_shapes_and_says_that_it_is_in_metres(explored, world):
     _, folder = explored
     document = json.loads((folder / "map.geojson").read_text())
-    assert document["crs"] is None
+    assert document["crs"]["properties"]["name"].startswith("LOCAL_CS")
     assert "metres" in document["coordinate_system"]
     shapes = {}
     for feature in document["features"]:
