@@ -1,32 +1,30 @@
 """How honest each back end is on the same recordings: ANEES of pose and map over many seeds, with intervals.
 
-Each seed is explored once with `--driver`; the recording then goes through every back end, with the truth in place of
-extraction and association or not. Seeds are the samples (steps of one run are nearly one draw): intervals are
-bootstrapped over runs.
+Each seed is explored once with `--driver`; the recording then goes through every back end from every start covariance,
+with the truth in place of extraction and association or not. Seeds are the samples (steps of one run are nearly one
+draw): intervals are bootstrapped over runs.
 """
 
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
-from functools import partial
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
-from jaxtyping import Float
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
-from sim.replay import Recording
 from slam.backends import BACKENDS
+from slam.consistency import anees, share_in_band
 
-from .files import csv_bytes, write
+from .recordings import record
 from .replay import Association, RecordedRun, ReplayOptions, replay
-from .scenario import P0, TrialConfig, UsageError, choose
-from .trial import TrialResult, run_trial
+from .scenario import P0, P0_SIGMAS, TrialConfig, UsageError, choose
+from .sightings import Sightings, ride, sightings_of, start
+from .study_table import Key, Rows, fill, show
 
-COLUMNS = ("backend", "seed", "pose_anees", "pose_nees_in_band", "map_anees", "pose_rmse_m", "lines", "duplicate_lines")
+KEY = ("world", "p0", "association", "perfect_extraction", "told_noise", "backend", "seed")
+SCORES = ("pose_anees", "pose_nees_in_band", "map_anees", "pose_rmse_m", "lines", "duplicate_lines")
 
 
 @dataclass(frozen=True)
@@ -39,84 +37,82 @@ class Study:
     """Recordings, with seeds 1 to this."""
     backends: tuple[str, ...] = tuple(BACKENDS)
     """The estimators."""
-    p0: P0 = "small"
-    """Covariance of the start."""
+    p0: tuple[P0, ...] = ("small",)
+    """Covariances of the start."""
     association: Association = "true"
     """Whose matches: the back end's own gate, or the truth."""
     perfect_extraction: bool = True
-    """True lines with noise drawn from exactly the stated covariance."""
+    """True lines with an error drawn as the measurement model states it."""
+    told_noise: float = 1.0
+    """The back ends are told this share of the sightings' covariance: below 1 they must be found out."""
     driver: str = "full-ekf"
-    """The estimator that explored when the recordings were made."""
+    """The estimator that explored, from a small start covariance, when the recordings were made."""
+    recordings: Path | None = None
+    """Folder in which recordings are kept and looked for; without it they are made anew."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/consistency.csv")
-    """Where the table of all replays goes."""
+    """Where each replay gets a row as soon as it is done; a seed whose rows are there already is not run again."""
 
     def run(self) -> None:
-        """Run the study, print a row for each back end and write a row for each replay."""
+        """Run the study, write a row for each replay and print one for each back end; raises UsageError."""
         for name in (*self.backends, self.driver):
             choose("back end", name, BACKENDS)
-        self.out.parent.mkdir(parents=True, exist_ok=True)
-        with ProcessPoolExecutor(self.jobs) as pool:
-            seeds = range(1, self.seeds + 1)
-            found = pool.map(partial(_replays, self), seeds)
-            rows = [row for rows in track(found, "replaying", len(seeds), console=Console(stderr=True)) for row in rows]
-        write(self.out, csv_bytes(COLUMNS, rows))
-        self._print(rows)
-
-    def _print(self, rows: list[tuple[object, ...]]) -> None:
+        for name in self.p0:
+            choose("start covariance (--p0)", name, P0_SIGMAS)
+        if not self.told_noise > 0 or (self.told_noise != 1.0 and self.association != "true"):
+            raise UsageError(
+                f"expected --told-noise above 0, and 1 without --association true, found {self.told_noise}: change it"
+            )
+        seeds = range(1, self.seeds + 1)
+        tasks = {seed: [self.key(p0, name, seed) for p0 in self.p0 for name in self.backends] for seed in seeds}
+        found = fill(self.out, (KEY, SCORES), tasks, functools.partial(rows_of, self), self.jobs)
         extraction = "stated noise" if self.perfect_extraction else "real extraction"
-        table = Table(
-            title=f"{self.world}, P0 {self.p0}, {self.seeds} seeds, {self.association} association, {extraction}"
-        )
-        for name in ("back end", "pose ANEES", "95 % interval", "median", "in band", "map ANEES", "median", "failed"):
-            table.add_column(name, justify="left" if name == "back end" else "right")
-        for name in self.backends:
-            mine = np.array([[np.nan if v is None else v for v in row[2:5]] for row in rows if row[0] == name], float)
-            pose = mine[np.isfinite(mine[:, 0]), 0]
-            if not len(pose):
-                table.add_row(name, *["-"] * 6, str(self.seeds))
-                continue
-            low, high = bootstrap(pose)
-            in_band, map_mean = np.nanmean(mine[:, 1:], axis=0)
-            cells = (np.median(pose), in_band, map_mean, np.nanmedian(mine[:, 2]))
-            words = [f"{value:.3f}" for value in cells]
-            table.add_row(name, f"{pose.mean():.3f}", f"{low:.3f} to {high:.3f}", *words, str(self.seeds - len(pose)))
-        Console().print(table)
+        told = "" if self.told_noise == 1.0 else f", told {self.told_noise} of it"
+        for p0 in self.p0:
+            runs = {name: np.array([found[self.key(p0, name, seed)][:3] for seed in seeds]) for name in self.backends}
+            title = f"{self.world}, P0 {p0}, {self.seeds} seeds, {self.association} association, {extraction}{told}"
+            show(title, runs, ("pose ANEES", "in band", "map ANEES"))
+
+    def key(self, p0: str, name: str, seed: int) -> Key:
+        """Return the key of one replay's row."""
+        settings = self.association, str(self.perfect_extraction), str(float(self.told_noise))
+        return self.world, p0, *settings, name, str(seed)
 
 
-def _replays(study: Study, seed: int) -> list[tuple[object, ...]]:
-    """Record one seed and replay it with every back end."""
-    made = run_trial(TrialConfig(study.world, study.driver, seed=seed, p0=study.p0))
-    return list(_rows(study, recorded(made)))
+def rows_of(study: Study, seed: int) -> Rows:
+    """Record one seed, or find its recording, and send it through every back end; raises UsageError for a bad one."""
+    made = record(TrialConfig(study.world, study.driver, seed=seed), study.recordings)
+    drive = sightings_of(made, study.perfect_extraction).told(study.told_noise) if study.association == "true" else None
+    rows: Rows = {}
+    for p0 in study.p0:
+        pose, cov = start(seed, made.true_poses_world[0], p0)
+        run = replace(made, trial=replace(made.trial, p0=p0), start_pose=pose, start_cov=cov)
+        for name in study.backends:
+            rows[study.key(p0, name, seed)] = (
+                _replayed(run, name, study) if drive is None else _ridden(run, name, drive)
+            )
+    return rows
 
 
-def _rows(study: Study, run: RecordedRun) -> Iterator[tuple[object, ...]]:
-    options = ReplayOptions(study.association, study.perfect_extraction)
-    for name in study.backends:
-        summary = replay(run, name, options).summary
-        yield name, run.trial.seed, *(summary[key] for key in COLUMNS[2:])
+def _replayed(run: RecordedRun, name: str, study: Study) -> Sequence[Any]:
+    summary = replay(run, name, ReplayOptions(study.association, study.perfect_extraction)).summary
+    return [summary[key] for key in SCORES]
 
 
-def recorded(made: TrialResult) -> RecordedRun:
-    """Return the recording that a trial left; raises UsageError where it ended before its first step."""
-    log, scenario = made.log, made.scenario
-    if log is None:
-        raise UsageError(f"expected a run of at least one step, found none: {made.ending.reason}")
-    recording = Recording(
-        log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov
-    )
-    return RecordedRun(
-        scenario.config, recording, scenario.start_estimate, scenario.start_cov, log.true_world, log.face_of_beam
-    )
-
-
-def bootstrap(values: Float[np.ndarray, " n"], draws: int = 2000, seed: int = 0) -> tuple[float, float]:
-    """Return the 95 % interval of the mean, by resampling whole runs."""
-    rng = np.random.default_rng(seed)
-    means = rng.choice(values, (draws, len(values))).mean(axis=1)
-    return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
+def _ridden(run: RecordedRun, name: str, drive: Sightings) -> Sequence[Any]:
+    ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy()), drive)
+    off = ridden.estimated_world[:, :2] - ridden.true_poses_world[:, :2]
+    rmse, lines = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), len(ridden.true_lines_world)
+    try:
+        values = ridden.pose_nees
+        return anees(values, 3), share_in_band(values, 3), ridden.map_anees, rmse, lines, 0
+    except np.linalg.LinAlgError:
+        return None, None, None, rmse, lines, 0
 
 
 if __name__ == "__main__":
-    tyro.cli(Study).run()
+    try:
+        tyro.cli(Study).run()
+    except UsageError as error:
+        raise SystemExit(f"consistency_study: {error}") from error

@@ -1,10 +1,11 @@
 """The truth in place of one part of the software, to find out which part a fault comes from; handed to the mapper."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from sim.chance import Channel, standard_normals
 from slam.backend import Joint
@@ -16,6 +17,9 @@ from slam.segments import Segments
 
 from .association import ONE_FACE_SHARE
 from .truth import Truth
+
+MOST_TURN_RAD = 1.0
+"""No sighting is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
 
 
 @dataclass
@@ -65,8 +69,8 @@ class TrueAssociation:
         """Return the true pairs when asked for the clear ones, and none of the rest."""
         if not clear_only:
             # Called with the segments left over: those of walls without a line begin one, the others are not used.
-            rows = np.arange(len(segments))
-            return replace(NO_MATCHES, unmatched=rows, doubtful=rows[~self._begins_a_line(self._rest)])
+            begins = begins_a_line(self._rest[:, 0], self._rest[:, 1], self._line_of_wall)
+            return replace(NO_MATCHES, unmatched=np.arange(len(segments)), doubtful=np.flatnonzero(~begins))
         faces = self._witness.faces(segments)
         wall = np.where(faces >= 0, self._witness.truth.walls[faces], -1)
         line = np.array([self._line_of_wall.get(int(w), -1) for w in wall], dtype=np.int64)
@@ -86,18 +90,21 @@ class TrueAssociation:
             if wall >= 0 and line >= 0:
                 self._line_of_wall.setdefault(wall, line)
 
-    def _begins_a_line(self, rest: Int[np.ndarray, "u 2"]) -> np.ndarray:
-        """Which leftover segments lie on walls without a line: of several on one wall, that of most beams."""
-        begins = np.zeros(len(rest), dtype=bool)
-        for wall in np.unique(rest[:, 0]):
-            if wall >= 0 and int(wall) not in self._line_of_wall:
-                rows = np.flatnonzero(rest[:, 0] == wall)
-                begins[rows[np.argmax(rest[rows, 1])]] = True
-        return begins
+
+def begins_a_line(
+    walls: Int[np.ndarray, " u"], beam_counts: Int[np.ndarray, " u"], known: Collection[int]
+) -> Bool[np.ndarray, " u"]:
+    """Return which segments are on walls (-1 for none) without a line: of several on one wall, that of most beams."""
+    begins = np.zeros(len(walls), dtype=bool)
+    for wall in np.unique(walls).tolist():
+        if wall >= 0 and wall not in known:
+            rows = np.flatnonzero(walls == wall)
+            begins[rows[np.argmax(beam_counts[rows])]] = True
+    return begins
 
 
 class PerfectExtraction:
-    """Real segmentation, but each line is the true one plus noise drawn from exactly the stated covariance."""
+    """Real segmentation, but each line is the true one with an error drawn as the measurement model states it."""
 
     def __init__(self, witness: Witness, seed: int) -> None:
         self._witness, self._seed = witness, seed
@@ -113,8 +120,26 @@ class PerfectExtraction:
         alpha, r = self._witness.truth.lines[faces].T
         exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
         draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
-        noise = np.linalg.cholesky(segments.cov) @ draws[: 2 * len(segments)].reshape(-1, 2, 1)
-        return replace(segments, lines=exact + noise[..., 0])
+        return replace(segments, lines=as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2)))
+
+
+def as_stated(
+    lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], standard_normals: Float[np.ndarray, "m 2"]
+) -> Float[np.ndarray, "m 2"]:
+    """Return sightings of true lines (alpha, r), robot frame, whose error is the one that `slam.models` states.
+
+    There (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_true) has independent parts of variance C_alpha_alpha and
+    (C_r_r - C_alpha_r t0) (cos(epsilon) - t0 sin(epsilon) / r)^2, t0 = C_alpha_r / C_alpha_alpha: to first order the
+    covariance C of (alpha, r), but a line off by epsilon turns about the seen piece instead of sliding off it. Solved
+    for r.
+    """
+    t0 = cov[:, 0, 1] / cov[:, 0, 0]
+    epsilon = np.clip(np.sqrt(cov[:, 0, 0]) * standard_normals[:, 0], -MOST_TURN_RAD, MOST_TURN_RAD)
+    across = np.sqrt(cov[:, 1, 1] - cov[:, 0, 1] * t0) * standard_normals[:, 1]
+    c, b = np.cos(epsilon), t0 * np.sin(epsilon)
+    half = 0.5 * (lines[:, 1] + across * c + b)
+    r = (half + np.sqrt(np.maximum(half**2 - c * b * across, 0.0))) / c
+    return np.stack([lines[:, 0] + epsilon, r], axis=-1)
 
 
 def true_odometry(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:

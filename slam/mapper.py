@@ -139,7 +139,7 @@ class Mapper:
         believed = faint[self._faint.see(self.backend.belief.pose_world, segments.take(faint))]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
-            centres = _seen_centres(segments, fresh)
+            centres = seen_centres(segments, fresh)
             owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
         forgotten = self._walls.see(self.backend.belief, scan, segments, owners, owners[believed])
         if len(forgotten):
@@ -185,6 +185,6 @@ def _both(clear: Matches, again: Matches) -> Matches:
     )
 
 
-def _seen_centres(segments: Segments, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
+def seen_centres(segments: Segments, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
     """Return the middle of each seen piece, robot frame, m."""
     return 0.5 * (segments.ends[rows, 0] + segments.ends[rows, 1])

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.consistency_study import bootstrap, recorded
 from experiments.oracles import true_odometry
+from experiments.recordings import recorded
 from experiments.replay import ReplayOptions, read_run, replay
 from experiments.results import write_results
 from experiments.scenario import TrialConfig
+from experiments.study_table import bootstrap
 from experiments.trial import run_trial
 from sim.replay import RecordedRobot
 from slam.geometry.poses import compose

@@ -1,0 +1,131 @@
+"""What the studies of back ends rest on: sightings told wall by wall, noise as stated, rings of corridors."""
+
+import jaxtyping
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.corridor import FIRM_RAD, Loop, drive, on_ring
+from experiments.loop_study import SCORES, Study
+from experiments.oracles import as_stated
+from experiments.recordings import record, recorded
+from experiments.replay import ReplayOptions, replay
+from experiments.scenario import TrialConfig, UsageError
+from experiments.sightings import ride, sightings_of, start
+from experiments.study_table import bootstrap
+from experiments.trial import run_trial
+from slam.backends import BACKENDS
+from slam.models import innovations
+
+few = settings(max_examples=20, deadline=None, derandomize=True)
+
+
+@pytest.mark.parametrize("perfect", [True, False])
+def test_a_back_end_alone_gets_what_the_mapper_would_hand_it_bit_for_bit(perfect):
+    run = recorded(run_trial(TrialConfig("paper-fig4", seed=4, max_steps=25)))
+    ridden = ride(BACKENDS["full-ekf"].make(run.start_pose.copy(), run.start_cov.copy()), sightings_of(run, perfect))
+    mapped = replay(run, "full-ekf", ReplayOptions("true", perfect))
+    np.testing.assert_array_equal(ridden.estimated_world, mapped.log.estimated_world)
+    np.testing.assert_array_equal(ridden.estimated_cov, mapped.log.estimated_cov)
+    assert ridden.pose_nees.mean() / 3 == pytest.approx(mapped.summary["pose_anees"], rel=1e-9)
+
+
+@few
+@given(seed=st.integers(0, 2**32))
+def test_a_sighting_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
+    """Whitened by the model's own R at the truth, the innovation is the draw, however far off the direction is."""
+    rng = np.random.default_rng(seed)
+    pose, alpha, r = np.array([1.0, -2.0, 0.4]), rng.uniform(-3, 3, 6), rng.uniform(0.5, 4.0, 6)
+    t0, along, across = rng.uniform(-2, 2, 6), rng.uniform(1e-3, 0.15, 6), rng.uniform(1e-3, 0.02, 6)
+    turn = np.tile(np.eye(2), (6, 1, 1))
+    turn[:, 1, 0] = t0
+    cov = turn @ (np.stack([along, across], -1)[..., None] ** 2 * np.eye(2)) @ turn.swapaxes(1, 2)
+    draws = rng.standard_normal((6, 2))
+    seen = as_stated(np.stack([alpha, r], axis=-1), cov, draws)
+    n = np.stack([np.cos(alpha + pose[2]), np.sin(alpha + pose[2])], axis=-1)
+    anchors = pose[:2] + r[:, None] * n
+    model = innovations(pose, anchors, np.stack([alpha + pose[2], np.zeros(6)], axis=-1), seen, cov)
+    white = model.e / np.sqrt(np.diagonal(model.R, axis1=1, axis2=2))
+    facing = np.cos(along * draws[:, 0]) - t0 * np.sin(along * draws[:, 0]) / seen[:, 1] > 0.1
+    np.testing.assert_allclose(white[facing], draws[facing], atol=1e-9)
+
+
+def test_a_recording_is_made_once_and_kept(tmp_path):
+    config = TrialConfig("paper-fig4", seed=2, max_steps=20)
+    new, kept = record(config, tmp_path), record(config, tmp_path)
+    np.testing.assert_array_equal(new.recording.ranges_m, kept.recording.ranges_m)
+    np.testing.assert_array_equal(new.true_poses_world, kept.true_poses_world)
+    (home,) = tmp_path.iterdir()
+    home.rename(tmp_path / home.name.replace("fig4", "fig8"))
+    with pytest.raises(UsageError, match="another"):
+        record(TrialConfig("paper-fig8", seed=2), tmp_path)
+
+
+@pytest.mark.parametrize("length_m", [30.0, 200.0])
+def test_a_ring_closes_smoothly(length_m):
+    way = np.linspace(0.0, length_m, 4001)
+    poses = on_ring(way, length_m)
+    np.testing.assert_allclose(poses[-1] - poses[0], 0.0, atol=1e-9)
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    np.testing.assert_allclose(steps, length_m / 4000, rtol=1e-3)
+    off = poses[:-1, 2] - np.arctan2(*np.diff(poses[:, :2], axis=0).T[::-1])
+    np.testing.assert_allclose(np.sin(0.5 * off), 0.0, atol=0.03)
+
+
+def test_every_back_end_meets_the_same_ring_and_nothing_is_seen_in_the_gap():
+    one, again = drive(Loop(30.0, gap_m=6.0), 7), drive(Loop(30.0, gap_m=6.0), 7)
+    for a, b in zip(one.again, again.again, strict=True):
+        np.testing.assert_array_equal(a.lines, b.lines)
+    seen = np.array([len(a) + len(b) for a, b in zip(one.again, one.first, strict=True)])
+    way = 0.25 * np.arange(len(seen))
+    gap = (way > 24.0) & (way < 30.0)
+    assert not seen[gap].any()
+    assert np.mean(seen[~gap]) > 3
+    assert not len(one.first[-1])
+    assert max(np.sqrt(looks.cov[:, 0, 0].max(initial=0.0)) for looks in one.again) < FIRM_RAD
+
+
+@pytest.fixture
+def _unchecked():
+    """Without the shape checks that pytest adds: they cost more than the filters do."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
+def mean_anees(told, loops=16):
+    """Return each ring's pose ANEES of the invariant filter, from a sure start."""
+    found = []
+    for seed in range(1, loops + 1):
+        seen = drive(Loop(20.0, after_m=5.0), seed)
+        make = BACKENDS["invariant-ekf"].make
+        found.append(ride(make(*start(seed, seen.true_poses_world[0], "zero")), seen.told(told)).pose_nees.mean() / 3)
+    return np.array(found)
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_the_study_has_teeth():
+    """A filter that is told half of the noise is rejected by its interval, and one that is told all of it is not."""
+    honest, fooled = mean_anees(1.0), mean_anees(0.5)
+    print(f"told all {honest.mean():.2f} {bootstrap(honest)}, told half {fooled.mean():.2f} {bootstrap(fooled)}")
+    assert bootstrap(fooled)[0] > 1.15
+    low, high = bootstrap(honest)
+    assert low < 1.0 < high
+
+
+def test_a_study_goes_on_where_it_was_left(tmp_path):
+    def study(seeds, backends=("full-ekf", "block-ekf")):
+        Study(backends, (20.0,), gap_m=(0.0,), seeds=seeds, jobs=1, out=tmp_path / "loops.csv").run()
+        return (tmp_path / "loops.csv").read_text().splitlines()
+
+    first = study(1)
+    assert len(first) == 3
+    both = study(2)
+    assert len(both) == 5
+    assert set(first) < set(both)
+    assert study(2) == both
+    assert both[0].endswith(",".join(SCORES))
+    (tmp_path / "loops.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(UsageError, match="another"):
+        study(1)
