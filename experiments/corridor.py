@@ -55,7 +55,7 @@ def drive(loop: Loop, seed: int) -> Sightings:
     lines, known = through(walls), np.zeros(len(walls), dtype=bool)
     noise = np.random.default_rng([seed, 2])
     for at, pose in zip(way, poses, strict=True):
-        looks = _look(walls, lines, pose, noise.standard_normal((len(walls), 2)))
+        looks = look(walls, lines, pose, noise.standard_normal((len(walls), 2)))
         if loop.length_m - loop.gap_m < at < loop.length_m:
             looks = looks.take(np.zeros(0, dtype=np.int64))
         old = known[looks.walls]
@@ -116,7 +116,7 @@ def _wheels(
     return np.concatenate([np.zeros((1, 3)), np.array(true) + noise]), np.tile(cov, (len(poses), 1, 1))
 
 
-def _look(
+def look(
     walls: Float[np.ndarray, "n 2 2"],
     lines: Float[np.ndarray, "n 2"],
     pose: Float[np.ndarray, "3"],
