@@ -15,6 +15,7 @@ from .listings import Backends, Strategies, Worlds
 from .measure_command import Measure
 from .replay_command import Replay
 from .scenario import UsageError, choose
+from .view_command import View
 
 BAD_USAGE, INTERRUPTED = 2, 130
 
@@ -33,6 +34,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "replay": Replay,
     "compare": Compare,
     "measure": Measure,
+    "view": View,
     "worlds": Worlds,
     "backends": Backends,
     "strategies": Strategies,

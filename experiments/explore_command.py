@@ -16,8 +16,9 @@ from .interrupts import first_interrupt_waits
 from .progress import print_summary, progress
 from .results import write_results
 from .saved import read_saved
-from .scenario import P0, TrialConfig, UsageError, check, load_world
-from .trial import run_trial
+from .scenario import P0, TrialConfig, UsageError, build, check, load_world
+from .timelines import Recording
+from .trial import default_mission, run_scenario
 
 SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale")
 """What a saved run has settled; only its limits may be others when it goes on."""
@@ -59,6 +60,10 @@ class Explore:
     resume: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """In place of WORLD: go on with the run in this folder, up to the limits given now. It is driven again from its
     start, which takes as long as it took, and leaves what a run that was never stopped would have left."""
+    rrd: Path | None = None
+    """Record the run for Rerun's viewer into this file (`chainslam view FILE` opens it)."""
+    view: bool = False
+    """Open Rerun's viewer and show the run as it goes on, instead of recording it."""
 
     @property
     def trial(self) -> TrialConfig:
@@ -101,9 +106,15 @@ class Explore:
         saved = None if self.resume is None else read_saved(self.resume)
         trial = self.trial if saved is None else self.continued(saved.trial)
         check(trial)
+        if self.view and self.rrd is not None:
+            raise UsageError("expected --rrd or --view, found both: the viewer can save what it shows")
         world = load_world(trial.world, trial.start, trial.scale)
         folder = self.out or self.resume or default_folder(world.name, trial)
         prepare(folder)
+        scenario = build(trial, world)
+        noise = "errorless" if trial.errorless else f"seed {trial.seed}"
+        title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
+        recording = Recording(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
         with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
 
             def watch(step: Step) -> None:
@@ -112,12 +123,14 @@ class Explore:
                 show(step)
                 stop_if_asked()
 
-            result = run_trial(trial, watch, world)
+            recorded = recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
+            result = run_scenario(scenario, recorded, default_mission)
         if saved is not None and len(result.log or ()) < len(saved.recording):
             told = f"expected to pass the end of the saved run, found {result.ending.reason}: its files are left as"
             print(f"chainslam: {told} they were", file=sys.stderr)
+            recording.drop()
             return result.ending.exit_status or 2
-        problems = write_results(result, folder)
+        problems = write_results(result, folder) + recording.close()
         if self.out is None and saved is None:
             _point_latest_at(folder)
         print_summary(result.summary)

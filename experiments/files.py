@@ -1,9 +1,11 @@
 """Files that are written whole or not at all, and the same bytes for the same content."""
 
 import csv
+import errno
 import json
 import math
 import os
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -24,6 +26,29 @@ def write(path: Path, content: bytes) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def probe(path: Path) -> None:
+    """Raise OSError, leaving nothing behind, where `write_anywhere` could not write."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not path.exists() or path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            return
+
+
+def write_anywhere(path: Path, content: bytes) -> None:
+    """Write to a place that somebody named: its folder is made, and what is no plain file (a device, a pipe) is kept.
+
+    Raises OSError, with nothing left behind.
+    """
+    if path.exists() and not path.is_file():
+        with path.open("wb") as stream:
+            stream.write(content)
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write(path, content)
 
 
 def json_bytes(value: Any) -> bytes:

@@ -1,5 +1,6 @@
 """`chainslam replay`: one recording, one or several back ends."""
 
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +13,8 @@ from .explore_command import prepare
 from .progress import print_comparison, progress
 from .replay import Association, ReplayOptions, read_run, replay
 from .results import write_results
-from .scenario import choose
+from .scenario import choose, load_world
+from .timelines import Recording
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Replay:
     """The true motions in place of what the wheels reported; the stated covariance stays."""
     out: Path | None = None
     """Folder for the results, one folder for each of several back ends; by default replay-ASSOCIATION beside LOG."""
+    rrd: Path | None = None
+    """Record all back ends, side by side on one time axis, for Rerun's viewer (`chainslam view FILE` opens it)."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
@@ -42,13 +46,21 @@ class Replay:
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
         for folder in folders.values():
             prepare(folder)
-        summaries, status = [], 0
+        trial = run.trial
+        world = load_world(trial.world, trial.start, trial.scale)
+        title = f"{world.name}, seed {trial.seed}, replayed with {self.association} association"
+        recording = Recording(title, self.backend, world, trial.errorless, self.rrd)
+        summaries, problems, status = [], [], 0
         for name, folder in folders.items():
             with progress(f"replaying with {name}") as watch:
-                result = replay(run, name, options, watch)
-            problems = write_results(result, folder)
+                recorded = recording.watch(name, lambda step: run.true_poses_world[step.index], watch)
+                result = replay(run, name, options, recorded)
+            problems += write_results(result, folder)
             summaries.append(result.summary)
-            status = max(status, result.ending.exit_status, 1 if problems else 0)
+            status = max(status, result.ending.exit_status)
+        problems += recording.close()
         print_comparison(summaries, f"{run.trial.world}, seed {run.trial.seed}, {self.association} association")
         print(f"results in {out}")
-        return status
+        for problem in problems:
+            print(f"chainslam: not written: {problem}", file=sys.stderr)
+        return status or (1 if problems else 0)

@@ -25,6 +25,8 @@ from .scores import odometry_path, pose_nees
 from .trial import TrialResult
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
+LOG = "log.npz"
+RECORDING = "run.rrd"
 STEP_COLUMNS = (
     *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
@@ -62,7 +64,7 @@ def _files(result: TrialResult) -> dict[str, Callable[[], bytes]]:
         return files
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
-        "log.npz": lambda: npz_bytes(log_arrays(result, log)),
+        LOG: lambda: npz_bytes(log_arrays(result, log)),
         "map.npz": lambda: npz_bytes(map_arrays(result)),
         "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
         "steps.csv": lambda: steps_csv(log),

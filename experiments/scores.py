@@ -45,15 +45,24 @@ class Ending:
 
 def pose_nees(log: Log) -> Float[np.ndarray, " s"]:
     """Return the NEES of the invariant pose error at each step; NaN where a covariance is not positive definite."""
-    errors = pose_errors(log.estimated_world, log.true_world)
-    covs = pose_covariances(log.estimated_world, log.estimated_cov)
-    values = np.full(len(log), np.nan)
-    for i, (error, cov) in enumerate(zip(errors, covs, strict=True)):
-        try:
-            values[i] = nees(error[None], cov[None])[0]
-        except np.linalg.LinAlgError:
-            continue
-    return values
+    return nees_of_poses(log.estimated_world, log.estimated_cov, log.true_world)
+
+
+def nees_of_poses(
+    estimated_world: Float[np.ndarray, "s 3"],
+    estimated_cov: Float[np.ndarray, "s 3 3"],
+    true_world: Float[np.ndarray, "s 3"],
+) -> Float[np.ndarray, " s"]:
+    """Return the NEES of invariant pose errors (m, m, rad); NaN where a covariance is not positive definite."""
+    errors = pose_errors(estimated_world, true_world)
+    covs = pose_covariances(estimated_world, estimated_cov)
+    try:
+        return nees(errors, covs)
+    except np.linalg.LinAlgError:
+        if len(errors) == 1:
+            return np.array([np.nan])
+        rows = zip(estimated_world[:, None], estimated_cov[:, None], true_world[:, None], strict=True)
+        return np.concatenate([nees_of_poses(*row) for row in rows])
 
 
 def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from io import BytesIO
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -73,9 +74,15 @@ def draw_map(picture: Picture) -> Figure:
 
 def png(figure: Figure) -> bytes:
     """Return a figure as the bytes of a PNG file, the same for the same figure."""
+    return saved(figure, "png")
+
+
+def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
+    """Return a figure as the bytes of a file, the same for the same figure; svg and pdf stay sharp at any size."""
     buffer = BytesIO()
+    unsaid = {"png": "Software", "svg": "Date", "pdf": "CreationDate"}
     with mpl.rc_context({"svg.hashsalt": "chainslam"}):
-        figure.savefig(buffer, format="png", metadata={"Software": None})
+        figure.savefig(buffer, format=kind, metadata={unsaid[kind]: None})
     return buffer.getvalue()
 
 

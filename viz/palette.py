@@ -1,17 +1,47 @@
-"""Colours, one meaning each; told apart with any colour vision (Okabe and Ito's set)."""
+"""Colours, one meaning each, the same in Rerun and in matplotlib."""
+
+from slam.backends import BACKENDS
+
+BACKEND_COLOURS = ("#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#1A1A1A", "#6B2C91")
+"""Okabe and Ito's set without its yellow, which white paper swallows; a dark purple in its place. With any colour
+vision two of them are as easily told apart as any two of that set (tests/viz/test_palette.py simulates it)."""
+
+
+def of_backend(name: str) -> str:
+    """Return the colour of a back end by its place in the registry; of one that is in none, the last."""
+    names = list(BACKENDS)
+    turn = names.index(name) if name in names else len(BACKEND_COLOURS) - 1
+    return BACKEND_COLOURS[turn % len(BACKEND_COLOURS)]
+
 
 CLOSED = ("#0072B2", "#009E73", "#56B4E9", "#7B4FA3", "#1B7F8C", "#4C5FD5", "#6B8E23", "#A0527F")
 """Closed chains, in turn."""
 OPEN = "#E69F00"
-"""Chains with open ends."""
+"""Chains with open ends ..."""
+OPEN_SHADES = (OPEN, "#B86E00", "#F2C45A", "#8C5A1E")
+"""... in turn, where several are told apart."""
 ALARM = "#D55E00"
 """Open ends."""
 TENTATIVE = "#9A9A9A"
+GOAL = "#FFC400"
+SWEPT = "#E4EFF7"
+SCAN = "#4A90D9"
+FUSED = "#009E73"
+NEW = "#0072B2"
+REFUSED = "#C8102E"
+UNUSED = "#9A9A9A"
+SIGHT = "#C4CDD6"
+NEIGHBOUR = "#8796A5"
+TO_FOLLOW = "#F3E58A"
+GRID_STRONG = "#B9B6AE"
+BAND = "#9A9A9A"
 PAGE = "#FFFFFF"
 SOLID = "#D9D7D2"
 """True walls."""
 FLOOR = "#FBFAF7"
+WALL_LINE = "#8F8C85"
 GRID = "#E4E2DC"
 INK = "#2B2B2B"
 PATH_ESTIMATED = "#333A56"
 PATH_TRUE = "#CC79A7"
+PATH_TRUE_PALE = "#E3B5CD"

@@ -1,0 +1,224 @@
+import csv
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from experiments.cli import main
+from experiments.timelines import Recording
+from experiments.replay import read_run, replay
+from experiments.scenario import TrialConfig, build, load_world
+from experiments.trial import default_mission, run_scenario
+
+WORLD, STEPS = "paper-fig4", 70
+EXPLORE = ["explore", WORLD, "--max-steps", str(STEPS)]
+TIMINGS = ("step_ms", "seconds")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _strict():
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """The same run twice, with a recording and without one."""
+    folder = tmp_path_factory.mktemp("recorded")
+    recorded = main([*EXPLORE, "--out", str(folder / "with"), "--rrd", str(folder / "new" / "run.rrd")])
+    plain = main([*EXPLORE, "--out", str(folder / "without")])
+    assert (recorded, plain) == (0, 0)
+    return SimpleNamespace(
+        recorded=folder / "with", plain=folder / "without", rrd=folder / "new" / "run.rrd", rows=steps(folder / "with")
+    )
+
+
+def steps(folder):
+    with (folder / "steps.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def column(rows, name):
+    return np.array([float(row[name]) for row in rows])
+
+
+def read(rrd, entity, component):
+    """Return the steps and the values of one component of one entity, static rows aside."""
+    times, values = [], []
+    for chunk in RrdReader(rrd).stream().filter(content=entity):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names and "step" in batch.schema.names:
+            times += batch.column("step").to_pylist()
+            values += batch.column(component).to_pylist()
+    order = np.argsort(times, kind="stable")
+    return np.array(times)[order], [values[k] for k in order]
+
+
+def scalars(rrd, entity):
+    times, values = read(rrd, entity, "Scalars:scalars")
+    return times, np.array(values, dtype=float)[:, 0]
+
+
+def without_timings(folder):
+    """The bytes of every file of a run, without what a clock has a part in."""
+    summary = json.loads((folder / "summary.json").read_text())
+    rows = [{k: v for k, v in row.items() if k not in TIMINGS} for row in steps(folder)]
+    others = {p.name: p.read_bytes() for p in folder.iterdir() if p.name not in ("summary.json", "steps.csv")}
+    return {k: v for k, v in summary.items() if k not in TIMINGS}, rows, others
+
+
+def test_results_are_the_same_bytes_with_and_without_a_recording(runs):
+    assert without_timings(runs.recorded) == without_timings(runs.plain)
+
+
+def test_every_thing_that_is_shown_has_its_entity(runs):
+    paths = {str(path) for path in RrdReader(runs.rrd).store().schema().entity_paths()}
+    world = "/world/full-ekf"
+    assert {"/world/truth/walls", "/world/truth/path", "/world/truth/robot", "/legend", "/model/axes"} <= paths
+    assert {
+        f"{world}/{name}"
+        for name in (
+            *("path", "ellipse", "robot", "robot/body", "robot/scan", "robot/segments", "corners", "open_ends"),
+            *("goal", "to_follow", "swept", "visibility/sights", "visibility/neighbours", "walls/0"),
+        )
+    } <= paths
+    assert {"/model/full-ekf/walls/0", "/model/full-ekf/seen", "/model/full-ekf/matches"} <= paths
+    assert {"/graph/full-ekf", "/decisions/full-ekf", "/plots/nees/full-ekf", "/plots/nees/band/high"} <= paths
+
+
+@pytest.mark.parametrize(
+    ("curve", "name"),
+    [
+        *(("nees", "pose_nees"), ("pose_trace", "pose_trace"), ("path_length_m", "path_length_m")),
+        *(("open_ends", "open_ends"), ("lines", "lines"), ("closed_chains", "closed_chains"), ("step_ms", "step_ms")),
+    ],
+)
+def test_curves_are_those_of_the_run(runs, curve, name):
+    times, values = scalars(runs.rrd, f"/plots/{curve}/full-ekf")
+    np.testing.assert_array_equal(times, np.arange(STEPS))
+    np.testing.assert_allclose(values, column(runs.rows, name), rtol=1e-9)
+
+
+def test_the_number_of_chains_and_the_circles_at_their_ends_are_those_of_the_map(runs):
+    chains = json.loads((runs.recorded / "map.geojson").read_text())["features"]
+    mapped = [feature for feature in chains if feature["properties"].get("kind") == "chain"]
+    _, counts = scalars(runs.rrd, "/plots/chains/full-ekf")
+    assert counts[-1] == len(mapped) > 0
+    _, circles = read(runs.rrd, "/world/full-ekf/open_ends", "Ellipses2D:centers")
+    assert len(circles[-1]) == int(runs.rows[-1]["open_ends"]) > 0
+
+
+def test_the_robot_stands_where_the_run_says_and_y_points_up(runs):
+    _, shifts = read(runs.rrd, "/world/full-ekf/robot", "Transform3D:translation")
+    _, turns = read(runs.rrd, "/world/full-ekf/robot", "Transform3D:quaternion")
+    places = np.array(shifts)[:, 0, :2]
+    np.testing.assert_allclose(places, np.column_stack([column(runs.rows, f"{axis}_m") for axis in "xy"]), atol=1e-5)
+    half = np.array(turns)[:, 0]
+    heading = 2.0 * np.arctan2(half[:, 2], half[:, 3])
+    off = np.angle(np.exp(1j * (heading - column(runs.rows, "heading_rad"))))
+    np.testing.assert_allclose(off, 0.0, atol=1e-5)
+    (frame,) = [c.to_record_batch() for c in RrdReader(runs.rrd).stream().filter(content="/world") if "scale" in str(c)]
+    assert frame.column("Transform3D:scale").to_pylist()[-1][0] == [1.0, -1.0, 1.0]
+
+
+def test_the_last_walls_drawn_are_those_of_the_map(runs):
+    with np.load(runs.recorded / "map.npz") as arrays:
+        ids, lines, anchors, extents = (arrays[name] for name in ("ids", "lines", "anchors", "extents"))
+    for wall, (alpha, d), anchor, extent in zip(ids, lines, anchors, extents, strict=True):
+        _, strips = read(runs.rrd, f"/world/full-ekf/walls/{wall}", "LineStrips2D:strips")
+        n = np.array([np.cos(alpha), np.sin(alpha)])
+        ends = anchor + d * n + extent[:, None] * np.array([-n[1], n[0]])
+        np.testing.assert_allclose(strips[-1][0], ends, atol=0.01)
+
+
+def test_several_back_ends_stand_in_one_recording_on_one_time_axis(runs, tmp_path):
+    run = read_run(runs.recorded / "log.npz")
+    world, backends = load_world(run.trial.world), ["block-ekf", "full-ekf", "graph"]
+    recording = Recording("three", backends, world, False, tmp_path / "three.rrd")
+    finals = {}
+    for backend in backends:
+        watch = recording.watch(backend, lambda step: run.true_poses_world[step.index])
+        finals[backend] = replay(run, backend, watch=watch)
+    assert recording.close() == []
+    plain = replay(run, "graph")
+    np.testing.assert_array_equal(finals["graph"].log.estimated_world, plain.log.estimated_world)
+    np.testing.assert_array_equal(finals["graph"].log.estimated_cov, plain.log.estimated_cov)
+    for backend in backends:
+        times, values = scalars(tmp_path / "three.rrd", f"/plots/nees/{backend}")
+        np.testing.assert_array_equal(times, np.arange(STEPS))
+        assert np.mean(values) / 3 == pytest.approx(finals[backend].summary["pose_anees"])
+    times, _ = read(tmp_path / "three.rrd", "/world/truth/robot", "Transform3D:translation")
+    np.testing.assert_array_equal(times, np.arange(STEPS))
+
+
+@pytest.mark.parametrize("place", ["file/run.rrd", "folder", "/dev/full"])
+def test_a_recording_that_cannot_be_written_costs_one_line_and_nothing_else(tmp_path, capsys, place):
+    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "folder").mkdir()
+    target = tmp_path / place
+    status = main(["explore", WORLD, "--max-steps", "4", "--out", str(tmp_path / "out"), "--rrd", str(target)])
+    said = capsys.readouterr().err.splitlines()
+    assert status == 1
+    assert len(said) == 1
+    assert said[0].startswith(f"chainslam: not written: {target}: ")
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["steps"] == 4
+    assert (tmp_path / "out" / "map.png").is_file()
+
+
+def test_a_trouble_while_recording_is_told_and_the_run_goes_on(tmp_path, monkeypatch):
+    from viz.timeline import Timeline
+
+    def fail(*_):
+        raise RuntimeError("out of\nink")
+
+    monkeypatch.setattr(Timeline, "add", fail)
+    scenario = build(TrialConfig(WORLD, max_steps=2))
+    recording = Recording("title", ["full-ekf"], scenario.world, False, tmp_path / "x.rrd")
+    seen = []
+    watch = recording.watch("full-ekf", lambda step: np.zeros(3), seen.append)
+    assert len(run_scenario(scenario, watch, default_mission).log) == len(seen) == 2
+    assert recording.close() == [f"{tmp_path / 'x.rrd'}: out of ink"]
+    assert not (tmp_path / "x.rrd").exists()
+
+
+def test_without_a_display_the_viewer_is_one_line_and_the_results_are_kept(tmp_path, capsys, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    status = main(["explore", WORLD, "--max-steps", "3", "--out", str(tmp_path), "--view"])
+    said = capsys.readouterr().err.splitlines()
+    assert status == 1
+    assert len(said) == 1
+    assert "expected a display" in said[0]
+    assert (tmp_path / "summary.json").is_file()
+
+
+def test_view_opens_a_file_or_makes_a_recording_from_a_log(runs, capsys, monkeypatch):
+    opened = []
+    monkeypatch.setattr("experiments.view_command.Viewer", opened.append)
+    assert main(["view", str(runs.rrd)]) == 0
+    assert main(["view", str(runs.rrd.parent)]) == 0
+    assert main(["view", str(runs.plain)]) == 0
+    assert opened == [[runs.rrd], [runs.rrd], [runs.plain / "run.rrd"]]
+    times, _ = scalars(runs.plain / "run.rrd", "/plots/nees/full-ekf")
+    assert len(times) == STEPS
+    (runs.plain / "run.rrd").unlink()
+    capsys.readouterr()
+    assert main(["view", str(runs.plain / "summary.json")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_rerun_is_imported_only_when_a_recording_is_asked_for(tmp_path):
+    code = (
+        "import sys; from experiments.cli import main; "
+        f"main(['explore', {WORLD!r}, '--max-steps', '2', '--out', {str(tmp_path)!r}]); "
+        "sys.exit('rerun' in sys.modules)"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    assert subprocess.run([sys.executable, "-c", code], env=environment, stdout=subprocess.DEVNULL).returncode == 0

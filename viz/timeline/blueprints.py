@@ -1,0 +1,150 @@
+"""How the viewer arranges a recording: one run, several back ends side by side, a campaign's summary."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun.blueprint as rrb
+from jaxtyping import Float
+
+from .curves import CHAINS, CLOSED, ENDS, LINES, LOG_NEES, NEES, PATH, POSE_BAND, STEP_MS, TRACE
+from .map_layers import style
+from .model_layer import TIMES
+from .recording import SIM_TIME, STEP
+from .robot_layers import POSE_TIMES
+from .sights import UNITS_PER_M
+
+WHITE = (255, 255, 255)
+CHAINS_NAME = "chains, and closed ones"
+TRACE_NAME = "trace of the pose covariance, m² + rad²"
+
+
+Bounds = tuple[tuple[float, float], tuple[float, float]]
+"""From and to along x and along y of a view, y down."""
+
+
+def one_run(backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -> rrb.Horizontal:
+    """Return the layout of one run: the map large, the estimate's insides beside it, the reasons below."""
+    below = rrb.Horizontal(_decisions(backend), _legend(), column_shares=[1, 1.15])
+    left = rrb.Vertical(map_view(backend, seen_world), below, row_shares=[2.3, 1])
+    right = rrb.Vertical(
+        rrb.Horizontal(model_view(backend, plane), graph_view(backend, seen_world)),
+        nees_view(),
+        curve_view(TRACE, TRACE_NAME),
+        rrb.Horizontal(
+            curve_view(ENDS, "open ends"),
+            curve_view(LINES, "walls in the map"),
+            curve_view((CHAINS, CLOSED), CHAINS_NAME),
+        ),
+        rrb.Horizontal(curve_view(PATH, "path length, m"), curve_view(STEP_MS, "time of a step, ms")),
+        row_shares=[2.2, 1.2, 1, 0.9, 0.9],
+    )
+    return rrb.Horizontal(left, right, column_shares=[1.25, 1], name="run")
+
+
+def comparison(backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -> rrb.Vertical:
+    """Return the layout of several back ends side by side, and their curves in common plots."""
+    columns = rrb.Horizontal(
+        *(
+            rrb.Vertical(
+                map_view(backend, seen_world),
+                rrb.Tabs(model_view(backend, plane), graph_view(backend, seen_world)),
+                row_shares=[1.6, 1],
+            )
+            for backend in backends
+        )
+    )
+    curves = rrb.Horizontal(
+        rrb.Tabs(
+            curve_view(LOG_NEES, "NEES of the pose as a power of ten, with its 95 % band", (-1.5, 5.0), legend=True),
+            nees_view(legend=True),
+        ),
+        curve_view(TRACE, TRACE_NAME),
+        rrb.Tabs(
+            curve_view(LINES, "walls in the map"), curve_view(ENDS, "open ends"),
+            curve_view((CHAINS, CLOSED), CHAINS_NAME), curve_view(PATH, "path length, m"),
+            curve_view(STEP_MS, "time of a step, ms"),
+        ),
+        _legend(),
+        column_shares=[1.4, 1.2, 1, 0.8],
+    )  # fmt: skip
+    return rrb.Vertical(columns, curves, row_shares=[2.4, 1], name="side by side")
+
+
+def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.Spatial2DView:
+    """Return the map of one back end over the truth."""
+    start, end = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
+    so_far = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=end) for line in (STEP, SIM_TIME)])
+    return rrb.Spatial2DView(
+        origin="/", contents=["/world/truth/**", f"/world/{backend}/**"], visual_bounds=_bounds(seen_world, 0.6),
+        name=f"{backend}: map  (robot's 3σ ellipse ×{POSE_TIMES:.0f})", background=WHITE, defaults=[style(2.6, 24.0)],
+        overrides={"/world/truth/path": so_far, f"/world/{backend}/path": so_far},
+    )  # fmt: skip
+
+
+def model_view(backend: str, plane: Bounds) -> rrb.Spatial2DView:
+    """Return the model space of one back end."""
+    return rrb.Spatial2DView(
+        origin="/", contents=["/model/axes/**", f"/model/{backend}/**"], background=WHITE,
+        defaults=[style(1.2, 24.0)], name=f"{backend}: model space (α, r)  (3σ ellipses ×{TIMES:.0f})",
+        visual_bounds=rrb.VisualBounds2D(x_range=plane[0], y_range=plane[1]),
+    )  # fmt: skip
+
+
+def graph_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.GraphView:
+    """Return the visibility graph of one back end."""
+    bounds = _bounds(UNITS_PER_M * seen_world, UNITS_PER_M)
+    return rrb.GraphView(
+        origin=f"/graph/{backend}", name=f"{backend}: visibility graph",
+        force_link=rrb.archetypes.ForceLink(enabled=False),
+        force_many_body=rrb.archetypes.ForceManyBody(enabled=False),
+        background=rrb.archetypes.GraphBackground(color=WHITE), visual_bounds=bounds,
+    )  # fmt: skip
+
+
+def nees_view(legend: bool = False) -> rrb.TimeSeriesView:
+    """Return the pose's NEES with its band; what leaves the scale is far from consistent, however far."""
+    high = 2.5 * POSE_BAND[1]
+    return curve_view(NEES, f"NEES of the pose, with its 95 % band (cut at {high:.0f})", (0.0, high), legend)
+
+
+def curve_view(
+    plots: str | tuple[str, ...], name: str, span: tuple[float, float] | None = None, legend: bool = False
+) -> rrb.TimeSeriesView:
+    """Return one plot of some quantities, with a curve for each back end."""
+    contents = [f"/plots/{plot}/**" for plot in ((plots,) if isinstance(plots, str) else plots)]
+    return rrb.TimeSeriesView(
+        origin="/plots", contents=contents, name=name,
+        background=rrb.archetypes.PlotBackground(color=WHITE, show_grid=False),
+        axis_y=None if span is None else rrb.ScalarAxis(range=span),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
+    )  # fmt: skip
+
+
+def _bounds(seen: Float[np.ndarray, "n 2"], margin: float) -> rrb.VisualBounds2D | None:
+    """Return the part of the plane that holds all points, y up; None where there are none."""
+    if not len(seen):
+        return None
+    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
+    return rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(-high[1], -low[1]))
+
+
+def _legend() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin="/legend", name="what is shown")
+
+
+def _decisions(backend: str) -> rrb.TextLogView:
+    # The lines begin with their step: the viewer would show the times in a column too narrow for them.
+    hidden = [rrb.encodings.TimelineColumn(timeline, visible=False) for timeline in (STEP, SIM_TIME)]
+    return rrb.TextLogView(
+        origin=f"/decisions/{backend}", name="decisions and their reasons",
+        columns=rrb.TextLogColumns(text_log_columns=["Body"], timeline_columns=hidden),
+    )  # fmt: skip
+
+
+def blueprint(*uses: rrb.Horizontal | rrb.Vertical) -> rrb.Blueprint:
+    """Return the whole layout: one use, or a tab for each, the panels aside."""
+    return rrb.Blueprint(
+        uses[0] if len(uses) == 1 else rrb.Tabs(*uses), rrb.TimePanel(state="collapsed", timeline="step"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )  # fmt: skip

@@ -1,0 +1,61 @@
+"""One back end's part of a recording: steps in, and every so often columns out, layer by layer."""
+
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.step import Step
+
+from .block import Block
+from .curves import Curves, Decisions
+from .map_layers import Corners, OpenEnds, Plan, Swept, Walls
+from .model_layer import ModelSpace
+from .moment import Keeper, Moment
+from .recording import Recording
+from .robot_layers import Robot, Seen
+from .sights import SightsLayer
+from .truth import Nees, NeesOf, Truth
+
+
+class Layer(Protocol):
+    """One kind of thing in a recording; it sends what changed of it and remembers what it sent."""
+
+    def send(self, block: Block) -> None:
+        """Send some steps, in order, none twice."""
+        ...
+
+
+class Lane:
+    """Gathers the steps of one back end."""
+
+    def __init__(self, recording: Recording, backend: str, truth: Truth, nees_of: NeesOf | None) -> None:
+        self._keeper = Keeper()
+        self._kept: list[Moment] = []
+        self._r_span = (0.0, 0.0)
+        kinds = (Swept, Walls, Corners, OpenEnds, Plan, Robot, Seen, SightsLayer, ModelSpace, Curves, Decisions)
+        self._layers: list[Layer] = [kind(recording, backend) for kind in kinds]
+        self._layers += [truth] if nees_of is None else [truth, Nees(recording, backend, nees_of)]
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    @property
+    def r_span(self) -> tuple[float, float]:
+        """Least and largest r of the lines so far, m."""
+        return self._r_span
+
+    def add(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> None:
+        """Keep a step; its belief is asked at once, before the back end moves on."""
+        self._kept.append(self._keeper.moment(step, true_pose_world))
+
+    def flush(self) -> None:
+        """Send what was kept since the last time."""
+        rows, self._kept = self._kept, []
+        if not rows:
+            return
+        block = Block(rows)
+        r = np.append(block.lines[:, 1], self._r_span)
+        self._r_span = float(r.min()), float(r.max())
+        for layer in self._layers:
+            layer.send(block)

@@ -1,0 +1,163 @@
+"""What a timeline keeps of one step: small arrays and references, cheap while the robot drives."""
+
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt32
+
+from explore.free_space import FreeSpace, FreeSpaceConfig
+from explore.goal import Goal, SetAside
+from explore.step import Step
+from explore.visibility import NEIGHBOUR
+from slam.chains import Chain
+from slam.matching import Matches
+from slam.robot import Scan
+from slam.segments import Segments
+
+from .colours import ChainColours
+
+EVERY_ALL, EVERY_SEEN = 25, 2
+"""The covariance of every wall is asked for once in so many steps, that of walls just seen once in so many."""
+EVERY_GRAPH = 10
+EVERY_SWEPT = 20
+EVERY_OWN_SCAN = 3
+"""Without a grid of the mission's own (a replay plans nothing), every so many scans are drawn into one."""
+OWN_CELL_M = 0.1
+
+
+@dataclass(frozen=True)
+class Ellipses:
+    """Walls whose covariance was asked for at a step."""
+
+    ids: Int[np.ndarray, " m"]
+    means: Float[np.ndarray, "m 2"]
+    anchors: Float[np.ndarray, "m 2"]
+    covs: Float[np.ndarray, "m 2 2"]
+    """Covariance of (alpha, d)."""
+
+
+NO_ELLIPSES = Ellipses(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+
+
+@dataclass(frozen=True)
+class Sights:
+    """The visibility graph at a step."""
+
+    nodes: tuple[int, ...]
+    edges: Int[np.ndarray, "e 2"]
+    is_neighbour: Bool[np.ndarray, " e"]
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What had been seen free at a step."""
+
+    free: Bool[np.ndarray, "h w"]
+    corner_world: Float[np.ndarray, "2"]
+    """Of the lowest row and first column, m."""
+    cell_m: float
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One step, as much of it as is drawn."""
+
+    index: int
+    time_s: float
+    pose: Float[np.ndarray, "3"]
+    pose_cov: Float[np.ndarray, "3 3"]
+    true_pose: Float[np.ndarray, "3"] | None
+    scan: Scan
+    segments: Segments
+    matches: Matches
+    owners: Int[np.ndarray, " s"]
+    ids: Int[np.ndarray, " n"]
+    means: Float[np.ndarray, "n 2"]
+    anchors: Float[np.ndarray, "n 2"]
+    extents: Float[np.ndarray, "n 2"]
+    colours: UInt32[np.ndarray, " n"]
+    """Of each wall, by its chain."""
+    ellipses: Ellipses | None
+    chains: tuple[Chain, ...]
+    set_aside: tuple[SetAside, ...]
+    goal: Goal | None
+    follow: tuple[int, ...]
+    reason: str
+    ended: str | None
+    sights: Sights | None
+    swept: Swept | None
+    path_length_m: float
+    seconds: float
+
+
+class Keeper:
+    """Makes moments out of the steps of one back end."""
+
+    def __init__(self) -> None:
+        self._own = FreeSpace(FreeSpaceConfig(cell_m=OWN_CELL_M))
+        self._graph_size = (-1, -1)
+        self._colours = ChainColours()
+
+    def moment(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> Moment:
+        """Return what is drawn of a step; it asks the step's belief, so before the back end moves on."""
+        belief, walls = step.map.belief, step.map
+        last = step.ended is not None
+        return Moment(
+            step.index, step.time_s, belief.pose_world.copy(), belief.pose_cov.copy(), true_pose_world, step.scan,
+            step.segments, step.matches, step.walls_of_segments, walls.ids.copy(), belief.means.copy(),
+            belief.anchors.copy(), walls.extents.copy(), self._colours.of_walls(walls.ids, step.chains),
+            _ellipses(step, last), step.chains, step.set_aside, step.goal, step.walls_to_follow, step.reason,
+            step.ended, self._sights(step.graph, step.index, last), self._swept(step, last), step.path_length_m,
+            step.seconds,
+        )  # fmt: skip
+
+    def _sights(self, graph: "nx.DiGraph[int]", index: int, last: bool) -> Sights | None:
+        if not last and index % EVERY_GRAPH:
+            return None
+        size = (graph.number_of_nodes(), graph.number_of_edges())
+        if size == self._graph_size:
+            return None
+        self._graph_size = size
+        kinds = [(a, b, says["kind"] == NEIGHBOUR) for a, b, says in graph.edges(data=True)]
+        table = np.array(kinds, dtype=np.int64).reshape(-1, 3)
+        return Sights(tuple(graph.nodes), table[:, :2], table[:, 2].astype(bool))
+
+    def _swept(self, step: Step, last: bool) -> Swept | None:
+        free_space = step.free_space
+        if not free_space.evidence.size:
+            free_space = self._own
+            if last or step.index % EVERY_OWN_SCAN == 0:
+                free_space.integrate(step.pose_world, step.scan)
+        if not last and step.index % EVERY_SWEPT:
+            return None
+        return _picture(free_space)
+
+
+def _ellipses(step: Step, last: bool) -> Ellipses | None:
+    """Ask for the covariance of the walls just seen, or now and then of all; None at the steps between."""
+    belief = step.map.belief
+    ids = belief.ids
+    if not last and step.index % EVERY_ALL:
+        if step.index % EVERY_SEEN or not len(ids):
+            return None
+        owners = step.walls_of_segments
+        rows = np.minimum(np.searchsorted(ids, owners), len(ids) - 1)
+        seen = np.zeros(len(ids), dtype=bool)
+        seen[rows[ids[rows] == owners]] = True
+        ids = ids[seen]
+    joint = belief.joint(ids)
+    m = len(ids)
+    blocks = joint.cov[3:, 3:].reshape(m, 2, m, 2)[np.arange(m), :, np.arange(m), :]
+    return Ellipses(ids, joint.mean[3:].reshape(m, 2), joint.anchors, blocks)
+
+
+def _picture(free_space: FreeSpace) -> Swept | None:
+    """Copy the part of the grid that was seen free."""
+    free = free_space.evidence < 0
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    if not len(rows):
+        return None
+    cell = free_space.config.cell_m
+    corner = free_space.origin_world + cell * np.array([columns[0], rows[0]])
+    return Swept(free[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].copy(), corner, cell)

@@ -1,0 +1,89 @@
+"""Rerun's viewer as a process of its own: bound to the loopback, and cut off from everything outside."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+LOOPBACK = "127.0.0.1"
+NOWHERE = f"http://{LOOPBACK}:9"
+"""A proxy that nobody serves: the viewer asks a host outside for its newest version, analytics off or on."""
+PATIENCE_S = 20.0
+
+
+class ViewerError(RuntimeError):
+    """The viewer cannot be shown, told in one line: what was expected, what was found, what to do."""
+
+
+class Viewer:
+    """A running viewer; it stays when this program ends."""
+
+    def __init__(self, files: Sequence[Path] = ()) -> None:
+        """Start it with some recordings, or empty; raises ViewerError."""
+        executable = _executable()
+        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & {
+            name for name, v in os.environ.items() if v
+        }:
+            raise ViewerError(
+                "expected a display for the viewer, found none: record with --rrd FILE and open it where there is one"
+            )
+        self._port = _free_port()
+        command = [executable, "--bind", LOOPBACK, "--port", str(self._port), "--hide-welcome-screen", *map(str, files)]
+        # A session of its own: Ctrl-C ends the run, not the picture of it.
+        self._process = subprocess.Popen(
+            command, env=_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        self._wait_until_it_listens()
+
+    @property
+    def url(self) -> str:
+        """Where a recording can be sent while it goes on."""
+        return f"rerun+http://{LOOPBACK}:{self._port}/proxy"
+
+    def _wait_until_it_listens(self) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            if self._process.poll() is not None:
+                break
+            with socket.socket() as probe:
+                if probe.connect_ex((LOOPBACK, self._port)) == 0:
+                    return
+            time.sleep(0.05)
+        raise ViewerError(
+            "expected Rerun's viewer to open, found that it ended at once: record with --rrd FILE and try `rerun FILE`"
+        )
+
+
+def _executable() -> str:
+    """Return the viewer's path, beside this Python or on the path."""
+    beside = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    found = shutil.which("rerun", path=beside)
+    if found is None:
+        raise ViewerError("expected Rerun's viewer, found no command `rerun`: install rerun-sdk")
+    return found
+
+
+def _environment() -> dict[str, str]:
+    """Return the viewer's environment: no way outside, and no statistics kept."""
+    proxies = {name: NOWHERE for name in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY")}
+    proxies |= {name.lower(): value for name, value in proxies.items()}
+    settings = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "chainslam" / "viewer"
+    try:
+        (settings / "rerun").mkdir(parents=True, exist_ok=True)
+        (settings / "rerun" / "analytics.json").write_text(
+            '{"analytics_enabled": false, "analytics_id": "", "metadata": {}}\n'
+        )
+    except OSError:
+        return os.environ | proxies
+    return os.environ | proxies | {"XDG_CONFIG_HOME": str(settings)}
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
