@@ -11,9 +11,9 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from experiments.cli import main
-from experiments.timelines import Recording
 from experiments.replay import read_run, replay
 from experiments.scenario import TrialConfig, build, load_world
+from experiments.timelines import Recording
 from experiments.trial import default_mission, run_scenario
 
 WORLD, STEPS = "paper-fig4", 70
