@@ -36,6 +36,8 @@ docs: setup
 
 smoke: setup
 	$(BIN)/chainslam compare --preset smoke --out results/smoke
+	$(BIN)/chainslam report results/smoke
 
 compare: setup
 	$(BIN)/chainslam compare --preset paper --out results/paper
+	$(BIN)/chainslam report results/paper --latex

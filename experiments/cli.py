@@ -14,6 +14,7 @@ from .explore_command import Explore
 from .listings import Backends, Strategies, Worlds
 from .measure_command import Measure
 from .replay_command import Replay
+from .report_command import Report
 from .scenario import UsageError, choose
 from .view_command import View
 
@@ -35,6 +36,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "compare": Compare,
     "measure": Measure,
     "view": View,
+    "report": Report,
     "worlds": Worlds,
     "backends": Backends,
     "strategies": Strategies,

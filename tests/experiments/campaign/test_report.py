@@ -1,0 +1,113 @@
+"""The report: one file that holds everything, opened in a real browser where there is one."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from experiments.campaign.plan import Campaign, trials
+from experiments.campaign.runner import on_cores, run_campaign
+from experiments.campaign.store import opened
+from experiments.campaign.tables import write_tables
+from experiments.campaign.words import command_of, interval, number, verdict
+from experiments.cli import main
+
+CAMPAIGN = Campaign(
+    ("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot", "nearest-start"), 2,
+    arms=("closed", "replay-true"), max_steps=6,
+)  # fmt: skip
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
+WITNESS = """<script>
+const wrong = []; addEventListener("error", e => wrong.push(String(e.message || e.target.src)), true);
+addEventListener("load", () => { document.title = JSON.stringify({ wrong,
+  pictures: document.images.length, shown: [...document.images].filter(i => i.complete && i.naturalWidth > 0).length,
+  fetched: performance.getEntriesByType("resource").map(r => r.name).filter(n => !n.startsWith("data:")),
+  wide: document.documentElement.scrollWidth - innerWidth }); });
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("report") / "campaign"
+    with opened(made, CAMPAIGN) as store:
+        run_campaign(store, on_cores(1))
+        write_tables(made, CAMPAIGN, trials(CAMPAIGN), store.record)
+    assert main(["report", str(made), "--latex"]) == 0
+    return made
+
+
+def test_the_page_answers_first_and_fetches_nothing(folder):
+    page = (folder / "report.html").read_text()
+    assert page.index("verdict") < page.index("<h2>")
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert "url(" not in page
+    assert page.count("<img") == page.count("data:image/png;base64,") >= 4
+    assert "chainslam compare --worlds paper-fig4" in page
+
+
+def test_the_same_results_give_the_same_page(folder):
+    before = (folder / "report.html").read_bytes()
+    assert main(["report", str(folder)]) == 0
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_the_tables_are_there_as_latex(folder):
+    tables = (folder / "tables.tex").read_text()
+    assert tables.count(r"\begin{tabular}") == tables.count(r"\end{tabular}") >= 5
+    assert not re.findall(r"(?<!\\)[%_#]", tables)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine: apt-get install chromium")
+@pytest.mark.parametrize("width", [390, 1200])
+def test_a_browser_shows_all_pictures_and_finds_no_error(folder, tmp_path, width):
+    copy = tmp_path / "report.html"
+    copy.write_text((folder / "report.html").read_text().replace("<head>", "<head>" + WITNESS))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
+    command = [BROWSER, *flags, f"--window-size={width},900", f"file://{copy}"]
+    seen = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    told = json.loads(re.search(r"<title>(.*?)</title>", seen.stdout).group(1))
+    assert told["wrong"] == told["fetched"] == []
+    assert told["shown"] == told["pictures"] >= 4
+    assert told["wide"] <= 0
+    assert "CONSOLE" not in seen.stderr
+
+
+def test_a_folder_without_a_campaign_gets_one_line_and_status_2(tmp_path, capsys):
+    (tmp_path / "config.json").write_text("[]")
+    for place in (tmp_path, tmp_path / "nowhere"):
+        assert main(["report", str(place)]) == 2
+        said = capsys.readouterr().err.strip()
+        assert said.startswith("chainslam: expected")
+        assert "\n" not in said
+
+
+def test_the_verdict_says_answer_interval_and_failures():
+    ratio = {"value": 2.0, "low": 1.5, "high": 2.5, "runs": 12}
+    states = {"driving": 3, "finished": 8, "failed": 1}
+    at = {"wall_rmse_m": ratio, "pose_anees_so_far": ratio, "contender": states, "baseline": states}
+    said = {
+        "decisive_mark": "33", "marks": {"33": at | {"uncovered": {"value": 0.02}}}, "matches_within": 1.1,
+        "contender": "A", "baseline": "B", "verdict": "does not match",
+    }  # fmt: skip
+    words = verdict(said)
+    assert words[0].startswith("No: after 33 m driven, A does not match B")
+    assert "95 % interval 1.5 to 2.5" in words[0]
+    assert "1 have failed" in words[2]
+    assert "2.0 percentage points more" in words[2]
+    assert "not tested" in verdict(None)[0]
+
+
+def test_numbers_are_short_and_never_in_powers_of_ten():
+    assert [number(v) for v in (None, 3, 0.0, 0.012345, 123.4, 123456.0)] == ["–", "3", "0", "0.0123", "123", "123,000"]
+    assert interval({"low": 0.5, "high": 2.0}, 100.0) == "50 to 200"
+
+
+def test_the_command_on_the_page_runs_the_campaign_again():
+    import tyro
+
+    from experiments.compare_command import Compare
+
+    words = command_of(CAMPAIGN).split()
+    assert tyro.cli(Compare, args=words[2:]).campaign == CAMPAIGN
