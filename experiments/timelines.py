@@ -28,7 +28,13 @@ class Recording:
     """A timeline of one or several back ends on its way to a file or a viewer; its troubles are told at the end."""
 
     def __init__(
-        self, title: str, backends: Sequence[str], world: World, errorless: bool, rrd: Path | None, view: bool = False
+        self,
+        title: str,
+        backends: Sequence[str],
+        world: World | None,
+        errorless: bool,
+        rrd: Path | None,
+        view: bool = False,
     ) -> None:
         """Begin it; with neither a file nor a viewer asked for it does nothing and costs nothing."""
         self._rrd = rrd
@@ -66,7 +72,7 @@ class Recording:
         self._try(self._finish)
         return [self._problem] if self._problem else []
 
-    def _begin(self, title: str, backends: Sequence[str], world: World, errorless: bool, view: bool) -> None:
+    def _begin(self, title: str, backends: Sequence[str], world: World | None, errorless: bool, view: bool) -> None:
         if self._rrd is not None:
             # Tried before the run, so that nobody waits for a recording that cannot be.
             probe(self._rrd)
@@ -74,7 +80,7 @@ class Recording:
         from viz.timeline import Timeline  # imports rerun: only where a recording is asked for
 
         nees_of = None if errorless else nees_of_poses
-        self._timeline = Timeline(title, backends, true_rings(world), nees_of, viewer_url)
+        self._timeline = Timeline(title, backends, () if world is None else true_rings(world), nees_of, viewer_url)
 
     def _finish(self) -> None:
         if self._timeline is None:
@@ -109,19 +115,22 @@ def record_comparison(
     title: str,
     trials: Sequence[Mapping[str, Any]],
     steps: Sequence[Mapping[str, Any]],
-    run: RecordedRun,
+    run: RecordedRun | None,
     backends: Sequence[str],
     options: ReplayOptions,
 ) -> list[str]:
-    """Record a campaign: its summary, and one of its logs through all back ends side by side.
+    """Record a campaign: one of its logs, if any, through all back ends side by side, and the summary of all trials.
 
     `trials` and `steps` are the campaign's tables, a mapping a row. Returns, in words, what could not be written.
     """
-    trial = run.trial
-    world = load_world(trial.world, trial.start, trial.scale)
-    recording = Recording(title, backends, world, trial.errorless, rrd)
-    for backend in backends:
-        if recording.is_on:
-            replay(run, backend, options, recording.watch(backend, lambda step: run.true_poses_world[step.index]))
+    if run is None:
+        recording = Recording(title, (), None, False, rrd)
+    else:
+        trial = run.trial
+        world = load_world(trial.world, trial.start, trial.scale)
+        recording = Recording(title, backends, world, trial.errorless, rrd)
+        for backend in backends:
+            if recording.is_on:
+                replay(run, backend, options, recording.watch(backend, lambda step: run.true_poses_world[step.index]))
     recording.add_campaign(trials, steps)
     return recording.close()

@@ -11,9 +11,9 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from experiments.cli import main
-from experiments.replay import read_run, replay
+from experiments.replay import ReplayOptions, read_run, replay
 from experiments.scenario import TrialConfig, build, load_world
-from experiments.timelines import Recording
+from experiments.timelines import Recording, record_comparison
 from experiments.trial import default_mission, run_scenario
 
 WORLD, STEPS = "paper-fig4", 70
@@ -67,11 +67,13 @@ def scalars(rrd, entity):
 
 
 def without_timings(folder):
-    """The bytes of every file of a run, without what a clock has a part in."""
+    """The bytes of every file of a run, without what a clock or an editor has a part in."""
     summary = json.loads((folder / "summary.json").read_text())
     rows = [{k: v for k, v in row.items() if k not in TIMINGS} for row in steps(folder)]
-    others = {p.name: p.read_bytes() for p in folder.iterdir() if p.name not in ("summary.json", "steps.csv")}
-    return {k: v for k, v in summary.items() if k not in TIMINGS}, rows, others
+    config = {k: v for k, v in json.loads((folder / "config.json").read_text()).items() if k != "commit"}
+    apart = ("summary.json", "steps.csv", "config.json")
+    others = {p.name: p.read_bytes() for p in folder.iterdir() if p.name not in apart}
+    return {k: v for k, v in summary.items() if k not in TIMINGS}, rows, config, others
 
 
 def test_results_are_the_same_bytes_with_and_without_a_recording(runs):
@@ -156,6 +158,35 @@ def test_several_back_ends_stand_in_one_recording_on_one_time_axis(runs, tmp_pat
         assert np.mean(values) / 3 == pytest.approx(finals[backend].summary["pose_anees"])
     times, _ = read(tmp_path / "three.rrd", "/world/truth/robot", "Transform3D:translation")
     np.testing.assert_array_equal(times, np.arange(STEPS))
+
+
+def test_a_campaigns_summary_holds_its_tables(tmp_path):
+    cell = {"world": "w", "strategy": "s", "mode": "replay", "association": "own"}
+    trials = [
+        {**cell, "backend": backend, "seed": seed, "status": "complete", "pose_anees": anees, "map_anees": None}
+        for backend, anees in (("block-ekf", 100.0), ("full-ekf", 1.0))
+        for seed in (1, 2)
+    ]
+    rows = [
+        {**cell, "backend": "full-ekf", "step": k, "pose_anees": 10.0, "band_low": 0.1, "band_high": 1.0}
+        | {"pose_error_rms_m": 0.25 * k}
+        for k in range(3)
+    ]
+    target = tmp_path / "campaign.rrd"
+    assert record_comparison(target, "campaign", trials, rows, None, (), ReplayOptions()) == []
+    (dots,) = [
+        batch.column("Points2D:positions").to_pylist()[0]
+        for chunk in RrdReader(target).stream().filter(content="/campaign/0/dots/pose_anees/trials")
+        if "Points2D:positions" in (batch := chunk.to_record_batch()).schema.names
+    ]
+    np.testing.assert_allclose(np.array(dots)[:, 1], [2.0, 2.0, 0.0, 0.0])
+    np.testing.assert_allclose(scalars(target, "/campaign/0/curves/pose_anees/full-ekf")[1], 1.0)
+    np.testing.assert_allclose(scalars(target, "/campaign/0/curves/pose_error_rms_m/full-ekf")[1], [0.0, 0.25, 0.5])
+    (table,) = [
+        chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
+        for chunk in RrdReader(target).stream().filter(content="/campaign/table")
+    ]
+    assert "| w, s, replay, own | block-ekf | 2 | 2 | 100 |" in table
 
 
 @pytest.mark.parametrize("place", ["file/run.rrd", "folder", "/dev/full"])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from jaxtyping import UInt32
 
 from .. import palette
 from .colours import packed
@@ -17,9 +18,11 @@ Row = Mapping[str, Any]
 CELL = ("world", "strategy", "mode", "association")
 """What the back ends of one cell have in common."""
 CURVES = {
-    "pose_anees": "pose ANEES over the trials, and the 95 % band of its mean",
+    "pose_anees": "pose ANEES over the trials as a power of ten, and the 95 % band of its mean",
     "pose_error_rms_m": "pose error, rms over the trials, m",
 }
+POWERS = ("pose_anees", "band_low", "band_high")
+"""Curves drawn as powers of ten: an overconfident filter would flatten all others."""
 DOTS = {"pose_anees": "pose ANEES", "map_anees": "map ANEES"}
 WIDTH = 1.6
 """How far apart the back ends stand among the dots, for a power of ten of 1."""
@@ -35,9 +38,11 @@ class Summary:
     def __init__(self, out: Recording, trials: Sequence[Row], steps: Sequence[Row]) -> None:
         self._out = out
         self._cells = list(dict.fromkeys(_cell(row) for row in trials))
+        self._counts: list[int] = []
         out.fixed("/campaign", rr.Transform3D(scale=[WIDTH, -1.0, 1.0]))
         for k, cell in enumerate(self._cells):
             here = [row for row in trials if _cell(row) == cell]
+            self._counts.append(len({row["backend"] for row in here}))
             self._dots(f"/campaign/{k}/dots", here)
             self._curves(f"/campaign/{k}/curves", [row for row in steps if _cell(row) == cell])
         out.fixed("/campaign/table", rr.TextDocument(_table(self._cells, trials), media_type="text/markdown"))
@@ -46,7 +51,7 @@ class Summary:
         """Return the summary's layout: a tab for each cell, the table below."""
         tabs = [
             rrb.Horizontal(
-                *(_dots_view(f"/campaign/{k}/dots/{name}", words, cell) for name, words in DOTS.items()),
+                *(_dots_view(f"/campaign/{k}/dots/{name}", words, self._counts[k]) for name, words in DOTS.items()),
                 rrb.Vertical(*(_curve_view(f"/campaign/{k}/curves/{name}", words) for name, words in CURVES.items())),
                 column_shares=[1, 1, 2],
                 name=", ".join(cell),
@@ -54,7 +59,7 @@ class Summary:
             for k, cell in enumerate(self._cells)
         ]
         table = rrb.TextDocumentView(origin="/campaign/table", name="all cells")
-        return rrb.Vertical(rrb.Tabs(*tabs), table, row_shares=[2, 1], name="campaign")
+        return rrb.Vertical(rrb.Tabs(*tabs), table, row_shares=[3, 1], name="campaign")
 
     def _dots(self, entity: str, trials: Sequence[Row]) -> None:
         """Draw every trial above its back end, by the power of ten of its ANEES."""
@@ -63,20 +68,22 @@ class Summary:
             known = [row for row in trials if _is_number(row.get(name)) and row[name] > 0.0]
             x = [names.index(row["backend"]) + 0.3 * _spread(row.get("seed", 0)) for row in known]
             y = [float(np.log10(row[name])) for row in known]
-            colours = [packed(palette.of_backend(row["backend"])) for row in known]
+            colours = _tints([row["backend"] for row in known])
             words = [f"seed {row.get('seed')}: {row[name]:.3g}, {row['status']}" for row in known]
             dots = rr.Points2D(
-                np.column_stack([x, y]), radii=rr.Radius.ui_points(3.0), colors=colours, labels=words, show_labels=False
+                np.column_stack([x, y]), radii=rr.Radius.ui_points(4.0), colors=colours, labels=words, show_labels=False
             )
             self._out.fixed(f"{entity}/{name}/trials", dots)
-            feet = [[k, -1.35] for k in range(len(names))]
-            tints = [packed(palette.of_backend(backend)) for backend in names]
+            feet = np.array([[k, -1.35] for k in range(len(names))])
             self._out.fixed(
-                f"{entity}/{name}/names", rr.Points2D(feet, radii=rr.Radius.ui_points(4.0), colors=tints, labels=names)
+                f"{entity}/{name}/feet", rr.Points2D(feet, radii=rr.Radius.ui_points(6.0), colors=_tints(names))
+            )
+            self._out.fixed(
+                f"{entity}/{name}/names", rr.Points2D(feet - [0.0, 0.1], colors=packed(palette.PAGE), labels=names)
             )
             levels = np.arange(-1.0, 4.0)
             lines = [[[-0.6, level], [len(names) - 0.4, level]] for level in levels]
-            strong = [packed(palette.INK if level == 0.0 else palette.GRID_STRONG) for level in levels]
+            strong = np.where(levels == 0.0, packed(palette.INK), packed(palette.GRID_STRONG)).astype(np.uint32)
             self._out.fixed(f"{entity}/{name}/levels", rr.LineStrips2D(lines, colors=strong), style(0.7, 1.0))
             marks = [[-0.75, level] for level in levels]
             white = rr.Points2D(marks, colors=packed(palette.PAGE), labels=[f"{10.0**level:g}" for level in levels])
@@ -103,7 +110,13 @@ class Summary:
         step = np.array([row["step"] for row in known], dtype=np.int64)
         # A campaign's trials have no time in common; its time axis is the step.
         values = np.array([row[name] for row in known], dtype=np.float64)
+        if name in POWERS:
+            values = np.log10(np.maximum(values, 1e-3))
         self._out.values(entity, Moments(step, step.astype(np.float64)), values)
+
+
+def _tints(backends: Sequence[str]) -> UInt32[np.ndarray, " k"]:
+    return np.array([packed(palette.of_backend(backend)) for backend in backends], dtype=np.uint32)
 
 
 def _cell(row: Row) -> tuple[str, ...]:
@@ -139,10 +152,11 @@ def _table(cells: Sequence[tuple[str, ...]], trials: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _dots_view(entity: str, words: str, cell: tuple[str, ...]) -> rrb.Spatial2DView:
+def _dots_view(entity: str, words: str, count: int) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
-        origin="/", contents=[f"{entity}/**"], name=f"{words}, a dot a trial (1 is ideal): {', '.join(cell)}",
+        origin="/", contents=[f"{entity}/**"], name=f"{words}, a dot a trial; 1 is ideal",
         background=(255, 255, 255),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-2.4, WIDTH * count), y_range=(-4.2, 1.9)),
     )  # fmt: skip
 
 
