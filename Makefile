@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test check bench docs smoke compare random
+.PHONY: setup demo test check bench docs smoke compare random strategies
 
 setup: .venv/made
 
@@ -29,6 +29,9 @@ bench: setup
 
 random: setup
 	$(BIN)/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
+
+strategies: setup
+	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv
 
 docs: setup
 	$(BIN)/chainslam explore paper-fig9 --seed 1 --out results/docs

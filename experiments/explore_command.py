@@ -33,7 +33,7 @@ class Explore:
     backend: str = "full-ekf"
     """The estimator (see `chainslam backends`)."""
     strategy: str = "nearest-robot"
-    """Which open end is visited next (see `chainslam strategies`)."""
+    """Where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at step 200."""
     seed: int = 1
     """Decides all noise and the error of the first estimate; the same seed gives the same bytes."""
     p0: P0 = "small"

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from explore.limits import Limits
 from explore.mission import MissionConfig
-from explore.strategies import STRATEGIES, Strategy
+from explore.strategies import Strategy, make_strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
@@ -108,10 +108,19 @@ def choose(kind: str, name: str, known: Iterable[str]) -> str:
     return name
 
 
+def strategy_of(words: str) -> Strategy:
+    """Return the strategy, or the schedule of several; raises UsageError for anything else."""
+    try:
+        return make_strategy(words)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
 def check(config: TrialConfig) -> None:
     """Raise UsageError for names that are in no registry and numbers out of range, before anything is computed."""
     choose("back end", config.backend, BACKENDS)
-    choose("strategy", config.strategy, [*STRATEGIES, STRATEGY_OF_REPLAYS])
+    if config.strategy != STRATEGY_OF_REPLAYS:
+        strategy_of(config.strategy)
     choose("start covariance (--p0)", config.p0, P0_SIGMAS)
     if not 0 <= config.seed <= SEED_MAX:
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")
@@ -125,7 +134,7 @@ def check(config: TrialConfig) -> None:
 def build(config: TrialConfig, world: World | None = None) -> Scenario:
     """Build a scenario; `world` saves loading it again. Raises UsageError for bad names and unusable worlds."""
     check(config)
-    choose("strategy", config.strategy, STRATEGIES)
+    strategy = strategy_of(config.strategy)
     world = world or load_world(config.world, config.start, config.scale)
     position_m, heading_rad = P0_SIGMAS[config.p0]
     sigmas = np.array([position_m, position_m, heading_rad])
@@ -137,7 +146,7 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
         world,
         SimulatedRobot(world, config.seed, config.errorless, config.robot),
         BACKENDS[config.backend].make(start.copy(), cov.copy()),
-        STRATEGIES[config.strategy].make(),
+        strategy,
         start,
         cov,
     )

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from .adaptive import Adaptive
 from .frontier import Frontier
 from .nearest_robot import NearestRobot
 from .nearest_start import NearestStart
 from .same_chain import SameChain
+from .schedule import Schedule
 from .strategy import Choice, Place, Situation, Strategy
+from .uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,30 @@ STRATEGIES: dict[str, StrategyEntry] = {
     "same-chain": StrategyEntry(SameChain, "close the actual chain before beginning another (paper, section 3.3)"),
     "nearest-start": StrategyEntry(NearestStart, "the open end closest to the start (paper, figure 6)"),
     "frontier": StrategyEntry(Frontier, "borders of seen floor, then the open ends left (the classical baseline)"),
+    "uncertainty": StrategyEntry(Uncertainty, "the open end with the most to learn a metre, by the joint covariance"),
+    "adaptive": StrategyEntry(
+        Adaptive, "nearest-robot, with returns to well-known walls while the position is uncertain"
+    ),
 }
 
-__all__ = ["STRATEGIES", "Choice", "Place", "Situation", "Strategy", "StrategyEntry"]
+
+def make_strategy(words: str) -> Strategy:
+    """Return the strategy of a name, or of a schedule such as `nearest-robot,same-chain@200`: the second from step 200.
+
+    Raises ValueError, with one line that says what was expected, for anything else.
+    """
+    parts: list[tuple[int, Strategy]] = []
+    for index, word in enumerate(words.split(",")):
+        name, at, step = word.partition("@")
+        if name not in STRATEGIES:
+            raise ValueError(f"expected a strategy out of {', '.join(STRATEGIES)}, found {name!r}: choose one of these")
+        first = 0 if index == 0 and not at else int(step) if step.isascii() and step.isdigit() else -1
+        if first < 0 or (index == 0 and first > 0) or (parts and first <= parts[-1][0]):
+            raise ValueError(
+                f"expected strategies with the steps of the changes, in order, found {words!r}: write A,B@200,C@500"
+            )
+        parts.append((first, STRATEGIES[name].make()))
+    return parts[0][1] if len(parts) == 1 else Schedule(parts)
+
+
+__all__ = ["STRATEGIES", "Choice", "Place", "Situation", "Strategy", "StrategyEntry", "make_strategy"]

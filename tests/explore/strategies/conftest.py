@@ -90,7 +90,7 @@ def look_from(scene, places, range_m=4.0):
         scene.grid.integrate(pose, Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, range_m, 0.0))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def scene_of():
     """Return a function from a seed (and from how many places the room was seen) to a scene of its own."""
 
@@ -103,7 +103,7 @@ def scene_of():
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def look():
     """Return the function that lets the robot look around in a scene."""
     return look_from
@@ -116,7 +116,7 @@ def random_chains(rng, count):
     return [tuple(int(w) for w in part) for part in np.split(walls, cuts)]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def chains_of():
     """Return the function that draws random chains."""
     return random_chains

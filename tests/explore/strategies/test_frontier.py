@@ -46,7 +46,7 @@ def test_a_frontier_is_chosen_before_any_open_end_and_holds_until_it_is_seen(sce
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_when_no_frontier_is_left_the_open_ends_follow_nearest_first(scene_of, seed):
-    scene = scene_of(seed, 400)
+    scene = scene_of(seed)
     situation = scene.situation(np.append(scene.places[0], 0.0), [(0, 1), (2,)])
     situation.__dict__["unseen"] = ()
     choice, nearest = Frontier().choose(situation), NearestRobot().choose(situation)
