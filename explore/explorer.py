@@ -14,8 +14,10 @@ from slam.robot import MotionCommand
 from .goal import Goal, SetAside
 from .navigation import route
 from .outcome import Outcome
+from .ping_pong import WallErrand
 from .strategies import Choice, Place, Situation, Strategy
 from .strategies.nearest import nearest_unseen
+from .unseen import known_floor
 from .visibility import followed_wall
 from .wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
 
@@ -29,6 +31,8 @@ class ExplorerConfig:
     """An end that was set aside is tried again when it has moved this far."""
     attempts: int = 3
     """So many ends set aside at one place (within 0.3 m) are enough: it is not tried again."""
+    grown: float = 0.1
+    """An end that could not be looked at is tried again when so much more of the floor around it is known."""
     patience_steps: int = 400
     """A goal that takes longer is set aside."""
     second_looks: int = 4
@@ -50,6 +54,8 @@ class Explorer:
         self._steps_on_goal = 0
         self._attempts = _Spots(0.3)
         self._visited = _Spots(0.3)
+        self._walked: set[tuple[int, int]] = set()
+        self._floor_known: dict[tuple[int, int], int] = {}
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self._looked_again = 0
         self._open: frozenset[tuple[int, int]] = frozenset()
@@ -107,7 +113,7 @@ class Explorer:
             if command is not None and self._steps_on_goal <= self._config.patience_steps:
                 self._looked_again = 0
                 return command
-            self._give_up()
+            self._give_up(around)
         return None
 
     def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
@@ -135,10 +141,10 @@ class Explorer:
         if self._choice is None:
             return
         holds = self._choice.holds(around) and not (self._sweeping and self._candidates(ends))
-        if isinstance(self._errand, EndErrand):
-            key = (self._errand.end.wall, self._errand.end.side)
+        if isinstance(self._choice.target, OpenEnd):
+            key = (self._choice.target.wall, self._choice.target.side)
             holds = holds and key in ends and key not in self.set_aside
-            if holds:
+            if holds and isinstance(self._errand, EndErrand):
                 self._errand.follow(ends[key])
         if not holds:
             self._drop()
@@ -155,6 +161,8 @@ class Explorer:
     ) -> bool:
         """Ask the strategy where to go, and set out; False when there is nowhere left."""
         following = self._config.following
+        if not self._candidates(ends):
+            self._retry(around, ends)
         situation = Situation(
             around, chains, self._candidates(ends), graph, self._start, followed_wall(around.walls), self._step,
             lambda place: self._visited.count(place) >= 2, following.paths, following.looks,
@@ -189,25 +197,45 @@ class Explorer:
     def _drop(self) -> None:
         self._errand = self._choice = self.goal = None
 
-    def _give_up(self) -> None:
-        """Set the goal aside with the reason."""
+    def _give_up(self, around: Surroundings) -> None:
+        """Set the goal aside with the reason; an end that nothing was seen of, only after a walk along its wall."""
         errand, choice = self._errand, self._choice
         assert errand is not None
         assert choice is not None
-        self._drop()
-        if not isinstance(errand, EndErrand):
-            assert isinstance(choice.target, Place)
-            self._visited.add(choice.target.centre_world)
+        target, following = choice.target, self._config.following
+        if isinstance(target, Place):
+            self._drop()
+            self._visited.add(target.centre_world)
             return
-        end = errand.end
-        if self._steps_on_goal > self._config.patience_steps:
+        key, in_time = (target.wall, target.side), self._steps_on_goal <= self._config.patience_steps
+        if in_time and isinstance(errand, WallErrand):
+            self._errand = EndErrand(target, (target.wall,), following)
+            return
+        if in_time and not errand.looks_done and key not in self._walked:
+            self._walked.add(key)
+            self._errand = WallErrand(target.wall, target.side, following)
+            return
+        self._drop()
+        end = errand.end if isinstance(errand, EndErrand) else target
+        if not in_time:
             reason = f"not reached in {self._config.patience_steps} steps"
         elif errand.looks_done:
             reason = f"still open after {errand.looks_done} looks"
         else:
             reason = errand.trouble
-        self.set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
+            self._floor_known[key] = known_floor(around.free_space, end.position_world, following.looks.near_m)
+        self.set_aside[key] = SetAside(end.wall, end.side, end.position_world, reason)
         self._attempts.add(end.position_world)
+
+    def _retry(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
+        """Forget that no look at an end was possible where the floor has become known since."""
+        reach = self._config.following.looks.near_m
+        for key, before in list(self._floor_known.items()):
+            if key not in ends or self._is_hopeless(ends[key].position_world):
+                continue
+            if known_floor(around.free_space, ends[key].position_world, reach) > (1.0 + self._config.grown) * before:
+                del self._floor_known[key]
+                self.set_aside.pop(key, None)
 
     def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
         return self._attempts.count(place) >= self._config.attempts

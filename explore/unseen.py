@@ -5,6 +5,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import find_objects, label
 
 from .free_space import FreeSpace
+from .paths import cells_within
 
 
 def unseen_borders(
@@ -34,3 +35,9 @@ def borders_on_unseen(free_space: FreeSpace, points_world: Float[np.ndarray, "n 
     offsets = cell * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     around = (points_world[:, None] + offsets).reshape(-1, 2)
     return np.asarray(free_space.unknown_at(around).reshape(-1, 4).any(axis=1))
+
+
+def known_floor(free_space: FreeSpace, place_world: Float[np.ndarray, "2"], reach_m: float) -> int:
+    """Return how many cells within reach of a place were seen, free or not."""
+    cells = cells_within(free_space, place_world, reach_m)
+    return int(np.count_nonzero(free_space.evidence[tuple(cells.T)]))

@@ -1,4 +1,4 @@
-"""A drawn room whose walls are all mapped, with open ends as a test wants them."""
+"""What the tests of exploration share: a drawn room whose walls are all mapped, with open ends as a test wants them."""
 
 from dataclasses import dataclass, replace
 from functools import cache
