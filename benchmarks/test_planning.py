@@ -1,0 +1,58 @@
+"""Cost of planning (choice, navigation, wall following) a step, on a large plan; the target is 3 ms on average."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import jaxtyping
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from explore.explorer import Explorer
+from explore.mission import explore_mission
+from explore.strategies import STRATEGIES
+from sim.robot import SimulatedRobot
+from sim.worlds import load
+from slam.backends import BACKENDS
+
+PLAN = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans" / "cml_Vieilley1.json"
+"""A school of 3,400 m2 with 377 faces."""
+STEPS = 1500
+
+
+@pytest.fixture(autouse=True)
+def _unchecked() -> Iterator[None]:
+    """Measure without the shape checks that pytest adds: they cost more than the step itself."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
+@pytest.mark.parametrize("strategy", list(STRATEGIES))
+def test_planning_of_one_step(benchmark: BenchmarkFixture, strategy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time of the decisions over the first errorless steps; `extra_info` holds the figures."""
+    if not PLAN.exists():
+        pytest.skip("the shared plans are not here")
+    decide, spent = Explorer.command, []
+
+    def timed(self: Explorer, *known: object) -> object:
+        began = time.thread_time()
+        command = decide(self, *known)  # type: ignore[arg-type]
+        spent.append(1e3 * (time.thread_time() - began))
+        return command
+
+    monkeypatch.setattr(Explorer, "command", timed)
+    world = load(str(PLAN))
+    cov = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
+
+    def drive() -> None:
+        robot, backend = SimulatedRobot(world, 1, errorless=True), BACKENDS["full-ekf"].make(world.start.copy(), cov)
+        for step in explore_mission(robot, backend, STRATEGIES[strategy].make()):
+            if step.index >= STEPS:
+                return
+
+    benchmark.pedantic(drive, rounds=1, iterations=1)
+    benchmark.extra_info |= {"mean_ms": float(np.mean(spent)), "p95_ms": float(np.percentile(spent, 95))}
+    print(f"{strategy}: mean {np.mean(spent):.2f} ms, p95 {np.percentile(spent, 95):.2f} ms")
+    assert np.mean(spent) < 2 * 3.0  # a shared machine drifts by up to 2
