@@ -85,6 +85,7 @@ def run_keys(scenario: Scenario, ending: Ending) -> dict[str, Any]:
         "errorless": config.errorless,
         "status": ending.status,
         "reason": ending.reason,
+        "outcome": str(ending.outcome),
     }
 
 
