@@ -50,11 +50,15 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
     """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position."""
     firm = np.flatnonzero(~walls.tentative)
     ours = firm[np.isin(walls.ids[firm], list(touched))]
-    alpha = walls.belief.means[:, 0]
-    near = np.argwhere(np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad))
+    alpha, ends = walls.belief.means[:, 0], walls.ends_world
+    middle, length = ends.mean(axis=1), walls.extents[:, 1] - walls.extents[:, 0]
+    # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
+    between = middle[ours, None] - middle[firm]
+    reach = 0.5 * (length[ours, None] + length[firm]) + config.touch_m + config.across_m
+    meets = between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2
+    near = np.argwhere(meets & (np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad)))
     pairs = np.stack([ours[near[:, 0]], firm[near[:, 1]]], axis=-1)
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
-    ends, length = walls.ends_world, walls.extents[:, 1] - walls.extents[:, 0]
     order = np.argsort(length[pairs], axis=1)
     shorter, longer = np.take_along_axis(pairs, order, axis=1).T
     off = ends[shorter] - ends[longer, :1]
