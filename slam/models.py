@@ -79,30 +79,30 @@ def innovations(
 
     e and R are those of the estimate; H is taken at the robot's `position` and the lines' directions `alpha` if given.
     """
+    m = len(lines)
     n = normals(means[:, 0])
-    r_predicted = means[:, 1] + np.sum(n * (anchors - pose_world[:2]), axis=-1)
+    to_anchor = anchors - pose_world[:2]
+    r_predicted = means[:, 1] + np.einsum("mi,mi->m", n, to_anchor)
     epsilon = wrap(lines[:, 0] - (means[:, 0] - pose_world[2]))
     t0 = cov[:, 0, 1] / cov[:, 0, 0]
     cosine, sine = np.cos(epsilon), np.sin(epsilon)
-    along = lines[:, 1] * sine + t0 * cosine
+    r = lines[:, 1]
+    along = r * sine + t0 * cosine
 
-    m = len(lines)
-    e = np.stack([epsilon, lines[:, 1] * cosine - t0 * sine - r_predicted], axis=-1)
-    n = n if alpha is None else normals(alpha)
-    t = n @ J.T
-    to_anchor = anchors - (pose_world[:2] if position is None else position)
-    H_pose = np.zeros((m, 2, 3))
+    e = np.empty((m, 2))
+    e[:, 0], e[:, 1] = epsilon, r * cosine - t0 * sine - r_predicted
+    if alpha is not None:
+        n = normals(alpha)
+    if position is not None:
+        to_anchor = anchors - position
+    H_pose, H_line, R = np.zeros((m, 2, 3)), np.zeros((m, 2, 2)), np.zeros((m, 2, 2))
     H_pose[:, 0, 2] = -1.0
-    H_pose[:, 1, :2] = -n
+    np.negative(n, out=H_pose[:, 1, :2])
     H_pose[:, 1, 2] = along
-    H_line = np.zeros((m, 2, 2))
-    H_line[:, 0, 0] = 1.0
-    H_line[:, 1, 0] = np.sum(t * to_anchor, axis=-1) - along
-    H_line[:, 1, 1] = 1.0
-    R = np.zeros((m, 2, 2))
+    H_line[:, 0, 0] = H_line[:, 1, 1] = 1.0
+    H_line[:, 1, 0] = n[:, 0] * to_anchor[:, 1] - n[:, 1] * to_anchor[:, 0] - along
     R[:, 0, 0] = cov[:, 0, 0]
-    across = cov[:, 1, 1] - cov[:, 0, 1] * t0
-    R[:, 1, 1] = across * (cosine - t0 * sine / lines[:, 1]) ** 2
+    R[:, 1, 1] = (cov[:, 1, 1] - cov[:, 0, 1] * t0) * (cosine - t0 * sine / r) ** 2
     return Innovations(e, H_pose, H_line, R)
 
 
