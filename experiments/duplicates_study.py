@@ -98,7 +98,7 @@ def main() -> int:
     except UsageError as error:
         print(f"duplicates_study: {error}", file=sys.stderr)
         return 2
-    Console().print(table)
+    Console(width=None if sys.stdout.isatty() else 140).print(table)
     return 0
 
 
