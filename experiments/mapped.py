@@ -21,7 +21,7 @@ class Room:
     chain: int
     corners: tuple[int, ...]
     """Names of its corners, in order, the free side on the left."""
-    is_pillar: bool
+    is_island: bool
     """Whether the free side lies outside."""
 
 
@@ -97,7 +97,7 @@ def _corners(arrays: dict[str, np.ndarray], features: list[dict[str, Any]]) -> M
         tuple((int(a), int(b)) for a, b in (f["properties"]["walls"] for f in found)),
         tuple(names),
         tuple(sharp),
-        tuple(_room(int(f["properties"]["id"]), names, positions) for f in chains if f["properties"]["closed"]),
+        tuple(_room(int(f["properties"]["chain"]), names, positions) for f in chains if f["properties"]["closed"]),
     )
 
 

@@ -68,7 +68,7 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
     for title in ("chain", "is", "corners", "area m²", "length m"):
         rooms.add_column(title, justify="left" if title == "is" else "right")
     for room in mapped.rooms:
-        kind = "obstacle" if room.is_pillar else "room"
+        kind = "island" if room.is_island else "room"
         values = (_words(mapped.area(room)), _words(mapped.perimeter(room)))
         rooms.add_row(str(room.chain), kind, str(len(room.corners)), *values)
     console.print(rooms)

@@ -5,7 +5,6 @@ import pytest
 
 from experiments.cli import main
 from experiments.corners import corners
-from experiments.geojson import map_geojson
 from experiments.mapped import read_corners
 from experiments.measurements import area, corner_jacobian, corner_points, distance, distances, perimeter
 from experiments.results import write_results
