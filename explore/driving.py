@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import arc, to_robot
+from slam.geometry.poses import J, arc, to_robot
 from slam.robot import MotionCommand, Scan
 
 from .free_space import FreeSpace
@@ -30,6 +30,20 @@ class DrivingConfig:
     """Least distance kept between disc and returns, unless the step leads away from them."""
     careful_m: float = 0.05
     """Longest step onto floor that was not seen yet."""
+    narrow_m: float = 0.55
+    """Where returns on both sides of the way leave less than this, the robot aims for the middle, slowly ..."""
+    narrow_margin_m: float = 0.01
+    """... keeps at least this from them, ..."""
+    narrow_spin_rad: float = float(np.deg2rad(4.0))
+    """... turns on the spot first with more than this to turn, ..."""
+    give_m: float = 0.003
+    """Where less than the margin is left already, a step may take this much of it, ..."""
+    least_margin_m: float = 0.004
+    """... down to this."""
+    fits_m: float = 0.44
+    """... and does not try where they leave less than this: returns tell the width to a centimetre or two."""
+    obstructed_m: float = 0.17
+    """A return this near to the path ahead is in the way: less than the radius, since the path keeps to a grid."""
     arrived_m: float = 0.08
     """The end of the path counts as reached within this."""
 
@@ -53,6 +67,13 @@ class Pilot:
         """Where the path ends, m."""
         return self._points[-1]
 
+    @property
+    def squeeze_world(self) -> Float[np.ndarray, "2"] | None:
+        """Where, within the next half metre of the path, there is hardly room for the body; None if nowhere."""
+        ahead = self._points[self._at : self._at + 10]
+        tight = np.flatnonzero(~self._planner.has_room(ahead))
+        return ahead[tight[len(tight) // 2]] if len(tight) else None
+
     def arrived(self, pose_world: Float[np.ndarray, "3"]) -> bool:
         """Return whether the robot stands at the end of the path."""
         return float(np.hypot(*(self._points[-1] - pose_world[:2]))) < self._config.arrived_m
@@ -63,21 +84,26 @@ class Pilot:
         # What is beside the robot already is no matter of the path: `command` gets away from it.
         ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.step_m]
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
-        return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.radius_m
+        return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.obstructed_m
 
     def command(self, pose_world: Float[np.ndarray, "3"], scan: Scan, free_space: FreeSpace) -> MotionCommand | None:
         """Return the next step along the path, or None where no safe one leads on."""
-        aim = to_robot(self._aim(pose_world[:2])[None], pose_world)[0]
+        points = returns(scan)
+        aim, narrow = _centred(to_robot(self._aim(pose_world[:2])[None], pose_world)[0], points, self._config)
         error, distance = float(np.arctan2(aim[1], aim[0])), float(np.hypot(aim[0], aim[1]))
         turn = float(np.clip(error, -self._config.turn_rad, self._config.turn_rad))
-        if abs(error) > self._config.spin_rad:
+        if abs(error) > (self._config.narrow_spin_rad if narrow else self._config.spin_rad):
             return MotionCommand(0.0, turn)
         forward = min(self._config.step_m * (1.0 - 0.8 * abs(error) / self._config.spin_rad), distance)
-        points = returns(scan)
+        margin = self._config.narrow_margin_m if narrow else self._config.margin_m
+        forward = min(forward, self._config.careful_m) if narrow else forward
         for share in (1.0, 0.5, 0.25):
             command = MotionCommand(share * forward, turn)
-            if _is_safe(command, points, self._config):
+            if _is_safe(command, points, self._config, margin):
                 return self._careful(command, pose_world, free_space)
+        back = MotionCommand(-self._config.careful_m, 0.0)
+        if narrow:
+            return back if _is_safe(back, points, self._config, margin) else None
         return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
@@ -89,7 +115,7 @@ class Pilot:
         for row in range(last, 0, -1):
             if self._planner.clear_ahead(position_world, self._points[self._at + row]):
                 return self._points[self._at + row]
-        return self._points[min(self._at + 2, len(self._points) - 1)]
+        return self._points[min(self._at + 4, len(self._points) - 1)]
 
     def _careful(
         self, command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace
@@ -125,11 +151,29 @@ def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> Moti
     gap = points_robot - ends[:, None]
     least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
     best = int(np.argmax(least))
-    leads_out = least[best] > gaps.min() + 0.2 * config.careful_m and _is_safe(commands[best], points_robot, config)
+    leads_out = least[best] > gaps.min() + 0.2 * config.careful_m and _is_safe(
+        commands[best], points_robot, config, config.margin_m
+    )
     return commands[best] if leads_out else None
 
 
-def _is_safe(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> bool:
+def _centred(
+    aim_robot: Float[np.ndarray, "2"], points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig
+) -> tuple[Float[np.ndarray, "2"], bool]:
+    """Return the aim, moved to the middle between returns on both sides where these are near, and whether they are."""
+    distance = float(np.hypot(aim_robot[0], aim_robot[1]))
+    ahead = aim_robot / max(distance, 1e-9)
+    offset = points_robot - aim_robot
+    sideways = (offset @ (J @ ahead))[np.abs(offset @ ahead) < 0.1]
+    left, right = sideways[sideways > 0].min(initial=np.inf), -sideways[sideways < 0].max(initial=-np.inf)
+    if distance < 1e-9 or not config.fits_m < left + right < config.narrow_m:
+        return aim_robot, False
+    return aim_robot + 0.5 * (left - right) * (J @ ahead), True
+
+
+def _is_safe(
+    command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, margin_m: float
+) -> bool:
     """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
     if not len(points_robot):
         return True
@@ -140,5 +184,6 @@ def _is_safe(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], con
     gap = near - places[:, None]
     least = float(np.hypot(gap[..., 0], gap[..., 1]).min())
     now = float(np.hypot(near[:, 0], near[:, 1]).min())
-    limit = config.radius_m + config.margin_m
-    return least >= limit or (least >= now and least > config.radius_m)
+    # Deep in a gap hardly wider than the body, a step along it may take some of what little is left.
+    little = max(min(margin_m, now - config.radius_m - config.give_m), config.least_margin_m)
+    return least >= config.radius_m + little or (least >= now and least > config.radius_m)

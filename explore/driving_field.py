@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float
 from skimage.graph import MCP_Geometric
 
 from .free_space import FreeSpace
-from .paths import PathConfig
+from .paths import PathConfig, costs
 
 BLOCK = 4
 """Cells on each side of a block: 0.2 m. The body's clearance on both sides of a wall is wider than that, so no block
@@ -18,9 +18,10 @@ class DrivingField:
     def __init__(self, free_space: FreeSpace, start_world: Float[np.ndarray, "2"], config: PathConfig) -> None:
         """Search the whole grid."""
         self._free_space = free_space
-        self._passable = (free_space.evidence < 0) & (free_space.clearance() >= config.radius_m + config.margin_m)
-        h, w = self._passable.shape
-        padded = np.pad(self._passable, ((0, -h % BLOCK), (0, -w % BLOCK)))
+        may_fit = free_space.may_fit((slice(None), slice(None)), config.tight_m)
+        metre, self._roomy = costs(free_space.evidence < 0, free_space.clearance(), may_fit, config)
+        h, w = metre.shape
+        padded = np.pad(metre > 0, ((0, -h % BLOCK), (0, -w % BLOCK)))
         # Ten times as fast as any() over a reshaped view.
         rows = np.logical_or.reduce([padded[k::BLOCK] for k in range(BLOCK)])
         blocks = np.logical_or.reduce([rows[:, k::BLOCK] for k in range(BLOCK)])
@@ -32,9 +33,9 @@ class DrivingField:
             blocks[tuple(start)] = True
             reach = int(np.ceil(config.escape_m / self._side_m))
             starts = np.argwhere(blocks[_box(start, reach)]) + np.maximum(start - reach, 0)
-        costs, _ = MCP_Geometric(np.where(blocks, 1.0, -1.0)).find_costs([tuple(b) for b in starts.tolist()])
+        lengths, _ = MCP_Geometric(np.where(blocks, 1.0, -1.0)).find_costs([tuple(b) for b in starts.tolist()])
         # A border of blocks out of reach saves bounds checks.
-        self._metres = np.pad(costs * self._side_m, 1, constant_values=np.inf)
+        self._metres = np.pad(lengths * self._side_m, 1, constant_values=np.inf)
 
     def metres(self, places_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Return how far it is to drive to each place (within a block of it), m; infinite where no way is known."""
@@ -48,10 +49,10 @@ class DrivingField:
         return best
 
     def reachable(self) -> Bool[np.ndarray, "h w"]:
-        """Return which cells of the grid the robot's centre may take and can get to."""
-        h, w = self._passable.shape
+        """Return which cells of the grid the robot's centre may stay in and can get to."""
+        h, w = self._roomy.shape
         finite = np.isfinite(self._metres[1:-1, 1:-1])
-        return self._passable & finite.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[:h, :w]
+        return self._roomy & finite.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[:h, :w]
 
 
 def _box(centre: np.ndarray, reach: int) -> tuple[slice, slice]:

@@ -37,6 +37,21 @@ class FreeSpace:
         self._clearance = np.zeros((0, 0), dtype=np.float32)
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: _Box | None = None
+        self._too_tight = np.zeros((0, 2))
+
+    def note_too_tight(self, place_world: Float[np.ndarray, "2"]) -> None:
+        """Remember that the body did not get through a narrow place."""
+        self._too_tight = np.vstack([self._too_tight, place_world])
+
+    def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
+        """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit."""
+        r0, r1, _ = box[0].indices(self.shape[0])
+        c0, c1, _ = box[1].indices(self.shape[1])
+        fits = np.ones((r1 - r0, c1 - c0), dtype=bool)
+        row, column = np.ogrid[r0:r1, c0:c1]
+        for r, c in self.cells(self._too_tight).tolist():
+            fits &= np.hypot(row - r, column - c) * self.config.cell_m > reach_m
+        return fits
 
     @property
     def shape(self) -> tuple[int, int]:

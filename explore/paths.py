@@ -17,6 +17,13 @@ class PathConfig:
     """The robot's disc."""
     margin_m: float = 0.025
     """Least distance m kept beyond the radius, between cell centres."""
+    squeeze_m: float = 0.2
+    """Through gaps narrower than that, down to this clearance between cell centres, the robot squeezes where no other
+    way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells whether it fits."""
+    squeeze_cost: float = 20.0
+    """What a metre of squeezing costs on top."""
+    tight_m: float = 0.3
+    """Around a place where the body did not fit it is not tried again."""
     standoff_m: float = 0.35
     """Distance from walls that costs nothing; it yields in narrow passages, the margin does not."""
     narrow_cost: float = 4.0
@@ -55,10 +62,7 @@ class Planner:
         box = (slice(self._corner[0], start[0] + reach + 1), slice(self._corner[1], start[1] + reach + 1))
         clearance = free_space.clearance()[box]
         is_free = free_space.is_free(box)
-        least = config.radius_m + config.margin_m
-        passable = is_free & (clearance >= least)
-        tight = np.clip((config.standoff_m - clearance) / (config.standoff_m - least), 0.0, 1.0)
-        self._costs = np.where(passable, 1.0 + config.narrow_cost * tight**2, -1.0)
+        self._costs, self._roomy = costs(is_free, clearance, free_space.may_fit(box, config.tight_m), config)
         self._start = start - self._corner
         self._open_start(is_free, clearance)
 
@@ -81,18 +85,22 @@ class Planner:
         return Path(self._free_space.points(way + self._corner), cost, int(usable[best]))
 
     def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
-        """Return the centres of those cells (row, column of the whole grid) that the robot's centre may take, m."""
+        """Return the centres of those cells (row, column of the whole grid) where the robot's centre may stay, m."""
         local = cells - self._corner
         local = local[np.all((local >= 0) & (local < self._costs.shape), axis=1)]
-        return self._free_space.points(local[self._costs[tuple(local.T)] > 0] + self._corner)
+        return self._free_space.points(local[self._roomy[tuple(local.T)]] + self._corner)
+
+    def has_room(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return at which places, cells of the window, the body has room enough and need not squeeze."""
+        return self._roomy[tuple((self._free_space.cells(points_world) - self._corner).T)]
 
     def clear_ahead(self, start_world: Float[np.ndarray, "2"], end_world: Float[np.ndarray, "2"]) -> bool:
-        """Return whether the straight way between two places leads over passable cells only."""
+        """Return whether the straight way between two places leads over cells with room enough only."""
         length = float(np.hypot(*(end_world - start_world)))
         share = np.linspace(0.0, 1.0, max(int(np.ceil(length / (0.5 * self._free_space.config.cell_m))), 1) + 1)
         cells = self._free_space.cells(start_world + share[:, None] * (end_world - start_world)) - self._corner
         on_grid = np.all((cells >= 0) & (cells < self._costs.shape), axis=1)
-        return bool(np.all(on_grid) and np.all(self._costs[tuple(cells.T)] > 0))
+        return bool(np.all(on_grid) and np.all(self._roomy[tuple(cells.T)]))
 
     def _open_start(self, is_free: Bool[np.ndarray, "h w"], clearance: Float[np.ndarray, "h w"]) -> None:
         """Make the free cells around the robot passable at a price, where they bring it no nearer to a wall."""
@@ -103,7 +111,24 @@ class Planner:
         near = np.hypot(row - r, column - c)[: self._costs[box].shape[0], : self._costs[box].shape[1]] <= reach
         escape = near & (self._costs[box] < 0) & is_free[box] & (clearance[box] >= clearance[r, c])
         self._costs[box] = np.where(escape, 30.0, self._costs[box])
+        self._roomy[box] |= escape
         self._costs[r, c] = max(self._costs[r, c], 1.0)
+        self._roomy[r, c] = True
+
+
+def costs(
+    is_free: Bool[np.ndarray, "h w"],
+    clearance: Float[np.ndarray, "h w"],
+    may_fit: Bool[np.ndarray, "h w"],
+    config: PathConfig,
+) -> tuple[Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """Return what a metre costs in each cell, -1 where the body does not fit, and which cells have room enough."""
+    least = config.radius_m + config.margin_m
+    roomy = is_free & (clearance >= least)
+    squeezed = is_free & ~roomy & may_fit & (clearance > config.squeeze_m - 1e-4)
+    tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
+    metre = 1.0 + config.narrow_cost * tight**2 + np.where(squeezed, config.squeeze_cost, 0.0)
+    return np.where(roomy | squeezed, metre, -1.0), roomy
 
 
 def sees(

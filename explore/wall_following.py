@@ -5,7 +5,7 @@ always over floor that was seen free; the stand-off yields in narrow passages, t
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -33,6 +33,10 @@ class FollowingConfig:
     """An end that moved by more than this is looked at afresh."""
     tries: int = 4
     """A place to which the way was blocked this often is given up."""
+    squeezes: int = 2
+    """A gap hardly wider than the body is tried this often."""
+    stall_steps: int = 60
+    """An errand ends when the way to its place grew no shorter for so many steps."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,8 @@ class Errand(ABC):
         self._pilot: Pilot | None = None
         self._stage = 0
         self._failures = 0
+        self._shortest_m, self._stalled = np.inf, 0
+        self._hopeless = False
         self.looks_done = 0
         self.trouble = ""
         self.doing = ""
@@ -64,6 +70,8 @@ class Errand(ABC):
     def command(self, around: Surroundings) -> MotionCommand | None:
         """Return the next step, or None when nothing is left to do; then `trouble` says what was in the way."""
         for _ in range(12):
+            if self._hopeless:
+                return None
             if self._pilot is not None and self._pilot.arrived(around.pose_world):
                 self._pilot = None
                 self._arrived()
@@ -72,34 +80,51 @@ class Errand(ABC):
             assert self._pilot is not None
             if not self._pilot.is_obstructed(around.pose_world, around.scan):
                 command = self._pilot.command(around.pose_world, around.scan, around.free_space)
-                if command is not None:
+                if command is not None and not self._is_stalled(self._pilot.remaining_m):
                     return command
-            self._pilot = None
-            self._blocked()
+            self._blocked(around)
         return None
 
     @abstractmethod
     def _plan(self, around: Surroundings) -> bool:
         """Set out for the present place or a later one; False when no way is left to any."""
 
+    def _is_stalled(self, remaining_m: float) -> bool:
+        """Take note of the way left; once it has not become shorter for long, there is no hope."""
+        if remaining_m < self._shortest_m - 0.02:
+            self._shortest_m, self._stalled = remaining_m, 0
+        self._stalled += 1
+        self._hopeless = self._stalled > self._config.stall_steps
+        if self._hopeless:
+            self.trouble = f"got no nearer in {self._config.stall_steps} steps"
+        return self._hopeless
+
     def _arrived(self) -> None:
-        self._stage += 1
-        self._failures = 0
+        self._next_stage()
         self.looks_done += 1
 
-    def _blocked(self) -> None:
+    def _blocked(self, around: Surroundings) -> None:
+        assert self._pilot is not None
         self._failures += 1
+        squeeze = self._pilot.squeeze_world
+        if squeeze is not None and (self._hopeless or self._failures >= self._config.squeezes):
+            around.free_space.note_too_tight(squeeze)
+        self._pilot = None
         if self._failures >= self._config.tries:
             self.trouble = "the way was blocked"
-            self._stage += 1
-            self._failures = 0
+            self._next_stage()
+
+    def _next_stage(self) -> None:
+        self._stage += 1
+        self._failures = 0
+        self._shortest_m, self._stalled = np.inf, 0
 
     def _planner(self, around: Surroundings, window_m: float | None) -> Planner:
         """Return a planner that keeps farther from walls after each failure."""
         paths = self._config.paths
-        wider = PathConfig(
-            paths.radius_m, paths.margin_m + 0.01 * self._failures, paths.standoff_m, paths.narrow_cost, paths.escape_m
-        )
+        margin = paths.margin_m + 0.01 * self._failures
+        squeeze = paths.squeeze_m if self._failures < self._config.squeezes else paths.radius_m + margin
+        wider = replace(paths, margin_m=margin, squeeze_m=squeeze)
         return Planner(around.free_space, around.pose_world[:2], wider, window_m)
 
     def _drive(self, planner: Planner, places: Float[np.ndarray, "n 2"]) -> bool:
@@ -124,12 +149,14 @@ class EndErrand(Errand):
         if np.hypot(*(end.position_world - self.end.position_world)) > self._config.moved_m:
             self.end = end
             self._stage, self._failures, self.looks_done = 0, 0, 0
+            self._shortest_m, self._stalled = np.inf, 0
             self._pilot = None
             self._visited = []
 
     def _arrived(self) -> None:
         if self._on_route:
             self._on_route = False
+            self._shortest_m, self._stalled = np.inf, 0
             return
         super()._arrived()
 

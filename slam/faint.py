@@ -21,7 +21,7 @@ class FaintConfig:
 
     looks: int = 3
     """Places from which it must have been seen ..."""
-    apart_m: float = 0.05
+    apart_m: float = 0.07
     """... so far from one another: from one place the same beams make the same line again."""
     patience_steps: int = 30
     """It is forgotten when it was not seen for so many scans."""
