@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .graph import Graph
-from .graph_solver import optimise
+from .graph_optimum import optimise
 
 
 class GraphBatch(Graph):

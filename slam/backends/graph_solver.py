@@ -1,55 +1,22 @@
-"""iSAM2 over poses and lines: factors go in, estimates and joint covariances come out.
+"""Poses and lines on their way to the least-squares solution, step by step.
 
 Here the first pose is the origin. What is entered is collected, and handed over when `settle` is called.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot, inf
 
-import gtsam
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..geometry.poses import compose, rotation, wrap
-from .graph_factors import (
-    LINE_ROWS,
-    POSE_ROWS,
-    line_factor,
-    line_key,
-    line_of,
-    odometry_factor,
-    plane,
-    pose3,
-    pose_key,
-    pose_of,
-    prior_factor,
-)
+from .graph_factors import line_factor, line_key, odometry_factor, prior_factor
+from .graph_guess import guess
+from .graph_isam import GraphConfig, Isam
 from .graph_loose import Loose, wrapped
 from .graph_record import Record
 
 MOST_TURN = 1.2
 """Sightings are linearised no farther than this from the prediction, rad: beyond pi/2 a line is seen from behind."""
-
-
-@dataclass(frozen=True)
-class GraphConfig:
-    """How closely iSAM2 follows the least-squares solution."""
-
-    relinearise_angle_rad: float = 0.02
-    """A pose or a line is linearised anew when it has turned by more than this."""
-    relinearise_place_m: float = 0.05
-    """And when it has moved by more than this."""
-    patience: float = 4.0
-    """Linearise anew once scans have corrected the pose by so many of the two above, summed since the last time."""
-    passes: int = 5
-    """At most so many rounds of linearising anew."""
-    wildfire: float = 1e-5
-    """Changes smaller than this, m and rad, are not passed on from one part of the map to the next."""
-    near: int = 60
-    """Lines that one question for a joint covariance may have, to be prepared for in the next steps."""
-    loose: float = 0.1
-    """A sighting is linearised anew when its line has turned so far that the distance is wrong by this many sigma."""
 
 
 class Solver:
@@ -68,18 +35,19 @@ class Solver:
         With `anew` the sightings are linearised there too, else as the record has it.
         """
         self._config, self._record = config, record
-        self._isam = gtsam.ISAM2(_params(config))
-        self._factors, self._values, self._removals = gtsam.NonlinearFactorGraph(), gtsam.Values(), list[int]()
-        self._entering: list[int] = []
-        self._slots: dict[int, int] = {}
+        self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
+        self.isam = Isam(config)
         self._loose = Loose(config.loose)
-        self._near: set[int] = set()
-        self._unrest, self._is_settled = 0.0, False
+        self._is_settled = False
         self._pose_cov = np.zeros((0, 0))
         self._keys: list[int] = []
-        self._reference, self._reference_lines = gtsam.Values(), np.zeros((0, 2))
+        self.ids = np.zeros(0, dtype=np.int64)
+        """The lines shown."""
         self.lines = np.zeros((0, 2))
-        """(alpha, r) of the lines shown."""
+        """Their (alpha, r)."""
+        self._linearised_at = np.zeros((0, 2))
+        self._astray = np.zeros(0)
+        """How far each line is from where it is linearised, in thresholds."""
         self.pose = np.array(poses[0], dtype=np.float64)
         """The last pose entered: predicted until it is settled."""
         self.last = 0
@@ -87,17 +55,17 @@ class Solver:
 
         body = np.eye(3)
         body[:2, :2] = rotation(-record.pose_world[2])
-        self._enter(prior_factor(body @ record.pose_cov @ body.T))
-        self._values.insert(pose_key(0), pose3(self.pose))
+        self.isam.enter(prior_factor(body @ record.pose_cov @ body.T))
+        self.isam.enter_pose(0, self.pose)
         for pose in poses[1:]:
             self.enter_pose(pose)
-        for (line, known), at in zip(record.lines.items(), lines, strict=True):
-            self._values.insert(line_key(line), gtsam.OrientedPlane3(plane(at[0], at[1])))
+        for (line, known), (alpha, r) in zip(record.lines.items(), lines.tolist(), strict=True):
+            self.isam.enter_line(line, alpha, r)
             for number in known.sightings:
-                epsilon = wrapped(record.seen[number][0] - at[0] + poses[record.seen_from[number], 2])
-                self.enter_sighting(line, number, epsilon if anew else record.epsilons[number], float(at[0]))
-        shown = [known.shown for known in record.lines.values()]
-        self._show([line for line, known in record.lines.items() if known.shown], lines[np.array(shown, dtype=bool)])
+                epsilon = wrapped(record.seen[number][0] - alpha + float(poses[record.seen_from[number], 2]))
+                self.enter_sighting(line, number, epsilon if anew else record.epsilons[number], alpha)
+        self._show(list(record.lines), lines)
+        self.hide(np.flatnonzero([not known.shown for known in record.lines.values()]))
 
     # -- entering ---------------------------------------------------------------------------------------------------
 
@@ -109,14 +77,34 @@ class Solver:
     def enter_pose(self, pose: Float[np.ndarray, "3"]) -> None:
         """Enter the next motion of the record; it leads about to `pose`."""
         self.pose, self.last = np.array(pose, dtype=np.float64), self.last + 1
-        self._values.insert(pose_key(self.last), pose3(self.pose))
+        self.isam.enter_pose(self.last, self.pose)
         motion, cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
-        self._enter(odometry_factor(self.last, motion, cov))
+        self.isam.enter(odometry_factor(self.last, motion, cov))
+        self._is_settled = False
 
-    def enter_lines(self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"]) -> None:
-        """Enter new lines; each needs a sighting before `settle`."""
-        for line, (alpha, r) in zip(ids, lines.tolist(), strict=True):
-            self._values.insert(line_key(line), gtsam.OrientedPlane3(plane(alpha, r)))
+    def enter_scan(
+        self, rows: Int[np.ndarray, " m"], seen: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]
+    ) -> None:
+        """Enter sightings of lines shown, from the last pose; a new pose is linearised where they put it."""
+        if self.last and self.isam.is_new(self.last):
+            motion, motion_cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
+            self.pose = guess(self.pose, motion, motion_cov, self.lines[rows], seen, cov)
+            self.isam.move_pose(self.last, self.pose)
+        alpha = self.lines[rows, 0]
+        epsilon = wrap(seen[:, 0] - alpha + self.pose[2]).tolist()
+        for k in np.lexsort((seen[:, 1], seen[:, 0], rows)).tolist():
+            line = int(self.ids[rows[k]])
+            number = self._record.see(self.last, line, seen[k], cov[k])
+            self.enter_sighting(line, number, epsilon[k], float(alpha[k]))
+
+    def enter_lines(
+        self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"], seen: Float[np.ndarray, "m 2"],
+        cov: Float[np.ndarray, "m 2 2"],
+    ) -> None:  # fmt: skip
+        """Enter new lines of the record, each with its first sighting, from the last pose."""
+        for k, (line, (alpha, r)) in enumerate(zip(ids, lines.tolist(), strict=True)):
+            self.isam.enter_line(line, alpha, r)
+            self.enter_sighting(line, self._record.see(self.last, line, seen[k], cov[k]), 0.0, alpha)
         self._show(ids, lines)
 
     def enter_sighting(self, line: int, number: int, epsilon: float, alpha: float, again: bool = False) -> None:
@@ -126,43 +114,34 @@ class Solver:
         """
         seen = self._record.seen[number]
         epsilon = self._record.epsilons[number] = min(max(epsilon, -MOST_TURN), MOST_TURN)
-        self._enter(line_factor(self._record.seen_from[number], line, seen, epsilon), number)
+        self.isam.enter(line_factor(self._record.seen_from[number], line, seen, epsilon), number)
         self._loose.note(line, number, seen, alpha, again)
+        self._is_settled = False
 
     def leave_sightings(self, line: int, numbers: Sequence[int]) -> None:
         """Take the factors of a line's sightings out; all must be settled. A line with none left drops out too."""
         for number in numbers:
-            self._removals.append(self._slots.pop(number))
+            self.isam.leave(number)
             self._loose.leave(line, number)
+        self._is_settled = False
 
     def hide(self, rows: Int[np.ndarray, " m"]) -> None:
         """No longer show the lines in these rows."""
-        kept = np.ones(len(self._keys), dtype=bool)
+        for line in self.ids[rows].tolist():
+            self.isam.forget(line)
+            self._loose.drop(line)
+        kept = np.ones(len(self.ids), dtype=bool)
         kept[rows] = False
-        for row in rows.tolist():
-            self._reference.erase(self._keys[row])
-        self._keys = [key for key, keep in zip(self._keys, kept, strict=True) if keep]
-        self.lines, self._reference_lines = self.lines[kept], self._reference_lines[kept]
-
-    def drop(self, line: int) -> None:
-        """Forget a line whose sightings have left."""
-        self._loose.drop(line)
-
-    def unsettle(self) -> None:
-        """Solve anew at the next occasion, with new points of linearisation: much may have changed."""
-        self._unrest, self._is_settled = inf, False
-
-    def _enter(self, factor: gtsam.NonlinearFactor, number: int = -1) -> None:
-        self._factors.push_back(factor)
-        self._entering.append(number)
-        self._is_settled = False
+        self.ids, self.lines = self.ids[kept], self.lines[kept]
+        self._linearised_at, self._astray = self._linearised_at[kept], self._astray[kept]
+        self._keys = [line_key(line) for line in self.ids.tolist()]
 
     def _show(self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"]) -> None:
-        for line, (alpha, r) in zip(ids, lines.tolist(), strict=True):
-            self._reference.insert(line_key(line), gtsam.OrientedPlane3(plane(alpha, r)))
+        self.ids = np.concatenate([self.ids, np.asarray(ids, dtype=np.int64)])
         self._keys += [line_key(line) for line in ids]
         self.lines = np.concatenate([self.lines, lines])
-        self._reference_lines = np.concatenate([self._reference_lines, lines])
+        self._linearised_at = np.concatenate([self._linearised_at, lines])
+        self._astray = np.concatenate([self._astray, np.zeros(len(ids))])
 
     # -- solving ----------------------------------------------------------------------------------------------------
 
@@ -170,146 +149,66 @@ class Solver:
         """Solve for what was entered since the last time."""
         if self._is_settled:
             return
-        predicted = self.pose
         self._push()
-        self.pose = self.pose_at(self.last)
-        dx, dy, turn = (self.pose - predicted).tolist()
-        self._unrest += hypot(dx, dy) / self._config.relinearise_place_m
-        self._unrest += abs(wrapped(turn)) / self._config.relinearise_angle_rad
-        if self._tighten() or self._unrest > self._config.patience:
-            for _ in range(self._config.passes):
-                if not self._push(relinearise=True) + self._tighten():
-                    break
-            if self._entering:
-                self._push()
-            self.pose, self._unrest = self.pose_at(self.last), 0.0
+        for _ in range(self._config.passes):
+            if not self._tighten() and self._astray.max(initial=0.0) <= self._config.closure:
+                break
+            self._push()
+        if self.isam.is_waiting:
+            self._push()
         self._loose.calm()
         self._is_settled = True
+
+    def _push(self) -> None:
+        """Hand over what was collected, linearise anew what is astray, and estimate."""
+        astray = np.flatnonzero(self._astray > 1.0)
+        self.isam.push(self.last, relinearise=bool(len(astray)))
+        self.pose = self.isam.pose(self.last)
         self._pose_cov = np.zeros((0, 0))  # Asked of iSAM2 when wanted.
-        self._estimate_lines()
-
-    def _push(self, relinearise: bool = False) -> int:
-        """Hand over what was collected; return how many variables were linearised anew."""
-        last, again = self._order()
-        if relinearise:  # iSAM2 would count these as linearised anew, and one round follow another.
-            again.clear()
-        result = self._isam.update(self._factors, self._values, self._removals, last, None, again, relinearise)
-        if self._entering:
-            for number, slot in zip(self._entering, result.getNewFactorsIndices(), strict=True):
-                if number >= 0:
-                    self._slots[number] = slot
-            self._factors, self._values, self._entering = gtsam.NonlinearFactorGraph(), gtsam.Values(), []
-        self._removals = []
-        return result.getVariablesRelinearized()
-
-    def _order(self) -> tuple[gtsam.KeyGroupMap, gtsam.KeyList]:
-        """Return what to eliminate last, and what to eliminate again for it.
-
-        The pose now, what this step sees and the lines that were asked for together with the pose come last: the
-        next such question is then answered from the top of the tree, four to seven times as fast.
-        """
-        last, again = gtsam.KeyGroupMap(), gtsam.KeyList()
-        last.insert2(pose_key(self.last), 1)
-        for key in self._factors.keyVector():
-            last.insert2(key, 1)
-        for key in sorted(self._near.intersection(self._keys)):
-            last.insert2(key, 1)
-            again.push_back(key)
-        return last, again
+        if not self._keys:
+            return
+        self._linearised_at[astray] = self.isam.lines([self._keys[row] for row in astray.tolist()])
+        moved = self.isam.moved(self._keys)
+        self.lines = self._linearised_at + moved
+        self.lines[:, 0] = wrap(self.lines[:, 0])
+        self._astray = np.max(np.abs(moved) / self._thresholds, axis=1)
 
     def _tighten(self) -> int:
-        """Collect anew the loose sightings of lines that have turned; return how many."""
+        """Collect anew the sightings that their line's present direction puts wrong; return how many."""
         count = 0
-        for line in self._loose.touched():
-            key = line_key(line)
-            alpha = float(line_of(self._isam.calculateEstimate([key]).atOrientedPlane3(key))[0])
-            for number in self._loose.turned(line, alpha):
-                heading = float(self.pose_at(self._record.seen_from[number])[2])
-                self._removals.append(self._slots.pop(number))
-                self.enter_sighting(line, number, wrapped(self._record.seen[number][0] - alpha + heading), alpha, True)
-                count += 1
+        for line, numbers in self._loose.touched().items():
+            row = int(np.searchsorted(self.ids, line))
+            alpha = float(self.lines[row, 0])
+            for number in self._loose.suspects(line, numbers, alpha):
+                index, seen = self._record.seen_from[number], self._record.seen[number]
+                heading = float(self.pose[2] if index == self.last else self.isam.pose(index)[2])
+                epsilon = wrapped(seen[0] - alpha + heading)
+                if abs(epsilon - self._record.epsilons[number]) > self._loose.turn(seen):
+                    self.leave_sightings(line, [number])
+                    self.enter_sighting(line, number, epsilon, alpha, again=True)
+                    count += 1
         return count
 
     # -- asking -----------------------------------------------------------------------------------------------------
 
-    def pose_at(self, index: int) -> Float[np.ndarray, "3"]:
-        """Return the present estimate of one pose."""
-        return pose_of(self._isam.calculateEstimatePose3(pose_key(index)))
-
     def poses(self, linearisation: bool = False) -> Float[np.ndarray, "p 3"]:
         """Return the present estimates of all poses, or the points at which they are linearised."""
-        values = self._all(linearisation)
-        return np.array([pose_of(values.atPose3(pose_key(k))) for k in range(self.last + 1)])
+        self.settle()
+        return self.isam.all(linearisation).poses(self.last + 1)
 
     def all_lines(self, linearisation: bool = False) -> Float[np.ndarray, "n 2"]:
         """Return the present estimates of all lines of the record, shown or not, or where they are linearised."""
-        values = self._all(linearisation)
-        lines = [line_of(values.atOrientedPlane3(line_key(line))) for line in self._record.lines]
-        return np.array(lines).reshape(-1, 2)
-
-    def _all(self, linearisation: bool) -> gtsam.Values:
         self.settle()
-        return self._isam.getLinearizationPoint() if linearisation else self._isam.calculateBestEstimate()
-
-    def _estimate_lines(self) -> None:
-        """Estimate all lines shown without a loop over them: from how far each is from where it was entered."""
-        if self._keys:
-            moved = self._reference.localCoordinates(self._isam.calculateEstimate(self._keys)).vector(self._keys)
-            self.lines = self._reference_lines - moved.reshape(-1, 3)[:, LINE_ROWS]
-            self.lines[:, 0] = wrap(self.lines[:, 0])
+        return self.isam.all(linearisation).lines(list(self._record.lines))
 
     def pose_cov(self) -> Float[np.ndarray, "3 3"]:
         """Return the covariance of the last pose, body frame."""
         if not len(self._pose_cov):
-            found = self._isam.marginalCovariance(pose_key(self.last))
-            self._pose_cov = found[np.ix_(POSE_ROWS, POSE_ROWS)]
+            self._pose_cov = self.isam.pose_cov(self.last)
         return self._pose_cov
 
     def joint_cov(self, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "s s"]:
         """Return the covariance of the last pose (body frame) and the lines (alpha, r) in these rows, by one query."""
         if not len(rows):
             return self.pose_cov().copy()
-        keys = [self._keys[row] for row in rows.tolist()]
-        if len(keys) <= self._config.near:
-            self._near = set(keys)
-        found = self._isam.jointMarginalCovariance([pose_key(self.last), *keys]).fullMatrix()
-        lines = 6 + 3 * np.arange(len(keys))[:, None] + np.array(LINE_ROWS)
-        index = np.concatenate([POSE_ROWS, lines.ravel()])
-        cov = found[np.ix_(index, index)]
-        cov[:3, 3:] *= -1.0
-        cov[3:, :3] *= -1.0
-        return cov
-
-
-def optimise(
-    record: Record, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"], rounds: int = 10
-) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
-    """Return all poses and lines at the least-squares optimum (Levenberg-Marquardt), from a first guess.
-
-    Sightings are linearised anew at each optimum, at most `rounds` times; after the second it hardly moves.
-    """
-    params = gtsam.LevenbergMarquardtParams()
-    params.setRelativeErrorTol(1e-14)
-    params.setAbsoluteErrorTol(1e-14)
-    for _ in range(rounds):
-        whole = Solver(GraphConfig(), record, poses, lines)
-        optimum = gtsam.LevenbergMarquardtOptimizer(whole._factors, whole._values, params).optimize()
-        before = poses, lines
-        poses = np.array([pose_of(optimum.atPose3(pose_key(k))) for k in range(len(poses))])
-        lines = np.array([line_of(optimum.atOrientedPlane3(line_key(line))) for line in record.lines]).reshape(-1, 2)
-        if np.allclose(poses, before[0], rtol=0, atol=1e-9) and np.allclose(lines, before[1], rtol=0, atol=1e-9):
-            break
-    return poses, lines
-
-
-def _params(config: GraphConfig) -> gtsam.ISAM2Params:
-    params = gtsam.ISAM2Params()
-    params.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(config.wildfire))
-    params.relinearizeSkip = 1 << 30  # Only when `settle` asks for it.
-    angle, place = config.relinearise_angle_rad, config.relinearise_place_m
-    thresholds = gtsam.ISAM2ThresholdMap()
-    thresholds.insert(("x", np.array([angle, 1.0, 1.0, 1.0, place, place])))
-    thresholds.insert(("l", np.array([angle, 1.0, place])))
-    params.setRelinearizeThreshold(thresholds)
-    params.findUnusedFactorSlots = True
-    return params
+        return self.isam.joint_cov(self.last, [self._keys[row] for row in rows.tolist()])

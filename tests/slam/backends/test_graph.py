@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from slam.backend import Observations, StaleBeliefError
 from slam.backends.graph import Graph
 from slam.backends.graph_batch import GraphBatch
-from slam.backends.graph_solver import GraphConfig
+from slam.backends.graph_isam import GraphConfig
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
 from slam.models import innovations, lines_robot
@@ -39,10 +39,11 @@ class Trip:
     motions: np.ndarray
     seen: list[list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]]
     walls: int
+    odometry_cov: np.ndarray
     ids: dict[int, int] = field(default_factory=dict)
 
     @classmethod
-    def record(cls, seed=0, steps=60, walls=9, sigmas=(0.01, 0.005), start=START) -> "Trip":
+    def record(cls, seed=0, steps=60, walls=9, sigmas=(0.01, 0.005), start=START, odometry_cov=ODOMETRY_COV) -> "Trip":
         """Drive a circle inside walls with all directions (also alpha = pi) and both signs of r in the world."""
         rng = np.random.default_rng([4, seed])
         alpha = wrap(np.pi + 2 * np.pi * np.arange(walls) / walls)
@@ -53,18 +54,18 @@ class Trip:
         for k in range(steps):
             if k:
                 motion = np.array([0.15, 0.0, 0.125])
-                true = compose(true, motion + np.linalg.cholesky(ODOMETRY_COV) @ rng.standard_normal(3))
+                true = compose(true, motion + np.linalg.cholesky(odometry_cov) @ rng.standard_normal(3))
                 motions.append(motion)
             rows = np.sort(rng.choice(walls, 4, replace=False))
             seen.append([(int(i), *look(true, points[i], alpha[i], sigmas, rng)) for i in rows])
-        return cls(start, np.array(motions), seen, walls)
+        return cls(start, np.array(motions), seen, walls, odometry_cov)
 
     def run(self, backend, walls_of=lambda k, i: i, ask=True, skip=lambda k, i: False):
         """Feed a back end; wall `i` at step `k` counts as the line of `walls_of(k, i)`."""
         self.ids = {}
         for k, sightings in enumerate(self.seen):
             if k:
-                backend.predict(Odometry(self.motions[k - 1], ODOMETRY_COV))
+                backend.predict(Odometry(self.motions[k - 1], self.odometry_cov))
             sightings = [(walls_of(k, i), *rest) for i, *rest in sightings if not skip(k, i)]
             old = [s for s in sightings if s[0] in self.ids]
             new = [s for s in sightings if s[0] not in self.ids]
@@ -96,7 +97,7 @@ class Trip:
             first = int(np.flatnonzero(wall == i)[0])
             alpha = wrap(z[first, 0] + poses[step[first], 2])
             lines[i] = alpha, z[first, 1] + normals(alpha) @ (poses[step[first], :2] - anchors[i])
-        prior, odometry = (np.linalg.cholesky(np.linalg.inv(P)).T for P in (P0, ODOMETRY_COV))
+        prior, odometry = (np.linalg.cholesky(np.linalg.inv(P)).T for P in (P0, self.odometry_cov))
         weights = np.linalg.cholesky(np.linalg.inv(cov)).swapaxes(1, 2)
         scale = np.ones((len(rows), 2))
         at_step = [np.flatnonzero(step == k) for k in range(n)]
@@ -198,8 +199,10 @@ def test_the_batch_solution_is_the_dense_one_even_where_directions_are_known_to_
     np.testing.assert_allclose(wrap(smoothed[:, 2] - poses[:, 2]), 0.0, atol=2 * HUNDREDTH_DEGREE)
 
 
-def test_step_by_step_the_graph_stays_within_a_few_hundredths_of_a_sigma_of_the_optimum():
-    trip = Trip.record(3)
+@pytest.mark.parametrize("slip", [1.0, 5.0])
+def test_step_by_step_the_graph_stays_within_a_few_hundredths_of_a_sigma_of_the_optimum(slip):
+    """Also where the wheels slip by four degrees a step, so that no prediction is a point to linearise at."""
+    trip = Trip.record(3, sigmas=(0.004, 0.002), odometry_cov=slip**2 * ODOMETRY_COV)
     stepwise, batch = trip.run(Graph(START, P0)), Trip.run(trip, GraphBatch(START, P0))
     batch.finish()
     a, b = everything(stepwise), everything(batch)
@@ -355,20 +358,6 @@ def test_another_format_is_refused():
     arrays = Graph(START, P0).arrays()
     with pytest.raises(ValueError, match="format"):
         Graph.from_arrays({**arrays, "format": np.array(99)})
-
-
-def test_the_pose_is_never_known_better_than_where_the_robot_began():
-    """P_pose >= A P0 A' at the points of linearisation, which are the estimates after `relinearise`."""
-    trip = Trip.record(13)
-    backend = trip.run(Graph(START, P0))
-    backend.relinearise()
-    path, belief = backend.trajectory(), backend.belief
-    A = np.eye(3)
-    A[:2, 2] = np.array([[0.0, -1.0], [1.0, 0.0]]) @ (path[-1, :2] - path[0, :2])
-    turn = np.eye(3)
-    turn[:2, :2] = rotation(path[0, 2] - START[2])  # GTSAM keeps the prior in the body frame of the first pose.
-    bound = A @ turn @ P0 @ turn.T @ A.T
-    assert np.linalg.eigvalsh(belief.pose_cov - bound).min() > -1e-8 * np.trace(P0)
 
 
 def test_a_wide_loop_closure_ends_at_the_optimum():

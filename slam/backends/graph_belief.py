@@ -1,0 +1,87 @@
+"""What a factor graph believes: its last pose carried ahead by waiting predictions, its lines about their anchors."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..backend import Belief, Joint, StaleBeliefError
+from ..geometry.lines import directions, normals
+from ..geometry.poses import compose, rotation, wrap
+from ..models import move
+from .graph_record import Record
+from .graph_solver import Solver
+
+
+def believe(
+    solver: Solver,
+    record: Record,
+    anchors: Float[np.ndarray, "n 2"],
+    inner_anchors: Float[np.ndarray, "n 2"],
+    is_present: Callable[[], bool],
+) -> Belief:
+    """Return the belief of a solver that is settled; `anchors` in the world frame, and as the solver sees them.
+
+    The largest joint covariance asked for is kept: what is part of it is not asked of the solver again.
+    """
+    ahead = _Ahead(compose(record.pose_world, solver.pose))
+    for index in range(solver.last, len(record.motions)):
+        ahead.move(record.motions[index], record.motion_covs[index])
+    means = solver.lines.copy()
+    means[:, 1] -= np.sum(normals(means[:, 0]) * inner_anchors, axis=-1)
+    means[:, 0] = wrap(means[:, 0] + record.pose_world[2])
+    answers: list[tuple[Int[np.ndarray, " m"], Float[np.ndarray, "s s"]]] = []
+
+    def query(wanted: Int[np.ndarray, " m"]) -> Joint:
+        if not is_present():
+            raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
+        rows = belief.rows(wanted)
+        if not answers or not np.all(np.isin(rows, answers[0][0])):
+            cov = ahead.joint_cov(_joint_cov(solver, rows, inner_anchors))
+            cov[:3, :3] = belief.pose_cov
+            answers[:] = [(rows, cov)]
+        known, cov = answers[0]
+        order = np.argsort(known)
+        at = order[np.searchsorted(known, rows, sorter=order)]
+        index = np.concatenate([np.arange(3), (3 + 2 * at[:, None] + np.arange(2)).ravel()])
+        mean = np.concatenate([belief.pose_world, belief.means[rows].ravel()])
+        return Joint(mean, cov[np.ix_(index, index)], anchors[rows])
+
+    belief = Belief(ahead.pose_world, ahead.pose_cov(solver.pose_cov()), solver.ids, anchors, means, query)
+    return belief
+
+
+def _joint_cov(
+    solver: Solver, rows: Int[np.ndarray, " m"], anchors: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "s s"]:
+    """Return the covariance of the last pose (body frame) and these lines (alpha, d)."""
+    cov = solver.joint_cov(rows)
+    # d = r - n(alpha)·c, so dd = dr - (t·c) dalpha.
+    lever = np.sum(directions(solver.lines[rows, 0]) * anchors[rows], axis=-1)
+    cov[4::2] -= lever[:, None] * cov[3::2]
+    cov[:, 4::2] -= lever * cov[:, 3::2]
+    return np.asarray(0.5 * (cov + cov.T))
+
+
+class _Ahead:
+    """A pose some predictions ahead of the last pose of the graph."""
+
+    def __init__(self, pose_world: Float[np.ndarray, "3"]) -> None:
+        self.pose_world = pose_world
+        self._F, self._Q = np.eye(3), np.zeros((3, 3))
+        self._F[:2, :2] = rotation(pose_world[2])
+
+    def move(self, motion: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> None:
+        step = move(self.pose_world, motion)
+        self.pose_world = step.pose_world
+        self._F = step.F @ self._F
+        self._Q = step.F @ self._Q @ step.F.T + step.W @ cov @ step.W.T
+
+    def pose_cov(self, cov_body: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+        cov = self._F @ cov_body @ self._F.T + self._Q
+        return np.asarray(0.5 * (cov + cov.T))
+
+    def joint_cov(self, cov: Float[np.ndarray, "s s"]) -> Float[np.ndarray, "s s"]:
+        cov[:3, 3:] = self._F @ cov[:3, 3:]
+        cov[3:, :3] = cov[:3, 3:].T
+        return cov
