@@ -105,9 +105,21 @@ class Backend(Protocol):
         ...
 
     def merge(self, keep: int, drop: int) -> None:
-        """Make two lines one, because they were found to be one wall; `keep` survives."""
+        """Make two lines one, because they were found to be one wall; `keep` survives.
+
+        Raises KeyError where an id is not in the map, and ValueError for one line twice.
+        """
         ...
 
     def remove(self, ids: Sequence[int]) -> None:
         """Forget lines; raises KeyError where an id is not in the map."""
+        ...
+
+
+@runtime_checkable
+class Smoother(Backend, Protocol):
+    """A back end that can solve everything once more when a run has ended."""
+
+    def finish(self) -> Float[np.ndarray, "n 3"]:
+        """Return the poses, world frame, at the start and after every prediction; beliefs then are of that solution."""
         ...

@@ -111,6 +111,8 @@ class Ekf(Generic[M]):
     def merge(self, keep: int, drop: int) -> None:
         """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
         rows = self.belief.rows([keep, drop])
+        if keep == drop:
+            raise ValueError(f"expected two lines to merge, found line {keep} twice")
         self._move_on()
         alpha = self._align(rows)
         H, e = equality(self._map.means[rows], self._map.anchors[rows], alpha)

@@ -135,7 +135,7 @@ def test_covariances_stay_sound_through_any_program_of_verbs(name, seed):
     room, backend = Room.random(rng), BACKENDS[name].make(START.copy(), P0.copy())
     true, owner, used = START.copy(), {}, set()
     for _ in range(40):
-        verb = rng.choice(["predict", "update", "grow", "remove"], p=[0.35, 0.35, 0.2, 0.1])
+        verb = rng.choice(["predict", "update", "grow", "merge", "remove"], p=[0.3, 0.3, 0.2, 0.1, 0.1])
         ids = backend.belief.ids
         if verb == "predict":
             odo, cov = odometry(rng, rng.uniform(-0.15, 0.15), rng.uniform(-0.17, 0.17))
@@ -151,6 +151,12 @@ def test_covariances_stay_sound_through_any_program_of_verbs(name, seed):
             chosen = rng.choice(ids, rng.integers(1, len(ids) + 1), replace=False)
             lines, cov, _ = room.seen(true, np.array([owner[i] for i in chosen.tolist()]), rng)
             see(backend, chosen, lines, cov)
+        elif verb == "merge":
+            walls = [owner[i] for i in ids.tolist()]
+            twins = [i for i, wall in zip(ids.tolist(), walls, strict=True) if walls.count(wall) > 1]
+            if twins:
+                keep = int(rng.choice(twins))
+                backend.merge(keep, next(i for i in twins if i != keep and owner[i] == owner[keep]))
         elif len(ids):
             backend.remove(rng.choice(ids, rng.integers(1, len(ids) + 1), replace=False).tolist())
         assert_sound(backend)
@@ -270,11 +276,12 @@ def verbs(backend, room):
         "predict": lambda: backend.predict(Odometry(np.array([0.1, 0.0, 0.0]), 1e-4 * np.eye(3))),
         "update": lambda: see(backend, first, lines, cov),
         "grow": lambda: backend.grow(lines, cov, centres),
+        "merge": lambda: backend.merge(*first.tolist()),
         "remove": lambda: backend.remove(first[:1].tolist()),
     }
 
 
-@pytest.mark.parametrize("verb", ["predict", "update", "grow", "remove"])
+@pytest.mark.parametrize("verb", ["predict", "update", "grow", "merge", "remove"])
 def test_a_belief_goes_stale_when_its_back_end_moves_on_and_keeps_what_it_said(name, verb):
     rng = np.random.default_rng(12)
     room = Room.random(rng)

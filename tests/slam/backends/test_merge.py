@@ -102,6 +102,14 @@ def test_merging_a_line_with_its_twin_again_and_again_stays_sound(name):
         assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 0
 
 
+def test_a_line_is_not_merged_with_itself_and_the_refusal_changes_nothing(name):
+    backend, keep, other, _ = two_of_one_wall(name)
+    belief = backend.belief
+    with pytest.raises(ValueError, match=f"expected two lines to merge, found line {keep} twice"):
+        backend.merge(keep, keep)
+    belief.joint([keep, other])
+
+
 def test_a_merge_makes_the_belief_stale_and_the_dropped_id_unknown(name):
     backend, keep, _, drop = two_of_one_wall(name)
     belief = backend.belief
