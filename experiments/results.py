@@ -62,6 +62,9 @@ def _files(result: TrialResult) -> dict[str, Callable[[], bytes]]:
     certificate = result.certificate
     if log is None or last is None or certificate is None:
         return files
+    smoothed = result.smoothed
+    if smoothed is not None:
+        files["trajectory_smoothed.tum"] = lambda: tum(log.time_s, smoothed.poses_world)
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
@@ -127,10 +130,14 @@ def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
 
 
 def map_arrays(result: TrialResult) -> dict[str, Any]:
-    """Return the map at the last step: lines are (alpha rad, d m) about their anchors, NaN for a lost covariance."""
+    """Return the final map: lines are (alpha rad, d m) about their anchors, NaN for a lost covariance.
+
+    It is that of the last step, or of the smoothed solution if there is one.
+    """
     if result.last is None:
         raise ValueError("expected a run of at least one step, found none: there is no map")
-    walls, joint = result.last.map, result.joint
+    final = result.smoothed
+    walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
     size = 3 + 2 * len(walls)
     return {
         "pose": walls.belief.pose_world,

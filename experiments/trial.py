@@ -18,6 +18,7 @@ from .certificate import certificate_record
 from .records import Log, Recorder
 from .scenario import Scenario, TrialConfig, UsageError, build
 from .scores import Ending, run_keys, summarise
+from .smoothing import Smoothed, smooth
 from .truth import truth_of
 
 
@@ -34,6 +35,8 @@ class TrialResult:
     """Pose and all lines at the last step."""
     certificate: Certificate | None
     summary: dict[str, Any]
+    smoothed: Smoothed | None = None
+    """What the back end made of everything at the end, if it smooths; the scores are of what each step knew."""
 
 
 Mission = Callable[[Scenario], Iterator[Step]]
@@ -73,7 +76,8 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep)
     summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending)
     summary |= {"certificate": certificate_record(certificate)}
-    return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary)
+    smoothed = smooth(scenario.backend, last.map, len(log))
+    return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
 
 
 def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,3 +132,21 @@ def test_wheels_alone_start_at_the_truth(world, scripted_mission):
 def test_bad_settings_are_told_in_one_line(world, changes):
     with pytest.raises(UsageError, match=r"^expected .*, found .*: .*$"):
         build(TrialConfig("square", **changes), world)
+
+
+def test_a_back_end_that_smooths_leaves_its_solution_beside_what_each_step_knew(tmp_path):
+    config = TrialConfig("paper-fig8", "graph-batch", seed=3, max_steps=25)
+    batch, stepwise = run_trial(config), run_trial(replace(config, backend="graph"))
+    assert stepwise.smoothed is None
+    same = {"backend", "step_ms"}
+    assert {k: v for k, v in batch.summary.items() if k not in same} == {
+        k: v for k, v in stepwise.summary.items() if k not in same
+    }
+    assert write_results(batch, tmp_path) == []
+    smoothed, known = (np.loadtxt(tmp_path / f"trajectory_{name}.tum") for name in ("smoothed", "estimated"))
+    np.testing.assert_array_equal(smoothed[:, 0], known[:, 0])
+    assert 0.0 < np.abs(smoothed[:, 1:3] - known[:, 1:3]).max() < 0.1
+    with np.load(tmp_path / "map.npz") as arrays:
+        np.testing.assert_allclose(arrays["pose"][:2], smoothed[-1, 1:3], atol=1e-8)
+        np.testing.assert_array_equal(arrays["ids"], batch.last.map.ids)
+        assert np.linalg.eigvalsh(arrays["cov"]).min() > 0
