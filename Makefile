@@ -34,8 +34,7 @@ strategies: setup
 	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv
 
 docs: setup
-	$(BIN)/chainslam explore paper-fig9 --seed 1 --out results/docs
-	mkdir -p docs/pictures && cp results/docs/map.png docs/pictures/fig9.png
+	docs/make-pictures
 
 smoke: setup
 	$(BIN)/chainslam compare --preset smoke --out results/smoke

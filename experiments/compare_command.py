@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from .campaign.film import record_campaign
 from .campaign.merge import merge
 from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign, trials
 from .campaign.runner import on_cores, on_dask, run_campaign
@@ -54,6 +55,9 @@ class Compare:
     merge: tuple[Path, ...] = ()
     """Folders of campaigns to put together into one, in place of running any."""
 
+    rrd: Path | None = None
+    """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this file."""
+
     @property
     def campaign(self) -> Campaign:
         """The campaign that the options describe; raises UsageError where they leave something open."""
@@ -75,6 +79,8 @@ class Compare:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         if self.merge:
+            if self.rrd is not None:
+                raise UsageError("expected --rrd with a campaign that runs, found --merge: leave one of them out")
             merge(self.merge, self.out)
             print(f"results in {self.out}")
             return 0
@@ -94,4 +100,7 @@ class Compare:
                 return INTERRUPTED
             write_tables(self.out, campaign, trials(campaign), store.record)
         print(f"results in {self.out}")
-        return 0
+        problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
+        for problem in problems:
+            print(f"chainslam: not written: {problem}", file=sys.stderr)
+        return 1 if problems else 0

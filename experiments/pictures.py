@@ -1,0 +1,108 @@
+"""Pictures for papers from the folders that runs left: `python -m experiments.pictures DIR ... --out PICTURES`.
+
+Paths and NEES of several folders (replays of one log) come together; the model space and the traversals are of the
+first. The map itself is in each folder as `map.png`.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tyro
+from jaxtyping import Float
+from matplotlib.figure import Figure
+
+from viz import palette
+from viz.figures import saved
+from viz.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
+from viz.shapes import hessian_cov
+
+from .explore_command import prepare
+from .files import write
+from .results import LOG
+from .saved import read_trial
+from .scenario import TrialConfig, UsageError, load_world
+from .timelines import true_rings
+
+BAD_USAGE = 2
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Draw paths, NEES, model space and traversals of the runs in some folders."""
+
+    runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR")]
+    """Folders of runs in one world."""
+    out: Path
+    """Folder for the pictures."""
+    kinds: tuple[Literal["png", "svg", "pdf"], ...] = ("svg", "png")
+    """Kinds of files."""
+
+    def run(self) -> None:
+        """Write the pictures; raises UsageError where a folder holds no run."""
+        runs = [_read(folder) for folder in self.runs]
+        prepare(self.out)
+        for name, draw in _pictures(runs).items():
+            figure = draw()
+            for kind in self.kinds:
+                write(self.out / f"{name}.{kind}", saved(figure, kind))
+
+
+@dataclass(frozen=True)
+class _Run:
+    trial: TrialConfig
+    log: dict[str, Any]
+    walls: dict[str, Any]
+    estimated_world: Float[np.ndarray, "s 3"]
+    nees: Float[np.ndarray, " s"]
+
+
+def _read(folder: Path) -> _Run:
+    trial = read_trial(folder / "config.json")
+    try:
+        with np.load(folder / LOG) as log, np.load(folder / "map.npz") as walls:
+            arrays, mapped = dict(log), dict(walls)
+        columns = ("x_m", "y_m", "heading_rad", "pose_nees")
+        with (folder / "steps.csv").open() as stream:
+            header = stream.readline().strip().split(",")
+            at = [header.index(name) for name in columns]
+            table = np.genfromtxt(stream, delimiter=",", usecols=at, ndmin=2)
+    except (OSError, ValueError, KeyError) as error:
+        raise UsageError(f"expected a run's results in {folder}, found {error}: name what `explore` left") from error
+    return _Run(trial, arrays, mapped, table[:, :3], table[:, 3])
+
+
+def _pictures(runs: list[_Run]) -> dict[str, Callable[[], Figure]]:
+    first = runs[0]
+    trial = first.trial
+    world = load_world(trial.world, trial.start, trial.scale)
+    rings, title = true_rings(world), f"{world.name}, seed {trial.seed}"
+    paths = {run.trial.backend: run.estimated_world for run in runs}
+    lines = first.walls["lines_world"]
+    count = len(lines)
+    blocks = first.walls["cov"][3:, 3:].reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count), :]
+    covs = hessian_cov(lines[:, 0], first.walls["anchors"], blocks)
+    colours = [palette.of_backend(trial.backend)] * count
+    return {
+        "paths": lambda: draw_trajectories(first.log["true_poses"], paths, rings, title),
+        "nees": lambda: draw_nees({run.trial.backend: run.nees for run in runs}, title),
+        "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
+        "traversals": lambda: draw_traversal(first.log["true_poses"], rings, title),
+    }
+
+
+def main() -> int:
+    """Run the command and return its exit status."""
+    try:
+        tyro.cli(Pictures).run()
+    except UsageError as error:
+        print(f"pictures: {error}", file=sys.stderr)
+        return BAD_USAGE
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
