@@ -15,6 +15,7 @@ from .goal import Goal, SetAside
 from .navigation import route
 from .outcome import Outcome
 from .ping_pong import WallErrand
+from .spots import Spots
 from .strategies import Choice, Place, Situation, Strategy
 from .strategies.nearest import nearest_unseen
 from .unseen import known_floor
@@ -52,8 +53,8 @@ class Explorer:
         self._choice: Choice | None = None
         self._sweeping = False
         self._steps_on_goal = 0
-        self._attempts = _Spots(0.3)
-        self._visited = _Spots(0.3)
+        self._attempts = Spots(0.3)
+        self._visited = Spots(0.3)
         self._walked: set[tuple[int, int]] = set()
         self._floor_known: dict[tuple[int, int], int] = {}
         self.set_aside: dict[tuple[int, int], SetAside] = {}
@@ -239,20 +240,6 @@ class Explorer:
 
     def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
         return self._attempts.count(place) >= self._config.attempts
-
-
-class _Spots:
-    """Counts what happened near a place."""
-
-    def __init__(self, reach_m: float) -> None:
-        self._reach_m = reach_m
-        self._places = np.zeros((0, 2))
-
-    def add(self, place: Float[np.ndarray, 2]) -> None:
-        self._places = np.vstack([self._places, place])
-
-    def count(self, place: Float[np.ndarray, 2]) -> int:
-        return int(np.count_nonzero(np.hypot(*(self._places - place).T) < self._reach_m))
 
 
 def _straight_to_nearest(situation: Situation) -> Choice:
