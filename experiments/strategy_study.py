@@ -41,6 +41,7 @@ KEYS = ("world", "strategy", "seed", "errorless")
 LENGTHS = tuple(f"{what}_{share:g}_m" for what in ("contour", "floor") for share in SHARES)
 COLUMNS = (*KEYS, *SCORES, *LENGTHS, "step_ms_mean")
 BASELINE = "nearest-robot"
+FEWEST_PAIRS = 5
 
 
 @dataclass
@@ -166,17 +167,21 @@ def ratio(
     """Return the ratio of mean lengths to the baseline's in each world, and their geometric mean with its interval.
 
     Only seeds that both have reached count. The 95 % interval resamples the pairs within each world; the worlds stay.
+    It is NaN where a world has fewer than five pairs.
     """
     pairs = table[table.strategy == strategy].merge(table[table.strategy == BASELINE], on=["world", "seed"])
     pairs = pairs.dropna(subset=[f"{column}_x", f"{column}_y"])
-    rng, means, drawn = np.random.default_rng(0), {}, []
+    rng, means, drawn, fewest = np.random.default_rng(0), {}, [], FEWEST_PAIRS
     for world, rows in pairs.groupby("world", sort=False):
         values = rows[[f"{column}_x", f"{column}_y"]].to_numpy(float)
+        fewest = min(fewest, len(values))
         means[str(world)] = float(values[:, 0].mean() / values[:, 1].mean())
         picks = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
         drawn.append(np.log(picks[:, 0] / picks[:, 1]))
     if not means:
         return {}, np.nan, np.nan, np.nan
+    if fewest < FEWEST_PAIRS:
+        return means, float(np.exp(np.mean(np.log(list(means.values()))))), np.nan, np.nan
     low, high = np.exp(np.quantile(np.mean(drawn, axis=0), [0.025, 0.975]))
     return means, float(np.exp(np.mean(np.log(list(means.values()))))), float(low), float(high)
 

@@ -41,10 +41,16 @@ def test_a_strategy_against_itself_is_exactly_one():
 
 def test_trials_that_never_reached_the_share_are_left_out_in_pairs():
     rows = table(2.0, 0.0)
-    rows.loc[(rows.strategy == "other") & (rows.seed > 3), "m"] = np.nan
+    rows.loc[(rows.strategy == "other") & (rows.seed > 6), "m"] = np.nan
     _, mean, low, high = ratio(rows, "other", "m")
     assert mean == pytest.approx(2.0)
     assert low == pytest.approx(high)
+
+
+def test_a_handful_of_trials_has_no_interval():
+    _, mean, low, high = ratio(table(2.0, 0.1, seeds=4), "other", "m")
+    assert mean == pytest.approx(2.0, rel=0.2)
+    assert np.isnan([low, high]).all()
 
 
 def test_a_study_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
