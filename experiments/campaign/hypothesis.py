@@ -10,6 +10,8 @@ from .score import END
 CONTENDER = ("nearest-start", "block-ekf")
 MATCHES_WITHIN = 1.1
 """Two errors match if the 95 % interval of their ratio stays below this; they do not if it stays above."""
+LEAST_PAIRS = 10
+"""Fewer pairs of runs decide nothing: the bootstrap's interval of a handful is too narrow."""
 DECISIVE = "33"
 """Metres driven at which the verdict is taken: the length of the paper's first experiment."""
 MEASURES = (
@@ -42,7 +44,8 @@ def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
             **{m.name: difference(first, second, m) for m in MEASURES},
         }
     ratio = found["marks"][DECISIVE]["wall_rmse_m"]
-    found["verdict"] = verdict(ratio["low"], ratio["high"])
+    enough = ratio["runs"] >= LEAST_PAIRS
+    found["verdict"] = verdict(ratio["low"], ratio["high"]) if enough else "undecided"
     return found
 
 

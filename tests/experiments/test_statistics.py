@@ -26,6 +26,11 @@ def test_where_buildings_differ_only_the_interval_by_building_is_wide_enough():
     assert np.mean([e.low_buildings <= 0.0 <= e.high_buildings for e in found]) > 0.85
 
 
+def test_an_interval_never_reaches_beyond_what_was_seen():
+    found = estimate({("a", 1): 1.0, ("a", 2): 2.0, ("a", 3): 500.0})
+    assert 1.0 <= found.low < found.mean < found.high <= 500.0
+
+
 def test_a_few_buildings_make_no_interval_by_building():
     found = estimate(runs(np.random.default_rng(1), buildings=4))
     assert found.low_buildings is None
@@ -83,6 +88,12 @@ def test_the_hypothesis_is_decided_by_the_interval_of_the_ratio(times, expected)
     assert found["verdict"] == expected
     assert found["marks"]["33"]["wall_rmse_m"]["value"] == pytest.approx(times, rel=0.05)
     assert found["marks"]["33"]["contender"] == {"driving": 30, "finished": 0, "failed": 0}
+
+
+def test_a_handful_of_runs_decides_nothing():
+    sides = (("nearest-robot", "full-ekf", 0.1), ("nearest-start", "block-ekf", 0.3))
+    rows = [mark(*side, seed, "33", wall) for *side, wall in sides for seed in range(5)]
+    assert hypothesis(rows)["verdict"] == "undecided"
 
 
 def test_without_both_sides_there_is_no_verdict():
