@@ -23,6 +23,9 @@ class FaintConfig:
     """Places from which it must have been seen ..."""
     apart_m: float = 0.07
     """... so far from one another: from one place the same beams make the same line again."""
+    longest_m: float = 0.18
+    """Longer ones are not believed: a face of that length shows five beams from near by, and what shows three or four
+    is mostly a line from one wall's corner to the next wall."""
     patience_steps: int = 30
     """It is forgotten when it was not seen for so many scans."""
     gate: float = 0.99
@@ -70,8 +73,12 @@ class FaintLines:
 
         A line keeps the sighting whose direction is known best, so that it does not wander off step by step.
         """
-        self._unseen += 1
         seen = _sightings(pose_world, segments)
+        short = np.flatnonzero(2.0 * seen.half_m <= self._config.longest_m)
+        return short[self._see(pose_world, seen.take(short))]
+
+    def _see(self, pose_world: Float[np.ndarray, "3"], seen: _Sightings) -> Int[np.ndarray, " m"]:
+        self._unseen += 1
         line_of = self._line_of(seen)
         again = np.flatnonzero(line_of >= 0)
         rows = line_of[again]
