@@ -245,6 +245,25 @@ def test_view_opens_a_file_or_makes_a_recording_from_a_log(runs, capsys, monkeyp
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
+def test_a_recording_needs_no_pandas_and_leaves_it_as_it_was(tmp_path):
+    code = f"""
+import io, sys
+from pathlib import Path
+from experiments.scenario import load_world
+from experiments.timelines import Recording
+assert Recording("t", ["graph"], load_world({WORLD!r}), False, Path({str(tmp_path / "x.rrd")!r})).close() == []
+assert "rerun" in sys.modules and "pandas" not in sys.modules
+import pandas, pyarrow
+table = pandas.DataFrame({{"a": [1.0, None], "b": ["x", None]}})
+stream = io.BytesIO()
+table.to_parquet(stream)
+assert pandas.read_parquet(stream).equals(table)
+assert pyarrow.array(table["b"]).null_count == 1
+"""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+
+
 def test_rerun_is_imported_only_when_a_recording_is_asked_for(tmp_path):
     code = (
         "import sys; from experiments.cli import main; "

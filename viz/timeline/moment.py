@@ -17,11 +17,11 @@ from slam.segments import Segments
 
 from .colours import ChainColours
 
-EVERY_ALL, EVERY_SEEN = 25, 2
+EVERY_ALL, EVERY_SEEN = 50, 3
 """The covariance of every wall is asked for once in so many steps, that of walls just seen once in so many."""
-EVERY_GRAPH = 10
+EVERY_GRAPH = 20
 EVERY_SWEPT = 20
-EVERY_OWN_SCAN = 3
+EVERY_OWN_SCAN = 4
 """Without a grid of the mission's own (a replay plans nothing), every so many scans are drawn into one."""
 OWN_CELL_M = 0.1
 

@@ -13,6 +13,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import Bool, Float, Int, UInt32
 
+from .arrow import settle
+
 APPLICATION = "chainslam"
 STEP, SIM_TIME = "step", "sim_time"
 _VEC2 = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
@@ -38,6 +40,7 @@ class Recording:
     """One Rerun recording in memory, or in a viewer as it goes on."""
 
     def __init__(self, name: str, viewer_url: str | None = None) -> None:
+        settle()
         self._stream = rr.RecordingStream(APPLICATION, recording_id=f"{APPLICATION} {name}")
         self._stream.set_log_tick_enabled(False)
         self._stream.set_log_time_enabled(False)
@@ -160,7 +163,9 @@ class Recording:
                 colors=_colors(np.concatenate([colors for _, _, colors in nodes])),
                 labels=_words(names),
             ).partition(counts),
-            *rr.GraphEdges.columns(edges=[pair for some in edges for pair in some]).partition([len(e) for e in edges]),
+            *rr.GraphEdges.columns(edges=_pairs([pair for some in edges for pair in some])).partition(
+                [len(some) for some in edges]
+            ),
             *rr.GraphEdges.columns(graph_type=["directed"] * len(edges)),
         ]
         self._send(entity, moments, columns)
@@ -209,6 +214,13 @@ def _colors(colors: UInt32[np.ndarray, " k"] | None) -> pa.Array | None:
 
 def _words(texts: Sequence[str] | None) -> pa.Array | None:
     return None if texts is None else pa.array(texts, type=pa.utf8())
+
+
+def _pairs(pairs: Sequence[tuple[str, str]]) -> pa.Array:
+    halves = [_words([pair[side] for pair in pairs]) for side in (0, 1)]
+    return pa.StructArray.from_arrays(
+        halves, fields=[pa.field(name, pa.utf8(), nullable=False) for name in ("first", "second")]
+    )
 
 
 def _floats(values: Float[np.ndarray, " k"] | None) -> pa.Array | None:
