@@ -84,15 +84,24 @@ class Votes:
 
 def duplicate_lines(walls: StochasticMap, labels: Int[np.ndarray, " n"], among: Bool[np.ndarray, " n"]) -> int:
     """Return how many lines, beyond the first of their true wall, overlap an older one of it over 0.2 m or more."""
+    return len(duplicate_pairs(walls, labels, among))
+
+
+def duplicate_pairs(
+    walls: StochasticMap, labels: Int[np.ndarray, " n"], among: Bool[np.ndarray, " n"]
+) -> list[tuple[int, int]]:
+    """Return the ids (older, younger) of those lines, each with the first line of its wall that it overlaps."""
     rows = np.flatnonzero(among & (labels >= 0))
-    duplicates = 0
+    pairs = []
     for label in np.unique(labels[rows]):
         same = rows[labels[rows] == label]
         along = _along(walls.ends_world[same], float(walls.belief.means[same[0], 0]))
         for k in range(1, len(same)):
             overlap = np.minimum(along[:k, 1], along[k, 1]) - np.maximum(along[:k, 0], along[k, 0])
-            duplicates += bool(np.any(overlap >= OVERLAP_M))
-    return duplicates
+            older = np.flatnonzero(overlap >= OVERLAP_M)
+            if len(older):
+                pairs.append((int(walls.ids[same[older[0]]]), int(walls.ids[same[k]])))
+    return pairs
 
 
 def _along(ends: Float[np.ndarray, "m 2 2"], alpha: float) -> Float[np.ndarray, "m 2"]:

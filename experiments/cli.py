@@ -15,6 +15,7 @@ from .listings import Backends, Strategies, Worlds
 from .measure_command import Measure
 from .replay_command import Replay
 from .report_command import Report
+from .reproduce_command import Reproduce
 from .scenario import UsageError, choose
 from .view_command import View
 
@@ -34,6 +35,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "explore": Explore,
     "replay": Replay,
     "compare": Compare,
+    "reproduce": Reproduce,
     "measure": Measure,
     "view": View,
     "report": Report,

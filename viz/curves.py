@@ -102,6 +102,13 @@ def map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndar
     """Draw one map over the true floor; `low` and `high` are the corners of what is shown, the same for all."""
     size = high - low
     figure, axes = _figure(small.title, (4.0, 0.5 + 3.8 * float(size[1] / size[0])))
+    paint_map(axes, small, low, high)
+    figure.subplots_adjust(left=0.01, right=0.99, bottom=0.01, top=1.0 - 0.35 / figure.get_figheight())
+    return figure
+
+
+def paint_map(axes: Axes, small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
+    """Paint one map over the true floor into axes that others may share a figure with."""
     for index, ring in enumerate(small.true_floor):
         axes.fill(*ring.T, facecolor=palette.SOLID if index else palette.FLOOR, edgecolor=palette.SOLID, linewidth=3.0)
     axes.plot(*small.path_world.T, color=palette.PATH_ESTIMATED, linewidth=0.7)
@@ -112,8 +119,6 @@ def map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndar
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set_axis_off()
-    figure.subplots_adjust(left=0.01, right=0.99, bottom=0.01, top=1.0 - 0.35 / figure.get_figheight())
-    return figure
 
 
 def colour(index: int) -> str:

@@ -1,0 +1,18 @@
+"""Figure 5: the nearest open end from where the robot is, a search depth first."""
+
+from .drives import driven
+from .reproduction import Reproduction
+from .traversals import NEAREST_ROBOT, NOTES, traversal_figure, traversal_numbers
+
+
+def reproduce(_seed: int) -> Reproduction:
+    """Explore the world of figure 5 by `nearest-robot`, without errors."""
+    made = driven(NEAREST_ROBOT)
+    length = made.summary["path_length_m"]
+    return Reproduction(
+        "Figure 5: next to actual position",
+        {"passes by the start": 1},
+        traversal_numbers(NEAREST_ROBOT),
+        traversal_figure(f"Figure 5: nearest-robot, errorless, {length:.0f} m", made),
+        NOTES,
+    )

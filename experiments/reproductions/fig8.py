@@ -1,0 +1,27 @@
+"""Figure 8: the cyclic environment of 7 m x 7 m, explored and mapped on its own."""
+
+from viz.panels import map_panels
+
+from ..scenario import TrialConfig
+from .drives import PAPER, last_map
+from .maps import compared, map_numbers, map_words, mark
+from .reproduction import Reproduction
+
+
+def reproduce(seed: int) -> Reproduction:
+    """Explore the world of figure 8 by the nearest open end, and map its scans with each back end."""
+    results = compared(TrialConfig("paper-fig8", PAPER, seed=seed))
+    maps = [last_map(result, f"{name}: {map_words(result)}") for name, result in results.items()]
+    figure, axes = map_panels(f"Figure 8, seed {seed}: the same scans through four back ends", maps, 2)
+    mark(axes[0], results[PAPER])
+    return Reproduction(
+        "Figure 8: the cyclic environment of 7 m x 7 m",
+        {
+            "path, m": 33.0,
+            "contours closed": "the cycle",
+            "error of named corners' distances, worst, cm": "5 (Table 1, rounded to 5)",
+        },
+        {name: map_numbers(result) for name, result in results.items()},
+        figure,
+        (f"One drive by {PAPER}, nearest-robot; the others map its scans with their own gate.",),
+    )
