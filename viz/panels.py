@@ -1,6 +1,7 @@
 """Several panels in one figure: estimators beside each other, as the paper's figures are reproduced."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +15,8 @@ from .curves import SmallMap, paint_map
 from .shapes import ellipses
 
 MARGIN_M = 0.5
-FAINT = 0.55
+DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
+"""Of curves in turn: those that lie on one before them leave it to be seen."""
 
 
 def panels(title: str, rows: int, columns: int, size_inch: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -52,8 +54,9 @@ def paint_curves(
     axes: Axes, x: Float[np.ndarray, " s"], curves: Mapping[str, Float[np.ndarray, " s"]], words: tuple[str, str]
 ) -> None:
     """Paint a curve for each back end in its colour, on a logarithmic axis; `words` name the two axes."""
-    for name, values in curves.items():
-        axes.plot(x, values, color=palette.of_backend(name), linewidth=1.2, label=name)
+    for turn, (name, values) in enumerate(curves.items()):
+        dash = DASHES[turn % len(DASHES)]
+        axes.plot(x, values, linestyle=dash, color=palette.of_backend(name), linewidth=1.3, label=name)
     axes.set_yscale("log")
     axes.set_xlabel(words[0], fontsize=8)
     axes.set_ylabel(words[1], fontsize=8)

@@ -69,5 +69,8 @@ def _figure(pairs: tuple[str, ...], errors: dict[str, np.ndarray], halves: dict[
     )
     beside.legend(frameon=False, fontsize=7)
     beside.set_title("beside the paper's, both of whose values are rounded to 5 cm", fontsize=8, loc="left")
+    legend = near.get_legend()
+    if legend is not None:
+        legend.remove()
     near.set_title(f"{DRIVES} drives, a dot each", fontsize=8, loc="left")
     return figure
