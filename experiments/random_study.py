@@ -3,10 +3,8 @@
 .venv/bin/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
 """
 
-import json
 import sys
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +12,9 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from .scenario import TrialConfig, UsageError, check
-from .suite import results, table
+from .rows import rows_of
+from .scenario import TrialConfig, UsageError
+from .suite import table
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class RandomStudy:
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/random.jsonl")
-    """A line of JSON for each run. What it holds already is not run again: name another file for other code."""
+    """A line of JSON for each run. What it holds of the same code already is not run again."""
 
     def trials(self) -> list[TrialConfig]:
         """Return the trials in order."""
@@ -64,55 +63,12 @@ def faults(row: dict[str, Any]) -> list[str]:
     return found
 
 
-def run(study: RandomStudy) -> Iterator[dict[str, Any]]:
-    """Run what the study's file lacks, append each row as it comes, and yield all rows of this study.
-
-    Raises UsageError for a file that holds something else.
-    """
-    trials = study.trials()
-    check(trials[0])
-    wanted = {_key(asdict(trial) | {"file": trial.world}): trial for trial in trials}
-    kept, rows = _read(study.out)
-    for row in rows:
-        if wanted.pop(_key(row), None) is not None:
-            yield row
-    left = list(wanted.values())
-    study.out.parent.mkdir(parents=True, exist_ok=True)
-    with study.out.open("ab") as file:
-        file.truncate(kept)
-        for index, row in results(left, study.jobs):
-            row |= {key: getattr(left[index], key) for key in ("backend", "strategy", "errorless")}
-            file.write(json.dumps(row).encode() + b"\n")
-            file.flush()
-            yield row
-
-
-def _key(row: dict[str, Any]) -> tuple[Any, ...]:
-    """Return what makes a run this one and no other."""
-    return tuple(row[name] for name in ("file", "seed", "backend", "strategy", "errorless"))
-
-
-def _read(path: Path) -> tuple[int, list[dict[str, Any]]]:
-    """Return the length of the whole lines of a file, and their rows; a line without an end was cut short."""
-    if not path.exists():
-        return 0, []
-    content = path.read_bytes()
-    kept = content.rfind(b"\n") + 1
-    try:
-        rows = [json.loads(line) for line in content[:kept].splitlines()]
-        for row in rows:
-            _key(row)
-    except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"expected rows of this study in {path}, found {error!r}: name another --out") from error
-    return kept, rows
-
-
 def main() -> int:
     """Run the study that the command line names and return the exit status: 1 where it was not clean."""
     study = tyro.cli(RandomStudy, prog="experiments.random_study")
     rows = []
     try:
-        for row in run(study):
+        for row in rows_of(study.trials(), study.out, study.jobs):
             rows.append(row)
             if sys.stderr.isatty():
                 print(f"\r{len(rows)} of {study.buildings}", end="", file=sys.stderr, flush=True)

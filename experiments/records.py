@@ -38,6 +38,8 @@ class Log:
     set_aside: Int[np.ndarray, " s"]
     seconds: Float[np.ndarray, " s"]
     """Wall-clock time of each step, sense to command."""
+    planning_seconds: Float[np.ndarray, " s"]
+    """Processor time of each step's decisions."""
     reasons: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -88,6 +90,7 @@ class Recorder:
                 "closed_chains": sum(chain.is_closed for chain in step.chains),
                 "set_aside": len(step.set_aside),
                 "seconds": step.seconds,
+                "planning_seconds": step.planning_seconds,
                 "reasons": step.reason,
             }
         )

@@ -22,6 +22,8 @@ from .swept import swept
 
 EXIT_STATUS = {Outcome.FAILED: 1, Outcome.INTERRUPTED: 130}
 """What the command ends in; 0 for every other outcome."""
+TIMED = ("step_ms", "planning_ms")
+"""The keys that differ between two runs of the same command."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,8 @@ def summarise(
         ],
         **_map_scores(scenario, log, votes, step, joint),
         **_pose_scores(log, config.errorless),
-        "step_ms": _step_ms(log),
+        "step_ms": _spread_ms(log.seconds),
+        "planning_ms": _spread_ms(log.planning_seconds),
     }
 
 
@@ -193,8 +196,8 @@ def map_anees(
         return None
 
 
-def _step_ms(log: Log) -> dict[str, float]:
-    ms = 1e3 * log.seconds
+def _spread_ms(seconds: Float[np.ndarray, " s"]) -> dict[str, float]:
+    ms = 1e3 * seconds
     return {
         "mean": float(ms.mean()),
         "p50": float(np.percentile(ms, 50)),

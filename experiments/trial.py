@@ -102,7 +102,7 @@ def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage swept pose_rmse_m"
         " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges false_merges"
-        " return_to_start certificate step_ms"
+        " return_to_start certificate step_ms planning_ms"
     )
     return {
         **run_keys(scenario, ending),

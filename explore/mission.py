@@ -129,6 +129,7 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
         update = mapper.step(scan, decider.set_aside.keys())
         if decider.needs_floor:
             free_space.integrate(update.map.belief.pose_world, scan)
+        decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
         command = decider.command(Surroundings(update.map, free_space, scan), update.chains, graph.graph)
@@ -137,10 +138,12 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
             outcome, reason = decider.outcome, decider.closing_words
             if outcome is Outcome.ALL_CLOSED and not update.chains:
                 outcome, reason = Outcome.NO_WALL, "no wall was found"
+        decided = time.thread_time() - decides
         yield Step(
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
             update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
-            decider.still_open, command, path_length, time.perf_counter() - began, outcome, reason, update.merged,
+            decider.still_open, command, path_length, time.perf_counter() - began, decided,
+            outcome, reason, update.merged,
         )  # fmt: skip
         if command is None:
             return

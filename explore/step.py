@@ -48,6 +48,8 @@ class Step:
     """By the wheels, so far."""
     seconds: float
     """Wall-clock time of this step, sense to command."""
+    planning_seconds: float
+    """Processor time of what the step decided: the visibility graph, the choice, the way, the command."""
     outcome: Outcome | None
     """Why the mission is over, at its last step, else None."""
     reason: str

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..files import json_bytes, write
 from ..scenario import UsageError
+from ..scores import TIMED
 from .plan import ARMS, Campaign, Trial, trials
 from .score import Record
 from .store import CONFIG, MERGED, Store, opened_anew, plain, read_campaigns, read_config
@@ -81,7 +82,7 @@ def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
 
 
 def _same(first: Record, second: Record) -> bool:
-    summaries = [{k: v for k, v in record.summary.items() if k != "step_ms"} for record in (first, second)]
+    summaries = [{k: v for k, v in record.summary.items() if k not in TIMED} for record in (first, second)]
     arrays = [first.arrays, second.arrays]
     return (
         summaries[0] == summaries[1]

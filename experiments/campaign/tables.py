@@ -40,7 +40,6 @@ def trial_row(record: Record) -> Row:
     summary = record.summary
     row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
     row.pop("traceback", None)
-    row.pop("step_ms", None)
     row["set_aside"] = len(summary.get("set_aside") or ())
     off, sigma = distance_errors(record)
     row["distances"] = len(off)

@@ -93,7 +93,8 @@ def scripted(scenario, commands=None, closed=True, fail_at=None, error=RuntimeEr
         yield Step(
             index, scan.time_s, odometry, scan, segments, NO_MATCHES, owners, map_of(faces, pose),
             chains_of(faces, rings, closed), FreeSpace(), nx.DiGraph(), None, (), (),
-            None if last else commands[index], length, 0.001, Outcome.ALL_CLOSED if last else None, "as scripted",
+            None if last else commands[index], length, 0.001, 0.0005,
+            Outcome.ALL_CLOSED if last else None, "as scripted",
         )  # fmt: skip
         if not last:
             odometry = scenario.robot.drive(commands[index])

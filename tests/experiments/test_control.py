@@ -19,6 +19,7 @@ from experiments.files import json_bytes
 from experiments.interrupts import first_interrupt_waits
 from experiments.saved import from_record, read_trial
 from experiments.scenario import TrialConfig, UsageError
+from experiments.scores import TIMED
 from explore.explorer import ExplorerConfig
 from explore.mission import MissionConfig
 
@@ -29,7 +30,7 @@ def timeless(folder):
     """Return the bytes of a run's files without the times that its steps took."""
     contents = {path.name: path.read_bytes() for path in folder.iterdir()}
     summary = json.loads(contents["summary.json"])
-    contents["summary.json"] = json_bytes({key: value for key, value in summary.items() if key != "step_ms"})
+    contents["summary.json"] = json_bytes({key: value for key, value in summary.items() if key not in TIMED})
     rows = list(csv.reader(io.StringIO(contents["steps.csv"].decode())))
     contents["steps.csv"] = [row[:-1] for row in rows]
     return contents

@@ -13,12 +13,13 @@ from rerun.chunk import RrdReader
 from experiments.cli import main
 from experiments.replay import ReplayOptions, read_run, replay
 from experiments.scenario import TrialConfig, build, load_world
+from experiments.scores import TIMED
 from experiments.timelines import Recording, record_comparison
 from experiments.trial import default_mission, run_scenario
 
 WORLD, STEPS = "paper-fig4", 70
 EXPLORE = ["explore", WORLD, "--max-steps", str(STEPS)]
-TIMINGS = ("step_ms", "seconds")
+TIMINGS = (*TIMED, "seconds")
 
 
 @pytest.fixture(scope="module", autouse=True)

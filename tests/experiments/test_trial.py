@@ -6,7 +6,7 @@ import pytest
 
 from experiments.results import write_results
 from experiments.scenario import TrialConfig, UsageError, build
-from experiments.scores import odometry_path, pose_nees
+from experiments.scores import TIMED, odometry_path, pose_nees
 from experiments.trial import run_trial
 
 FILES = (
@@ -28,7 +28,8 @@ def test_a_run_is_scored(world, scripted_mission):
     assert summary["false_matches"] == summary["duplicate_lines"] == summary["collisions"] == 0
     assert summary["map_anees"] > 0.0
     assert 0.5 < summary["swept"] < 1.0
-    assert set(summary["step_ms"]) == {"mean", "p50", "p95", "max"}
+    assert set(summary["step_ms"]) == set(summary["planning_ms"]) == {"mean", "p50", "p95", "max"}
+    assert 0.0 < summary["planning_ms"]["mean"] < summary["step_ms"]["mean"]
 
 
 def test_without_noise_there_is_no_nees_and_no_odometry_error(world, scripted_mission):
@@ -138,7 +139,7 @@ def test_a_back_end_that_smooths_leaves_its_solution_beside_what_each_step_knew(
     config = TrialConfig("paper-fig8", "graph-batch", seed=3, max_steps=25)
     batch, stepwise = run_trial(config), run_trial(replace(config, backend="graph"))
     assert stepwise.smoothed is None
-    same = {"backend", "step_ms"}
+    same = {"backend", *TIMED}
     assert {k: v for k, v in batch.summary.items() if k not in same} == {
         k: v for k, v in stepwise.summary.items() if k not in same
     }
