@@ -77,7 +77,13 @@ def connect(
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
     successor = _links(ends, lines, ids, set_aside, passed, config)
-    return tuple(_chain(run, closed, ends, lines, ids, config) for run, closed in _runs(successor))
+    before = np.flatnonzero(successor >= 0)
+    after = successor[before]
+    corners = np.full((len(rows), 2), np.nan)
+    corners[before] = corner_points(
+        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], config.corner_reach_m
+    )
+    return tuple(_chain(run, closed, ends, corners, ids) for run, closed in _runs(successor))
 
 
 def _links(
@@ -93,9 +99,10 @@ def _links(
         cKDTree(ends[:, TAIL]), max(config.reach_m, config.set_aside_reach_m), output_type="ndarray"
     )
     head, tail, gap = near["i"], near["j"], near["v"]
-    aside = np.array([[(int(i), side) in set_aside for side in (TAIL, HEAD)] for i in ids]).reshape(-1, 2)
+    aside = np.isin(2 * ids[:, None] + [TAIL, HEAD], [2 * wall + side for wall, side in set_aside])
     both_aside = aside[head, HEAD] & aside[tail, TAIL]
-    both_aside &= np.array([pair not in passed for pair in zip(ids[head], ids[tail], strict=True)], dtype=bool)
+    for k in np.flatnonzero(both_aside):
+        both_aside[k] = (ids[head[k]], ids[tail[k]]) not in passed
     allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
     straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
     across = np.abs(np.sum(normals(lines[head, 0]) * (ends[tail, TAIL] - ends[head, HEAD]), axis=-1))
@@ -133,22 +140,15 @@ def _chain(
     run: list[int],
     closed: bool,
     ends: Float[np.ndarray, "n 2 2"],
-    lines: Float[np.ndarray, "n 2"],
+    corners: Float[np.ndarray, "n 2"],
     ids: Int[np.ndarray, " n"],
-    config: ChainConfig,
 ) -> Chain:
-    before = np.array(run if closed else run[:-1], dtype=np.int64)
-    after = np.array(run[1:] + run[:1] if closed else run[1:], dtype=np.int64)
-    corners = corner_points(lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], config.corner_reach_m)
-    open_ends = (
-        ()
-        if closed
-        else (
-            OpenEnd(int(ids[run[0]]), TAIL, ends[run[0], TAIL]),
-            OpenEnd(int(ids[run[-1]]), HEAD, ends[run[-1], HEAD]),
-        )
-    )
-    return Chain(tuple(int(ids[row]) for row in run), corners, open_ends)
+    """Return the chain of these rows; `corners` holds where each wall meets its successor."""
+    walls = tuple(ids[run].tolist())
+    if closed:
+        return Chain(walls, corners[run], ())
+    tail, head = OpenEnd(walls[0], TAIL, ends[run[0], TAIL]), OpenEnd(walls[-1], HEAD, ends[run[-1], HEAD])
+    return Chain(walls, corners[run[:-1]], (tail, head))
 
 
 def corner_points(

@@ -141,6 +141,25 @@ def test_the_numbering_of_the_walls_does_not_matter(seed):
     assert links(connect(map_of(walls)), same) == links(connect(map_of(walls[place])), place)
 
 
+@few
+@given(seeds)
+def test_each_of_several_chains_is_the_one_that_its_walls_alone_make(seed):
+    rng = np.random.default_rng(seed)
+    rooms = [jittered(edges(random_room(rng, (20.0 * k, 0.0))), rng, 0.3 * REACH) for k in range(4)]
+    walls = np.concatenate([*rooms[:2], *(room[1:] for room in rooms[2:])])
+    walls = walls[rng.permutation(len(walls))]
+    chains = connect(map_of(walls))
+    assert sorted(chain.is_closed for chain in chains) == [False, False, True, True]
+    for chain in chains:
+        rows = np.sort(chain.walls)
+        (alone,) = connect(map_of(walls[rows], rows))
+        assert alone.walls == chain.walls
+        np.testing.assert_array_equal(alone.corners_world, chain.corners_world)
+        assert [(end.wall, end.side) for end in alone.open_ends] == [(end.wall, end.side) for end in chain.open_ends]
+        for one, other in zip(alone.open_ends, chain.open_ends, strict=True):
+            np.testing.assert_array_equal(one.position_world, other.position_world)
+
+
 def test_the_papers_first_figure_is_one_closed_and_one_open_chain():
     """An obstacle stands in a room; of the room's wall the robot has not yet seen one part."""
     room = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 5], [0, 5]], dtype=float)
