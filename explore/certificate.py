@@ -147,8 +147,8 @@ def left_unseen(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) ->
     """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
     why = "not visited yet" if outcome.status != "complete" else "visited in vain, or the way was blocked"
     why = why if sweep else "unseen floor was not to be visited"
-    reachable = DrivingField(step.free_space, step.pose_world[:2], paths).reachable()
-    borders = unseen_borders(step.free_space, reachable, LEAST_BORDER_CELLS)
+    field = DrivingField(step.free_space, step.pose_world[:2], paths)
+    borders = unseen_borders(step.free_space, field, LEAST_BORDER_CELLS)
     cell = step.free_space.config.cell_m
     return tuple(LeftUnseen(border, len(border) * cell, why) for border in borders)
 

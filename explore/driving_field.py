@@ -1,58 +1,97 @@
 """How far it is to drive from one place to everywhere else, from one search over blocks of cells."""
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from skimage.graph import MCP_Geometric
 
+from .blocks import BLOCK, blocks_with_any
 from .free_space import FreeSpace
-from .paths import PathConfig, costs
+from .paths import PathConfig, passable, roomy
 
-BLOCK = 4
-"""Cells on each side of a block: 0.2 m. The body's clearance on both sides of a wall is wider than that, so no block
-reaches through one."""
+NEAR_M = 8.0
+"""The search goes so far first; most of what is asked for is nearer, and a whole building costs far more."""
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """What one search found."""
+
+    first_block: Int[np.ndarray, "2"]
+    """The block of the whole grid at which `metres` begins, less the border."""
+    metres: Float[np.ndarray, "p q"]
+    """Length of the shortest way to each block, with a border of blocks out of reach, which saves bounds checks."""
 
 
 class DrivingField:
-    """Lengths of the shortest ways from one place over floor that was seen free, good to about a block."""
+    """Lengths of the shortest ways from one place over floor that was seen free, good to about a block.
+
+    It searches when it is asked, so ask before the floor changes.
+    """
 
     def __init__(self, free_space: FreeSpace, start_world: Float[np.ndarray, "2"], config: PathConfig) -> None:
-        """Search the whole grid."""
-        self._free_space = free_space
-        may_fit = free_space.may_fit((slice(None), slice(None)), config.tight_m)
-        metre, self._roomy = costs(free_space.evidence < 0, free_space.clearance(), may_fit, config)
-        h, w = metre.shape
-        padded = np.pad(metre > 0, ((0, -h % BLOCK), (0, -w % BLOCK)))
-        # Ten times as fast as any() over a reshaped view.
-        rows = np.logical_or.reduce([padded[k::BLOCK] for k in range(BLOCK)])
-        blocks = np.logical_or.reduce([rows[:, k::BLOCK] for k in range(BLOCK)])
+        """Search from `start_world`."""
+        self._free_space, self._config = free_space, config
         self._side_m = BLOCK * free_space.config.cell_m
-        start = np.clip(free_space.cells(start_world[None])[0] // BLOCK, 0, np.array(blocks.shape) - 1)
+        blocks = -(-np.array(free_space.shape) // BLOCK)
+        self._start = np.clip(free_space.cells(start_world[None])[0] // BLOCK, 0, blocks - 1)
+
+    def metres(self, places_world: Float[np.ndarray, "n 2"], beyond_nearest: bool = True) -> Float[np.ndarray, " n"]:
+        """Return how far it is to drive to each place (within a block of it), m; infinite where no way is known.
+
+        Without `beyond_nearest` only the least is wanted: any other may be infinite, too, which is much cheaper.
+        """
+        if "_far" in self.__dict__:
+            return self._lookup(self._far, places_world)
+        metres = self._lookup(self._near, places_world)
+        metres[metres > NEAR_M] = np.inf
+        known = np.isfinite(metres)
+        if known.all() or (known.any() and not beyond_nearest):
+            return metres
+        return self._lookup(self._far, places_world)
+
+    def can_stay(self, cells: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return in which cells (row, column of the grid) the robot's centre may stay, and can get to."""
+        at = tuple(cells.T)
+        free, clearance = self._free_space.evidence[at] < 0, self._free_space.clearance()[at]
+        block = cells // BLOCK - self._far.first_block + 1
+        return roomy(free, clearance, self._config) & np.isfinite(self._far.metres[tuple(block.T)])
+
+    @cached_property
+    def _near(self) -> _Reach:
+        return self._search(int(np.ceil(NEAR_M / self._side_m)) + 1)
+
+    @cached_property
+    def _far(self) -> _Reach:
+        return self._search(max(self._free_space.shape))
+
+    def _search(self, reach: int) -> _Reach:
+        """Search as far as `reach` blocks from the start in rows and columns."""
+        first = np.maximum(self._start - reach, 0)
+        low, high = BLOCK * first, BLOCK * (self._start + reach + 1)
+        box = (slice(low[0], high[0]), slice(low[1], high[1]))
+        blocks = blocks_with_any(passable(self._free_space, box, self._config)[0])
+        start = self._start - first
         starts = start[None]
         if not blocks[tuple(start)]:
             # Too near to a wall: it gets away to what is passable around it, as paths do.
             blocks[tuple(start)] = True
-            reach = int(np.ceil(config.escape_m / self._side_m))
-            starts = np.argwhere(blocks[_box(start, reach)]) + np.maximum(start - reach, 0)
+            away = int(np.ceil(self._config.escape_m / self._side_m))
+            starts = np.argwhere(blocks[_box(start, away)]) + np.maximum(start - away, 0)
         lengths, _ = MCP_Geometric(np.where(blocks, 1.0, -1.0)).find_costs([tuple(b) for b in starts.tolist()])
-        # A border of blocks out of reach saves bounds checks.
-        self._metres = np.pad(lengths * self._side_m, 1, constant_values=np.inf)
+        return _Reach(first, np.pad(lengths * self._side_m, 1, constant_values=np.inf))
 
-    def metres(self, places_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-        """Return how far it is to drive to each place (within a block of it), m; infinite where no way is known."""
-        position = (places_world - self._free_space.origin_world)[:, ::-1] / self._side_m
-        near = np.clip(np.floor(position).astype(np.int64), -1, np.array(self._metres.shape) - 2)
+    def _lookup(self, reach: _Reach, places_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+        position = (places_world - self._free_space.origin_world)[:, ::-1] / self._side_m - reach.first_block
+        near = np.clip(np.floor(position).astype(np.int64), -1, np.array(reach.metres.shape) - 2)
         best = np.full(len(places_world), np.inf)
         for offset in np.ndindex(3, 3):
-            block = np.clip(near + np.array(offset), 0, np.array(self._metres.shape) - 1)
+            block = np.clip(near + np.array(offset), 0, np.array(reach.metres.shape) - 1)
             gap = np.hypot(*(position - (block - 0.5)).T) * self._side_m
-            best = np.minimum(best, self._metres[tuple(block.T)] + gap)
+            best = np.minimum(best, reach.metres[tuple(block.T)] + gap)
         return best
-
-    def reachable(self) -> Bool[np.ndarray, "h w"]:
-        """Return which cells of the grid the robot's centre may stay in and can get to."""
-        h, w = self._roomy.shape
-        finite = np.isfinite(self._metres[1:-1, 1:-1])
-        return self._roomy & finite.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[:h, :w]
 
 
 def _box(centre: np.ndarray, reach: int) -> tuple[slice, slice]:

@@ -48,9 +48,11 @@ class FreeSpace:
         r0, r1, _ = box[0].indices(self.shape[0])
         c0, c1, _ = box[1].indices(self.shape[1])
         fits = np.ones((r1 - r0, c1 - c0), dtype=bool)
-        row, column = np.ogrid[r0:r1, c0:c1]
+        reach = int(np.ceil(reach_m / self.config.cell_m))
         for r, c in self.cells(self._too_tight).tolist():
-            fits &= np.hypot(row - r, column - c) * self.config.cell_m > reach_m
+            near = _slices(_grown((r - r0, r - r0 + 1, c - c0, c - c0 + 1), reach, fits.shape))
+            row, column = np.ogrid[near]
+            fits[near] &= np.hypot(row + r0 - r, column + c0 - c) * self.config.cell_m > reach_m
         return fits
 
     @property

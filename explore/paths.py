@@ -1,12 +1,19 @@
 """Collision-free paths for the robot's disc over floor that was seen free."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from skimage.graph import MCP_Geometric
 
+from .blocks import BLOCK, blocks_with_any, cells_of
 from .free_space import FreeSpace
+
+BESIDE = 5
+"""Paths are sought so many blocks to each side of the shortest way by blocks: 1 m."""
+ESCAPE_COST = 30.0
+"""What a metre costs where the robot gets away from a wall that it is too near to."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,7 @@ class Path:
 
 
 class Planner:
-    """Cheapest paths from one place over a free space as it is now, within a window of it."""
+    """Cheapest paths from one place over a free space as it was then, within a window of it."""
 
     def __init__(
         self,
@@ -60,34 +67,98 @@ class Planner:
         reach = max(free_space.shape) if window_m is None else int(np.ceil(window_m / free_space.config.cell_m))
         self._corner = np.maximum(start - reach, 0)
         box = (slice(self._corner[0], start[0] + reach + 1), slice(self._corner[1], start[1] + reach + 1))
-        clearance = free_space.clearance()[box]
-        is_free = free_space.is_free(box)
-        self._costs, self._roomy = costs(is_free, clearance, free_space.may_fit(box, config.tight_m), config)
+        self._passable, self._roomy = passable(free_space, box, config)
+        self._clearance = free_space.clearance()[box].copy()
         self._start = start - self._corner
-        self._open_start(is_free, clearance)
+        self._escape = np.zeros_like(self._roomy)
+        self._open_start(free_space.is_free(box))
 
     def to(self, places_world: Float[np.ndarray, "n 2"]) -> Path | None:
-        """Return the cheapest path to the cheapest of the places, or None if none can be reached."""
+        """Return the cheapest path to the cheapest of the places, or None if none can be reached.
+
+        The search keeps to the surroundings of the shortest way by blocks of cells, if it leads through there: the
+        path may cost more than the cheapest, if that lies farther off.
+        """
         cells = self._free_space.cells(places_world) - self._corner
-        usable = np.flatnonzero(np.all((cells >= 0) & (cells < self._costs.shape), axis=1))
-        usable = usable[self._costs[tuple(cells[usable].T)] > 0]
+        usable = np.flatnonzero(np.all((cells >= 0) & (cells < self._passable.shape), axis=1))
+        usable = usable[self._passable[tuple(cells[usable].T)]]
         if not len(usable):
             return None
-        search = MCP_Geometric(self._costs)
-        ends = [tuple(cell) for cell in cells[usable].tolist()]
-        costs, _ = search.find_costs([tuple(self._start.tolist())], ends, find_all_ends=False)
-        at_ends = costs[tuple(cells[usable].T)]
+        corridor = self._corridor(cells[usable])
+        if corridor is None:
+            return None
+        # A block may hold cells that do not hang together; then the way by blocks may be none.
+        found = self._cheapest(cells[usable], corridor) or self._cheapest(cells[usable], np.ones_like(corridor))
+        if found is None:
+            return None
+        way, cost, reached = found
+        return Path(
+            self._free_space.points(way + self._corner),
+            cost * self._free_space.config.cell_m,
+            int(usable[reached]),
+        )
+
+    def _corridor(self, goals: Int[np.ndarray, "g 2"]) -> Bool[np.ndarray, "p q"] | None:
+        """Return the blocks around the shortest way to the nearest of some cells; None if no way leads to any."""
+        squeezed = np.where(self._passable_blocks, 1.0 + self._config.squeeze_cost, -1.0)
+        costs = np.where(self._roomy_blocks, 1.0, squeezed)
+        ends = np.unique(goals // BLOCK, axis=0)
+        search = MCP_Geometric(costs)
+        lengths, _ = search.find_costs([tuple(self._start // BLOCK)], [tuple(end) for end in ends], find_all_ends=False)
+        at_ends = lengths[tuple(ends.T)]
         best = int(np.argmin(at_ends))
         if not np.isfinite(at_ends[best]):
             return None
-        way = np.array(search.traceback(ends[best]), dtype=np.int64)
-        cost = float(at_ends[best]) * self._free_space.config.cell_m
-        return Path(self._free_space.points(way + self._corner), cost, int(usable[best]))
+        corridor = np.zeros(costs.shape, dtype=bool)
+        for r, c in search.traceback(tuple(ends[best])):
+            corridor[max(r - BESIDE, 0) : r + BESIDE + 1, max(c - BESIDE, 0) : c + BESIDE + 1] = True
+        return corridor
+
+    def _cheapest(
+        self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]
+    ) -> tuple[Int[np.ndarray, "n 2"], float, int] | None:
+        """Return the cells of the cheapest path to the cheapest of some cells, its cost in cells, and to which of them.
+
+        It leads over the blocks of a corridor.
+        """
+        blocks = np.argwhere(corridor)
+        first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
+        box = (slice(BLOCK * first[0], BLOCK * end[0]), slice(BLOCK * first[1], BLOCK * end[1]))
+        metre = self._metre(box)
+        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape)] = -1.0
+        corner = BLOCK * first
+        goals, start = goals - corner, self._start - corner
+        inside = np.flatnonzero(np.all((goals >= 0) & (goals < metre.shape), axis=1))
+        inside = inside[metre[tuple(goals[inside].T)] > 0]
+        if not len(inside):
+            return None
+        ends = [tuple(cell) for cell in goals[inside].tolist()]
+        search = MCP_Geometric(metre)
+        costs, _ = search.find_costs([tuple(start.tolist())], ends, find_all_ends=False)
+        at_ends = costs[tuple(goals[inside].T)]
+        best = int(np.argmin(at_ends))
+        if not np.isfinite(at_ends[best]):
+            return None
+        return np.array(search.traceback(ends[best]), dtype=np.int64) + corner, float(at_ends[best]), int(inside[best])
+
+    def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
+        """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
+        metre = np.where(self._passable[box], metre_costs(self._clearance[box], self._roomy[box], self._config), -1.0)
+        metre[self._escape[box]] = ESCAPE_COST
+        return metre
+
+    @cached_property
+    def _roomy_blocks(self) -> Bool[np.ndarray, "p q"]:
+        return blocks_with_any(self._roomy)
+
+    @cached_property
+    def _passable_blocks(self) -> Bool[np.ndarray, "p q"]:
+        return blocks_with_any(self._passable)
 
     def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Return the centres of those cells (row, column of the whole grid) where the robot's centre may stay, m."""
         local = cells - self._corner
-        local = local[np.all((local >= 0) & (local < self._costs.shape), axis=1)]
+        local = local[np.all((local >= 0) & (local < self._roomy.shape), axis=1)]
         return self._free_space.points(local[self._roomy[tuple(local.T)]] + self._corner)
 
     def has_room(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
@@ -99,36 +170,48 @@ class Planner:
         length = float(np.hypot(*(end_world - start_world)))
         share = np.linspace(0.0, 1.0, max(int(np.ceil(length / (0.5 * self._free_space.config.cell_m))), 1) + 1)
         cells = self._free_space.cells(start_world + share[:, None] * (end_world - start_world)) - self._corner
-        on_grid = np.all((cells >= 0) & (cells < self._costs.shape), axis=1)
+        on_grid = np.all((cells >= 0) & (cells < self._roomy.shape), axis=1)
         return bool(np.all(on_grid) and np.all(self._roomy[tuple(cells.T)]))
 
-    def _open_start(self, is_free: Bool[np.ndarray, "h w"], clearance: Float[np.ndarray, "h w"]) -> None:
+    def _open_start(self, is_free: Bool[np.ndarray, "h w"]) -> None:
         """Make the free cells around the robot passable at a price, where they bring it no nearer to a wall."""
         reach = int(np.ceil(self._config.escape_m / self._free_space.config.cell_m))
         r, c = self._start
         box = (slice(max(r - reach, 0), r + reach + 1), slice(max(c - reach, 0), c + reach + 1))
-        row, column = np.ogrid[box]
-        near = np.hypot(row - r, column - c)[: self._costs[box].shape[0], : self._costs[box].shape[1]] <= reach
-        escape = near & (self._costs[box] < 0) & is_free[box] & (clearance[box] >= clearance[r, c])
-        self._costs[box] = np.where(escape, 30.0, self._costs[box])
-        self._roomy[box] |= escape
-        self._costs[r, c] = max(self._costs[r, c], 1.0)
-        self._roomy[r, c] = True
+        rows, columns = self._roomy[box].shape
+        row, column = np.ogrid[box[0].start : box[0].start + rows, box[1].start : box[1].start + columns]
+        near = np.hypot(row - r, column - c) <= reach
+        self._escape[box] = near & ~self._passable[box] & is_free[box] & (self._clearance[box] >= self._clearance[r, c])
+        self._escape[r, c] = False
+        for cells in (self._passable, self._roomy):
+            cells[box] |= self._escape[box]
+            cells[r, c] = True
 
 
-def costs(
-    is_free: Bool[np.ndarray, "h w"],
-    clearance: Float[np.ndarray, "h w"],
-    may_fit: Bool[np.ndarray, "h w"],
-    config: PathConfig,
-) -> tuple[Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Return what a metre costs in each cell, -1 where the body does not fit, and which cells have room enough."""
+def passable(
+    free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig
+) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """Return in which cells of a part of the grid the body fits, and in which it has room enough."""
+    is_free, clearance = free_space.is_free(box), free_space.clearance()[box]
+    roomy_cells = roomy(is_free, clearance, config)
+    fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
+    return fits | roomy_cells, roomy_cells
+
+
+def roomy(
+    is_free: Bool[np.ndarray, "*n"], clearance: Float[np.ndarray, "*n"], config: PathConfig
+) -> Bool[np.ndarray, "*n"]:
+    """Return in which cells the body has room enough, by whether they were seen free and their clearance, m."""
+    return is_free & (clearance >= config.radius_m + config.margin_m)
+
+
+def metre_costs(
+    clearance: Float[np.ndarray, "h w"], is_roomy: Bool[np.ndarray, "h w"], config: PathConfig
+) -> Float[np.ndarray, "h w"]:
+    """Return what a metre costs in each cell, if the body fits there."""
     least = config.radius_m + config.margin_m
-    roomy = is_free & (clearance >= least)
-    squeezed = is_free & ~roomy & may_fit & (clearance > config.squeeze_m - 1e-4)
     tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
-    metre = 1.0 + config.narrow_cost * tight**2 + np.where(squeezed, config.squeeze_cost, 0.0)
-    return np.where(roomy | squeezed, metre, -1.0), roomy
+    return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)
 
 
 def sees(

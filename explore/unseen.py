@@ -1,16 +1,17 @@
 """Floor that can be driven to and borders on what was never seen: where to find a first wall, or a hidden island."""
 
 import numpy as np
-from jaxtyping import Bool, Float
-from scipy.ndimage import find_objects, label
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
+from .driving_field import DrivingField
 from .free_space import FreeSpace
 from .paths import cells_within
 
 
-def unseen_borders(
-    free_space: FreeSpace, reachable: Bool[np.ndarray, "h w"], least_cells: int = 4
-) -> list[Float[np.ndarray, "n 2"]]:
+def unseen_borders(free_space: FreeSpace, field: DrivingField, least_cells: int = 4) -> list[Float[np.ndarray, "n 2"]]:
     """Return the borders between reachable floor and unseen floor, each as the reachable cells' centres, m.
 
     Borders of fewer than `least_cells` cells are left out.
@@ -21,12 +22,19 @@ def unseen_borders(
     beside[:-1] |= unknown[1:]
     beside[:, 1:] |= unknown[:, :-1]
     beside[:, :-1] |= unknown[:, 1:]
-    labels, _ = label(reachable & beside, structure=np.ones((3, 3)))
-    borders = []
-    for k, box in enumerate(find_objects(labels), start=1):
-        corner = np.array([box[0].start, box[1].start])
-        borders.append(free_space.points(np.argwhere(labels[box] == k) + corner))
-    return [border for border in borders if len(border) >= least_cells]
+    cells = np.argwhere(beside & (free_space.evidence < 0))
+    cells = cells[field.can_stay(cells)]
+    border = _connected(cells)
+    order = np.argsort(border, kind="stable")
+    groups = np.split(cells[order], np.cumsum(np.bincount(border))[:-1]) if len(cells) else []
+    return [free_space.points(group) for group in groups if len(group) >= least_cells]
+
+
+def _connected(cells: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " n"]:
+    """Return a number for each cell, the same for cells joined by sides or corners; these are few, a grid is large."""
+    pairs = cKDTree(cells.reshape(-1, 2)).query_pairs(1.5, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def borders_on_unseen(free_space: FreeSpace, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:

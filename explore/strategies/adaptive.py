@@ -39,7 +39,8 @@ class Adaptive:
             return choice
         row = next(k for k, end in enumerate(situation.open_ends) if end is choice.target)
         place = ideal_places(choice.target, situation.map, situation.looks)[0]
-        there = _expected(situation, choice.target.wall, place, float(situation.end_metres[row])).position_sigma_m
+        metres = float(situation.nearest_end_metres[row])
+        there = _expected(situation, choice.target.wall, place, metres).position_sigma_m
         worst = self._lost(max(now, there))
         if worst > self._bar_m:
             limit, self._bar_m = FALLEN * self._bar_m, RAISE * worst

@@ -11,14 +11,17 @@ from .strategy import Choice, Place, Situation
 
 
 def nearest_end(
-    situation: Situation, metres: Float[np.ndarray, " n"], among: Sequence[int] | None = None
+    situation: Situation, metres: Float[np.ndarray, " n"] | None = None, among: Sequence[int] | None = None
 ) -> int | None:
     """Return which open end has the least of `metres`, by its place in `open_ends`; None if no way leads to any.
 
-    `among` are the places in `open_ends` that count.
+    Without `metres` it is the shortest drive that counts. `among` are the places in `open_ends` that count.
     """
+    nearest_wanted = metres is None and among is None
+    drives = situation.nearest_end_metres if nearest_wanted else situation.end_metres
+    metres = drives if metres is None else metres
     rows = np.arange(len(metres)) if among is None else np.asarray(among, dtype=np.int64)
-    rows = rows[np.isfinite(situation.end_metres[rows])]
+    rows = rows[np.isfinite(drives[rows])]
     return int(rows[np.argmin(metres[rows])]) if len(rows) else None
 
 

@@ -9,9 +9,9 @@ class NearestRobot:
 
     def choose(self, situation: Situation) -> Choice | None:
         """Return the nearest open end by driving distance."""
-        metres = situation.end_metres
-        best = nearest_end(situation, metres)
+        best = nearest_end(situation)
         if best is None:
             return None
-        reason = f"nearest of {len(metres)} open ends, {metres[best]:.1f} m to drive"
+        metres = situation.nearest_end_metres[best]
+        reason = f"nearest of {len(situation.open_ends)} open ends, {metres:.1f} m to drive"
         return Choice(situation.open_ends[best], reason)

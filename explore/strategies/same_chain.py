@@ -12,17 +12,19 @@ class SameChain:
 
     def choose(self, situation: Situation) -> Choice | None:
         """Return the nearer open end of the actual chain, else the nearest of all."""
-        ends, metres = situation.open_ends, situation.end_metres
+        ends = situation.open_ends
         mine = self._actual_chain(situation)
-        best = nearest_end(situation, metres, [row for row, end in enumerate(ends) if end.wall in mine])
+        best = nearest_end(situation, None, [row for row, end in enumerate(ends) if end.wall in mine])
         if best is not None:
-            reason = f"open end of the actual chain of {len(mine)} walls, {metres[best]:.1f} m to drive"
+            metres = situation.end_metres[best]
+            reason = f"open end of the actual chain of {len(mine)} walls, {metres:.1f} m to drive"
         else:
-            best = nearest_end(situation, metres)
+            best = nearest_end(situation)
             if best is None:
                 return None
             state = "no chain was begun" if self._wall is None else "the actual chain has no end to explore"
-            reason = f"{state}: the nearest of {len(ends)} open ends, {metres[best]:.1f} m to drive"
+            metres = situation.nearest_end_metres[best]
+            reason = f"{state}: the nearest of {len(ends)} open ends, {metres:.1f} m to drive"
         self._wall = ends[best].wall
         return Choice(ends[best], reason)
 

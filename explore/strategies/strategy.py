@@ -74,13 +74,22 @@ class Situation:
     @cached_property
     def end_metres(self) -> Float[np.ndarray, " n"]:
         """How far it is to drive to where each open end can be looked at, m; infinite where no way is known."""
+        return self._end_metres(beyond_nearest=True)
+
+    @cached_property
+    def nearest_end_metres(self) -> Float[np.ndarray, " n"]:
+        """The same, but only the least of them counts: any other may be infinite. Much cheaper in a large building."""
+        return self._end_metres(beyond_nearest=False)
+
+    def _end_metres(self, beyond_nearest: bool) -> Float[np.ndarray, " n"]:
         places = [ideal_places(end, self.map, self.looks)[:2] for end in self.open_ends]
-        return self.field.metres(np.reshape(places, (-1, 2))).reshape(-1, 2).min(axis=1)
+        metres = self.field.metres(np.reshape(places, (-1, 2)), beyond_nearest)
+        return metres.reshape(-1, 2).min(axis=1)
 
     @cached_property
     def unseen(self) -> tuple[Place, ...]:
         """The borders between floor that can be driven to and floor that was never seen, the useless ones left out."""
-        borders = unseen_borders(self.around.free_space, self.field.reachable())
+        borders = unseen_borders(self.around.free_space, self.field)
         places = (Place(border, "unseen floor is left") for border in borders)
         return tuple(place for place in places if not self.was_in_vain(place.centre_world))
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import shapely
+from skimage.graph import MCP_Geometric
 
+from explore import driving_field
 from explore.driving_field import DrivingField
 from explore.free_space import FreeSpace
 from explore.paths import PathConfig, Planner
@@ -55,12 +57,12 @@ def test_distances_are_those_of_the_shortest_paths_to_within_two_blocks(seed):
 def test_reachable_cells_are_those_with_a_path(seed):
     grid, places = seen(seed, 12)
     field, planner = DrivingField(grid, places[0], LENGTH), Planner(grid, places[0], LENGTH)
-    cells = np.argwhere(field.reachable())
+    every = np.argwhere(np.ones(grid.shape, dtype=bool))
+    cells, others = every[field.can_stay(every)], every[~field.can_stay(every)]
     assert len(cells) > 200
     rng = np.random.default_rng(seed)
     for cell in cells[rng.integers(0, len(cells), 30)]:
         assert planner.to(grid.points(cell[None])) is not None
-    others = np.argwhere(~field.reachable())
     for cell in others[rng.integers(0, len(others), 30)]:
         if np.hypot(*(grid.points(cell[None])[0] - places[0])) > LENGTH.escape_m + 0.1:
             assert planner.to(grid.points(cell[None])) is None
@@ -77,3 +79,26 @@ def test_a_robot_too_near_to_a_wall_still_knows_its_way():
     near = np.argwhere((grid.evidence < 0) & (grid.clearance() < 0.2) & (grid.clearance() > 0.15))
     for cell in near[:: max(len(near) // 20, 1)]:
         assert np.isfinite(DrivingField(grid, grid.points(cell[None])[0], LENGTH).metres(places)).any()
+
+
+def test_what_is_near_is_found_without_a_search_of_the_whole_building(monkeypatch):
+    grid, searched = FreeSpace(), []
+    beams = np.linspace(-np.pi, np.pi, 180, endpoint=False)
+    for x in np.arange(0.0, 40.0, 1.0):
+        grid.integrate(np.array([x, 0.0, 0.0]), Scan(beams, np.full(180, np.nan), 0.01, 4.0, 0.0))
+
+    def noted(blocks):
+        searched.append(blocks.shape)
+        return MCP_Geometric(blocks)
+
+    monkeypatch.setattr(driving_field, "MCP_Geometric", noted)
+    places = np.array([[22.0, 1.0], [23.0, 0.0], [39.0, 0.0]])
+    nearest = DrivingField(grid, np.array([20.0, 0.0]), LENGTH)
+    near = nearest.metres(places, beyond_nearest=False)
+    assert [max(shape) < 100 for shape in searched] == [True]
+    every = DrivingField(grid, np.array([20.0, 0.0]), LENGTH).metres(places)
+    assert np.argmin(near) == np.argmin(every) == 0
+    assert near[0] == every[0]
+    assert np.all(near >= every)
+    assert max(searched[-1]) > 150
+    assert nearest.metres(places).tolist() == every.tolist()

@@ -4,7 +4,9 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
+from skimage.graph import MCP_Geometric
 
+from explore import paths
 from explore.free_space import FreeSpace
 from explore.paths import PathConfig, Planner, cells_within, sees
 from sim.lidar import LidarConfig, RangeFinder
@@ -194,3 +196,21 @@ def test_cells_within_reach_are_all_those_within_reach():
     every = np.argwhere(np.ones(grid.shape, dtype=bool))
     near = every[np.hypot(*(grid.points(every) - places[0]).T) <= 0.4]
     assert found == {tuple(cell) for cell in near.tolist()}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_path_is_sought_only_around_the_shortest_way_by_blocks(seed, monkeypatch):
+    _, grid, places = explored(seed)
+    searched = []
+
+    def noted(costs):
+        searched.append(int(np.count_nonzero(costs > 0)))
+        return MCP_Geometric(costs)
+
+    monkeypatch.setattr(paths, "MCP_Geometric", noted)
+    planner, floor = Planner(grid, places[0], CONFIG), int(np.count_nonzero(grid.evidence < 0))
+    near = places[np.argsort(np.hypot(*(places - places[0]).T))[1:6]]
+    assert planner.to(near) is not None
+    blocks, cells = searched
+    assert blocks < floor / 8
+    assert cells < floor / 2
