@@ -50,9 +50,11 @@ class FreeSpace:
         fits = np.ones((r1 - r0, c1 - c0), dtype=bool)
         reach = int(np.ceil(reach_m / self.config.cell_m))
         for r, c in self.cells(self._too_tight).tolist():
-            near = _slices(_grown((r - r0, r - r0 + 1, c - c0, c - c0 + 1), reach, fits.shape))
-            row, column = np.ogrid[near]
-            fits[near] &= np.hypot(row + r0 - r, column + c0 - c) * self.config.cell_m > reach_m
+            rows = slice(*np.clip([r - reach, r + reach + 1], r0, r1))
+            columns = slice(*np.clip([c - reach, c + reach + 1], c0, c1))
+            row, column = np.ogrid[rows, columns]
+            near = np.hypot(row - r, column - c) * self.config.cell_m <= reach_m
+            fits[rows.start - r0 : rows.stop - r0, columns.start - c0 : columns.stop - c0] &= ~near
         return fits
 
     @property

@@ -206,3 +206,22 @@ def test_unseen_floor_is_unknown_also_beyond_the_grid():
     np.testing.assert_array_equal(
         grid.unknown_at(np.array([[0.5, 0.5], [1.6, 0.0], [500.0, 0.0]])), [False, True, True]
     )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_the_body_did_not_fit_is_known_in_any_part_of_the_grid(seed):
+    rng, grid, reach = np.random.default_rng(seed), FreeSpace(), 0.3
+    room = random_room(rng)
+    grid.integrate(np.zeros(3), scan_from(room, np.zeros(3)))
+    low = grid.origin_world
+    for place in low + rng.uniform(-1.0, CELL * min(grid.shape) + 1.0, (8, 2)):
+        grid.note_too_tight(place)
+    index = np.argwhere(np.ones(grid.shape, dtype=bool))
+    tight = grid.cells(grid._too_tight)
+    gap = CELL * np.hypot(*(index[:, None] - tight).transpose(2, 0, 1))
+    expected = (gap > reach).all(axis=1).reshape(grid.shape)
+    assert not expected.all()
+    for _ in range(20):
+        (r0, r1), (c0, c1) = np.sort(rng.integers(0, max(grid.shape) + 20, (2, 2)), axis=1)
+        box = (slice(r0, r1), slice(c0, c1))
+        np.testing.assert_array_equal(grid.may_fit(box, reach), expected[box])
