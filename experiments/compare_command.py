@@ -93,12 +93,13 @@ class Compare:
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
         with opened(self.out, campaign) as store:
             try:
-                run_campaign(store, executor)
+                tally = run_campaign(store, executor)
             except KeyboardInterrupt:
                 print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
                       file=sys.stderr)  # fmt: skip
                 return INTERRUPTED
             write_tables(self.out, campaign, trials(campaign), store.record)
+        print(tally.words())
         print(f"results in {self.out}")
         problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
         for problem in problems:

@@ -74,10 +74,10 @@ def pooled_band(runs: Sequence[Float[np.ndarray, " _"]], dof: int, confidence: f
     return low / dof, high / dof
 
 
-def bound_margin(
+def bound_margins(
     poses_world: Float[np.ndarray, "s 3"], covs: Float[np.ndarray, "s 3 3"], initial_cov: Float[np.ndarray, "3 3"]
-) -> float:
-    """Return the smallest eigenvalue of P_k - A P_0 A', over all steps and over tr P_0; negative below the bound.
+) -> Float[np.ndarray, " s"]:
+    """Return the smallest eigenvalue of P_k - A P_0 A' at each step, over tr P_0; negative below the bound.
 
     A = [I, J (p_k - p_0); 0, 1]. An estimator that gains nothing about where the world lies never falls below 0
     (docs/estimation.md, "The bound").
@@ -85,7 +85,8 @@ def bound_margin(
     A = np.tile(np.eye(3), (len(covs), 1, 1))
     A[:, :2, 2] = (poses_world[:, :2] - poses_world[0, :2]) @ J.T
     gap = covs - A @ initial_cov @ np.swapaxes(A, -1, -2)
-    return float(np.linalg.eigvalsh(0.5 * (gap + np.swapaxes(gap, -1, -2))).min() / np.trace(initial_cov))
+    least = np.linalg.eigvalsh(0.5 * (gap + np.swapaxes(gap, -1, -2)))[:, 0]
+    return np.asarray(least / np.trace(initial_cov))
 
 
 def pose_errors(

@@ -8,12 +8,22 @@ from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from . import palette
 
 SIZE_INCH = (5.2, 3.7)
 """One figure stands alone on a phone, two or three beside each other on a page."""
+MARKS = ("o", "s", "^", "D", "v", "P")
+"""Of groups in a figure whose colours are those of back ends."""
+ROUND = (
+    (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0),
+    (1.0, 1.5, 2.0, 3.0, 5.0, 7.0),
+    (1.0, 2.0, 5.0),
+    (1.0, 3.0),
+    (1.0,),
+)
+MOST_TICKS = 7
 
 
 @dataclass(frozen=True)
@@ -58,13 +68,19 @@ class SmallMap:
 def anees_figure(title: str, curves: Sequence[Curve]) -> Figure:
     """Draw the ANEES of several estimators over the way driven, with the band of an ideal one."""
     figure, axes = _figure(title)
-    for index, curve in enumerate(curves):
+    for curve in curves:
         order = np.argsort(curve.path_m, kind="stable")
-        if index == 0:
+        if curve is curves[0]:
             axes.fill_between(
                 curve.path_m[order], curve.low[order], curve.high[order], color=palette.SOLID, label="95 % band", lw=0
             )
-        axes.plot(curve.path_m[order], curve.anees[order], color=colour(index), linewidth=1.3, label=curve.name)
+        axes.plot(
+            curve.path_m[order],
+            curve.anees[order],
+            color=palette.of_backend(curve.name),
+            linewidth=1.3,
+            label=curve.name,
+        )
     axes.axhline(1.0, color=palette.INK, linewidth=0.7)
     axes.set_yscale("log")
     axes.set_xlabel("mean way driven, m", fontsize=9)
@@ -74,28 +90,43 @@ def anees_figure(title: str, curves: Sequence[Curve]) -> Figure:
 
 
 def ratio_figure(title: str, ratios: Sequence[Ratio], label: str) -> Figure:
-    """Draw ratios with their intervals, a row each, in the groups in which they come."""
+    """Draw ratios of back ends with their intervals, a row each: a colour for each back end, a mark for each group."""
     figure, axes = _figure(title, (SIZE_INCH[0], 1.5 + 0.27 * len(ratios)))
     groups = list(dict.fromkeys(ratio.group for ratio in ratios))
     for row, ratio in enumerate(ratios):
-        paint = colour(groups.index(ratio.group))
+        paint, mark = palette.of_backend(ratio.name), MARKS[groups.index(ratio.group) % len(MARKS)]
         axes.plot([ratio.low, ratio.high], [row, row], color=paint, linewidth=2.0)
-        axes.plot([ratio.value], [row], "o", color=paint, markersize=4.5)
-    for index, group in enumerate(groups):
-        axes.plot([], [], "o-", color=colour(index), label=group)
+        axes.plot([ratio.value], [row], mark, color=paint, markersize=5.5, markeredgecolor=palette.PAGE)
+    for mark, group in zip(MARKS, groups, strict=False):
+        axes.plot([], [], mark, color=palette.INK, markersize=5.5, label=group)
     axes.axvline(1.0, color=palette.INK, linewidth=0.8)
     axes.set_xscale("log")
-    # Ratios read better as 0.5, 2 and 100 than as powers of ten, and near 1 there is no power of ten to label.
-    few = max(r.high for r in ratios) < 30.0 * min(r.low for r in ratios)
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if few else (1.0,)))
+    axes.xaxis.set_major_locator(FixedLocator(round_ratios(*axes.get_xlim())))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_yticks(range(len(ratios)), [ratio.name for ratio in ratios], fontsize=8)
+    names = [ratio.name for ratio in ratios]
+    first = [row for row, name in enumerate(names) if row == 0 or names[row - 1] != name]
+    axes.set_yticks(first, [names[row] for row in first], fontsize=8)
+    axes.grid(visible=False, axis="y")
     axes.set_ylim(len(ratios) - 0.5, -0.5)
     axes.set_xlabel(label, fontsize=9)
     figure.legend(loc="lower center", ncols=3, frameon=False, fontsize=8)
     figure.subplots_adjust(left=0.3, bottom=0.95 / figure.get_figheight())
     return figure
+
+
+def round_ratios(low: float, high: float) -> list[float]:
+    """Return round numbers between two positive ones, as many as a logarithmic axis has room for the words of.
+
+    Ratios read better as 0.5, 2 and 100 than as powers of ten, and near 1 there is no power of ten to label.
+    """
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ticks: list[float] = []
+    for steps in ROUND:
+        ticks = [s * 10.0**d for d in decades for s in steps if low <= s * 10.0**d <= high]
+        if len(ticks) <= MOST_TICKS:
+            break
+    return ticks
 
 
 def map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> Figure:
@@ -119,11 +150,6 @@ def paint_map(axes: Axes, small: SmallMap, low: Float[np.ndarray, "2"], high: Fl
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set_axis_off()
-
-
-def colour(index: int) -> str:
-    """Return the colour of the nth of several things that are compared."""
-    return palette.COMPARED[index % len(palette.COMPARED)]
 
 
 def _figure(title: str, size: tuple[float, float] = SIZE_INCH) -> tuple[Figure, Axes]:

@@ -45,5 +45,3 @@ INK = "#2B2B2B"
 PATH_ESTIMATED = "#333A56"
 PATH_TRUE = "#CC79A7"
 PATH_TRUE_PALE = "#E3B5CD"
-COMPARED = ("#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#009E73", "#56B4E9", "#2B2B2B", "#7B4FA3")
-"""Estimators or arms beside each other, in turn."""

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
+LONG_ROWS = 24
+"""A table of more rows is folded up on a screen; on paper it is all there."""
+
 
 @dataclass(frozen=True)
 class PageTable:
@@ -15,6 +18,8 @@ class PageTable:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    is_wordy: bool = False
+    """Whether its cells are sentences, which break into lines, rather than numbers."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class Page:
     """A report."""
 
     title: str
+    question: str
+    """What was asked, for a reader who knows nothing yet."""
     verdict: tuple[str, ...]
     """The answer, first on the page; a paragraph each."""
     command: str
@@ -59,7 +66,7 @@ def html(page: Page) -> bytes:
     environment = Environment(
         loader=PackageLoader("viz", "."), autoescape=select_autoescape(default=True), trim_blocks=True
     )
-    return environment.get_template("report.html.j2").render(page=page).encode()
+    return environment.get_template("report.html.j2").render(page=page, long_rows=LONG_ROWS).encode()
 
 
 def latex(tables: Sequence[PageTable]) -> bytes:

@@ -36,7 +36,17 @@ MEASURES = (
     Measure("duplicate_lines", False),
     Measure("false_matches", False),
     Measure("matches_missed", False),
+    Measure("double_entries", False),
 )
+MEANS = (
+    *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "heading_rmse_rad"),
+    *("nis_mean", "nis_whiteness"),
+)
+SUMS = (
+    *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"),
+    *("merges", "false_merges", "sightings", "double_entries", "distances"),
+)
+"""Columns that are added up over runs."""
 BASELINE_BACKEND, BASELINE_STRATEGY = "full-ekf", "nearest-robot"
 
 
@@ -45,10 +55,11 @@ def compare(campaign: Campaign, trials: Sequence[Row], marks: Sequence[Row], ban
 
     `bands` has a row for each cell, in the order of the trials, with what its steps say.
     """
+    cells = [cell | band for cell, band in zip(_cells(trials), bands, strict=True)]
     return {
         "counts": _counts(trials),
-        "pooled": _pooled(campaign, trials),
-        "cells": [cell | band for cell, band in zip(_cells(trials), bands, strict=True)],
+        "pooled": _pooled(campaign, trials, cells),
+        "cells": cells,
         "backends": list(_backends(campaign, trials)),
         "strategies": list(_strategies(campaign, trials)),
         "interaction": list(_interaction(campaign, trials)),
@@ -120,12 +131,14 @@ def _counts(rows: Sequence[Row]) -> dict[str, int]:
     return {"trials": len(rows), **{state: states.count(state) for state in ("complete", "stopped", "failed")}}
 
 
-def _pooled(campaign: Campaign, rows: Sequence[Row]) -> list[Row]:
+def _pooled(campaign: Campaign, rows: Sequence[Row], cells: Sequence[Row]) -> list[Row]:
     """Return a row for each back end in each arm, over all worlds and strategies; still a run is the unit."""
-    return [
-        {"backend": backend, "arm": arm} | cell_scores(select(rows, backend=backend, arm=arm))
-        for arm, backend in product(campaign.arms, campaign.backends)
-    ]
+    found = []
+    for arm, backend in product(campaign.arms, campaign.backends):
+        outside = [c["steps_outside_band"] for c in cells if (c["arm"], c["backend"]) == (arm, backend)]
+        scores = cell_scores(select(rows, backend=backend, arm=arm))
+        found.append({"backend": backend, "arm": arm, **scores, "steps_outside_band": _mean(outside)})
+    return found
 
 
 def _cells(rows: Sequence[Row]) -> list[Row]:
@@ -143,19 +156,22 @@ def cell_scores(rows: Sequence[Row]) -> Row:
     """Return the scores of some trials together, over the runs that completed; the others are counted."""
     complete = [row for row in rows if row["status"] == "complete"]
     scores: Row = {"trials": len(rows), "complete": len(complete)}
-    for name in ("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "nis_mean", "nis_whiteness"):
+    for name in MEANS:
         runs = runs_of(complete, Measure(name, False))
         found = estimate(runs)
         scores[name] = None if found is None else asdict(found) | {"median": float(np.median(list(runs.values())))}
-    for name in ("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"):
+    for name in SUMS:
         scores[name] = sum(row.get(name) or 0 for row in complete)
-    seen = sum(scores[name] for name in ("matches_true", "matches_missed", "matches_false"))
-    scores["missed_share"] = scores["matches_missed"] / seen if seen else None
-    found = estimate(runs_of(complete, Measure("distances_in_95", False)))
-    scores["distances_in_95"] = None if found is None else asdict(found)
+    for name in ("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"):
+        found = estimate(runs_of(complete, Measure(name, False)))
+        scores[name] = None if found is None else asdict(found)
     for name in ("trace_least", "bound_margin"):
         values = [row[name] for row in complete if row.get(name) is not None]
         scores[name] = min(values) if values else None
+    below = [row for row in complete if row.get("bound_first_m") is not None]
+    scores["bound_runs_below"] = len(below)
+    for name in ("bound_margin", "bound_first_m", "bound_worst_m"):
+        scores[f"{name}_median"] = float(np.median([row[name] for row in below])) if below else None
     scores["pose_nees_in_band"] = _mean([row.get("pose_nees_in_band") for row in complete])
     return scores
 

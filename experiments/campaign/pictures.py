@@ -17,6 +17,7 @@ from ..scenario import UsageError, load_world
 from .comparison import BASELINE_STRATEGY
 from .plan import CLOSED, Campaign, Trial, trials, world_key
 from .store import Store
+from .words import ARMS_SHORT
 
 MARGIN_M = 0.5
 RATIO_LABELS = {"pose_anees": "pose ANEES over that of full-ekf", "wall_rmse_m": "error of walls over that of full-ekf"}
@@ -36,8 +37,8 @@ def curve_pictures(folder: Path, campaign: Campaign) -> tuple[PagePicture, ...]:
             curves = [_curve(name, arrays, chosen & (arrays["backend"] == name)) for name in campaign.backends]
             curves = [curve for curve in curves if len(curve.path_m)]
             if curves:
-                caption = f"ANEES of the pose over the trials, {world}, {strategy}, {arm}, with its 95 % band"
-                pictures.append(PagePicture(png(anees_figure(f"{world}, {arm}", curves)), caption))
+                caption = f"{world} by {strategy}, {ARMS_SHORT[arm]}: ANEES of the pose over the trials"
+                pictures.append(PagePicture(png(anees_figure(f"{world}, {ARMS_SHORT[arm]}", curves)), caption))
     return tuple(pictures)
 
 
@@ -52,10 +53,10 @@ def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:
     for measure, label in RATIO_LABELS.items():
         rows = [row for row in said["backends"] if row["measure"] == measure and row["value"] is not None]
         rows.sort(key=lambda row: row["first"])
-        ratios = [Ratio(row["first"], row["arm"], row["value"], row["low"], row["high"]) for row in rows]
+        ratios = [Ratio(row["first"], ARMS_SHORT[row["arm"]], row["value"], row["low"], row["high"]) for row in rows]
         if ratios:
             figure = ratio_figure(label, ratios, "ratio, 95 % interval by run")
-            pictures.append(PagePicture(png(figure), f"{label}, by back end and arm"))
+            pictures.append(PagePicture(png(figure), f"{label}: right of the line the back end is worse"))
     return tuple(pictures)
 
 

@@ -2,7 +2,9 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
+from time import monotonic
 from typing import Any
 
 from joblib import Parallel, delayed
@@ -21,8 +23,28 @@ Executor = Callable[[Iterable[Job]], Iterator[Done]]
 """Performs jobs, in any order, taking each one up only when there is room for it."""
 
 
-def run_campaign(store: Store, executor: Executor) -> None:
+@dataclass(frozen=True)
+class Tally:
+    """What a campaign's trials took, those excepted that were there already."""
+
+    trials: int
+    wall_s: float
+    cpu_s: float
+    """Of the trials alone, over all processes."""
+
+    def words(self) -> str:
+        """Return the rate, and how many processes computed at a time: with two of them 2 is perfect."""
+        if not self.trials:
+            return "all trials were there already"
+        return (
+            f"{self.trials} trials in {self.wall_s:.0f} s: {self.trials / self.wall_s:.2f} a second,"
+            f" {self.cpu_s:.0f} s computed, {self.cpu_s / self.wall_s:.2f} at a time"
+        )
+
+
+def run_campaign(store: Store, executor: Executor) -> Tally:
     """Perform every trial that has no result yet, recordings first; what is done stays done whatever happens."""
+    began, count, cpu_s = monotonic(), 0, 0.0
     drives = _drives(store)
     driven = {job.trial for job in drives}
     rest = [t for t in trials(store.campaign) if not store.has(t) and t not in driven]
@@ -39,7 +61,9 @@ def run_campaign(store: Store, executor: Executor) -> None:
         for jobs in (iter(drives), (_job(store, trial) for trial in rest)):
             for done in executor(jobs):
                 store.save(done)
+                count, cpu_s = count + 1, cpu_s + done.cpu_s
                 bar.advance(task)
+    return Tally(count, monotonic() - began, cpu_s)
 
 
 def _drives(store: Store) -> list[Job]:

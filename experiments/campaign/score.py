@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from slam.backend import Joint
 from slam.chains import Chain
-from slam.consistency import bound_margin
+from slam.consistency import bound_margins
 from slam.geometry.lines import normals
 from slam.geometry.poses import to_world, wrap
 from slam.stochastic_map import StochasticMap
@@ -26,6 +26,8 @@ from .innovation import InnovationEar
 from .observer import Moment, Observer, association_counts
 
 END = "end"
+ROUNDING = 1e-6
+"""A trace or a bound missed by less than this share of the start's trace is not missed."""
 RPE_STEPS = 10
 
 
@@ -57,9 +59,14 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
     shift, turn = rpe(log.estimated_world, log.true_world, RPE_STEPS) if len(log) > RPE_STEPS else (None, None)
     traces = np.trace(log.estimated_cov, axis1=1, axis2=2)
     start_cov = result.scenario.start_cov
+    margins = bound_margins(log.estimated_world, log.estimated_cov, start_cov)
+    below = np.flatnonzero(margins < -ROUNDING)
     summary |= {
         "trace_least": float(traces.min() / np.trace(start_cov)),
-        "bound_margin": bound_margin(log.estimated_world, log.estimated_cov, start_cov),
+        "trace_below": float(np.mean(traces < (1.0 - ROUNDING) * np.trace(start_cov))),
+        "bound_margin": float(margins.min()),
+        "bound_first_m": float(log.path_length_m[below[0]]) if len(below) else None,
+        "bound_worst_m": float(log.path_length_m[margins.argmin()]) if len(below) else None,
         "ate_m": ate(log.estimated_world, log.true_world),
         "ate_aligned_m": ate(log.estimated_world, log.true_world, align=True),
         "rpe_m": shift,
@@ -110,7 +117,7 @@ class _Scorer:
             "pose_anees_so_far": _or_none(np.mean(self.nees[: k + 1]) / 3.0),
             "pose_trace": float(np.trace(log.estimated_cov[k])),
             "coverage": self.coverage(moment),
-            "wall_rmse_m": _wall_rmse(walls, self.votes, among, self.to_true),
+            "wall_rmse_m": wall_rmse(walls, self.votes, among, self.to_true),
             "map_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among),
             "joint_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among, with_pose=True),
             "lines": len(walls),
@@ -122,7 +129,7 @@ def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _wall_rmse(walls: StochasticMap, votes: Votes, among: np.ndarray, to_true: Float[np.ndarray, "3"]) -> float | None:
+def wall_rmse(walls: StochasticMap, votes: Votes, among: np.ndarray, to_true: Float[np.ndarray, "3"]) -> float | None:
     """Return how far the ends of mapped walls lie from the lines of their true walls, rms, m."""
     if not among.any():
         return None

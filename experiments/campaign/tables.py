@@ -12,10 +12,12 @@ import pyarrow.parquet as pq
 from jaxtyping import Float
 
 from slam.consistency import chi2_band, pooled_band
+from slam.matching import MatchingConfig
 
 from ..files import csv_bytes, json_bytes, write
 from ..measurements import Z_95
 from .comparison import compare
+from .findings import findings
 from .hypothesis import hypothesis
 from .plan import Campaign, Trial
 from .score import END, Record
@@ -29,6 +31,8 @@ FIRST = (
 """Columns that scripts rely on; the others follow in the order in which they were first met."""
 TIMINGS = "step_ms_"
 """What the names of all columns begin with that differ from run to run."""
+GATE = MatchingConfig().gate
+"""Level of the gate that all trials of a campaign match with."""
 KEYS = ("world", "strategy", "backend", "mode", "association")
 PLAIN = (str, int, float, bool)
 
@@ -41,11 +45,32 @@ def trial_row(record: Record) -> Row:
     row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
     row.pop("traceback", None)
     row["set_aside"] = len(summary.get("set_aside") or ())
+    row |= doubles(summary)
     off, sigma = distance_errors(record)
     row["distances"] = len(off)
     row["distances_in_95"] = float(np.mean(np.abs(off) <= Z_95 * sigma)) if len(off) else None
     row |= {f"{TIMINGS}{key}": value for key, value in (summary.get("step_ms") or {}).items()}
     return row
+
+
+def doubles(summary: Row) -> Row:
+    """Return how many sightings of known walls there were, and how many walls were entered twice, merged since or not.
+
+    A gate at level g refuses 1 - g of the sightings of a calibrated estimate, each of which may enter a wall anew:
+    `doubles_beyond_gate` is the number of double entries less that.
+    """
+    names = ("matches_true", "matches_missed", "matches_false", "duplicate_lines", "merges", "false_merges")
+    found: dict[str, int] = {name: summary[name] for name in names if summary.get(name) is not None}
+    if len(found) < len(names):
+        return {"sightings": None, "missed_share": None, "double_entries": None, "doubles_beyond_gate": None}
+    seen = found["matches_true"] + found["matches_missed"] + found["matches_false"]
+    entries = found["duplicate_lines"] + found["merges"] - found["false_merges"]
+    return {
+        "sightings": seen,
+        "missed_share": found["matches_missed"] / seen if seen else None,
+        "double_entries": entries,
+        "doubles_beyond_gate": entries - (1.0 - GATE) * seen,
+    }
 
 
 def distance_errors(record: Record) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
@@ -160,5 +185,6 @@ def write_tables(
     write_table(folder / "trials", rows, FIRST)
     write_table(folder / "marks", marks)
     write_table(folder / "steps", steps)
-    said = compare(campaign, rows, marks, bands) | {"hypothesis": hypothesis(marks)}
+    said = compare(campaign, rows, marks, bands)
+    said |= {"hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     write(folder / "comparison.json", json_bytes(said))

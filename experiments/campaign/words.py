@@ -7,6 +7,20 @@ from .plan import CLOSED, Campaign
 from .score import END
 
 ANSWERS = {"matches": "Yes", "does not match": "No", "undecided": "Undecided"}
+ARMS_SHORT = {CLOSED: "closed loop", "replay-own": "replay, own gate", "replay-true": "replay, true matches"}
+MEASURE_WORDS = {
+    "pose_anees": "pose ANEES",
+    "map_anees": "map ANEES",
+    "ate_m": "error of the path",
+    "wall_rmse_m": "error of the walls",
+    "heading_rmse_rad": "error of the heading",
+    "path_length_m": "way driven",
+    "duplicate_lines": "walls left twice in the map",
+    "double_entries": "walls entered twice",
+    "false_matches": "false matches",
+    "matches_missed": "missed matches",
+}
+NONE = "–"
 SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps"), ("--first-seed", "first_seed"))
 
 
@@ -25,14 +39,17 @@ def verdict(hypothesis: dict[str, Any] | None) -> tuple[str, ...]:
     if wall["value"] is None:
         return (f"Undecided: {where} no pair of runs of {contender} and {baseline} has a map to compare.",)
     answer = ANSWERS[hypothesis["verdict"]]
-    verb = {"matches": "matches", "does not match": "does not match", "undecided": "may or may not match"}
+    says = {
+        "matches": f"{contender} matches {baseline}",
+        "does not match": f"{contender} does not match {baseline}",
+        "undecided": f"these runs do not tell whether {contender} matches {baseline}",
+    }
     return (
-        f"{answer}: {where}, {contender} {verb[hypothesis['verdict']]} {baseline}: the walls of its map are"
+        f"{answer}: {where}, {says[hypothesis['verdict']]}: the walls of its map are"
         f" {number(wall['value'])} times as far off (95 % interval {interval(wall)}; {wall['runs']} pairs of runs;"
         f" a match is an interval below {hypothesis['matches_within']}).",
         _honesty(honesty),
-        f"{_states(at['contender'], contender)}; {_states(at['baseline'], baseline)}. Of the reachable contour the"
-        f" first leaves {_percent_points(at['uncovered'])} than the second.",
+        f"{_states(at['contender'], contender)}; {_states(at['baseline'], baseline)}. {_covered(at['uncovered'])}",
     )
 
 
@@ -41,7 +58,7 @@ def _honesty(ratio: dict[str, Any]) -> str:
         return "How well each knows its own error cannot be told."
     times = f"{number(ratio['value'])} times (95 % interval {interval(ratio)})"
     if ratio["low"] > 1.0:
-        return f"No strategy mends what it says of itself: the NEES of its pose is {times} that of the other."
+        return f"The strategy does not mend what it says of itself: the NEES of its pose is {times} that of the other."
     return f"The NEES of its pose is {times} that of the other."
 
 
@@ -53,17 +70,20 @@ def _states(states: dict[str, int], who: str) -> str:
     )
 
 
-def _percent_points(uncovered: dict[str, Any]) -> str:
+def _covered(uncovered: dict[str, Any]) -> str:
     if uncovered["value"] is None:
-        return "an unknown share more or less uncovered"
+        return "How much of the reachable contour each has mapped cannot be told."
+    points = f"{abs(100 * uncovered['value']):.1f}"
+    if points == "0.0":
+        return "Both have mapped the same share of the reachable contour."
     more = "more" if uncovered["value"] >= 0 else "fewer"
-    return f"{abs(100 * uncovered['value']):.1f} percentage points {more} uncovered"
+    return f"Of the reachable contour the first leaves {points} percentage points {more} uncovered than the second."
 
 
 def number(value: float | int | None, digits: int = 3) -> str:
     """Return a number with so many significant digits, never in powers of ten; a dash for none."""
     if value is None:
-        return "–"
+        return NONE
     if isinstance(value, int) or value == 0:
         return str(int(value)) if float(value).is_integer() else str(value)
     short = f"{value:.{digits}g}"
@@ -73,12 +93,27 @@ def number(value: float | int | None, digits: int = 3) -> str:
 def interval(found: dict[str, Any], scale: float = 1.0) -> str:
     """Return the interval by run, and that by building where there is one."""
     if found["low"] is None:
-        return "–"
+        return NONE
     words = f"{number(scale * found['low'])} to {number(scale * found['high'])}"
     if found.get("low_buildings") is not None:
         wide = f"{number(scale * found['low_buildings'])} to {number(scale * found['high_buildings'])}"
         words += f"; for other buildings {wide}"
     return words
+
+
+def percent(value: float | None) -> str:
+    """Return a share in per cent."""
+    return number(None if value is None else 100.0 * value)
+
+
+def mean(found: dict[str, Any] | None, digits: int = 3, scale: float = 1.0) -> str:
+    """Return the mean of an estimate."""
+    return NONE if found is None else number(scale * found["mean"], digits)
+
+
+def share(found: dict[str, Any] | None) -> str:
+    """Return an estimated share in per cent, with its interval."""
+    return NONE if found is None else f"{percent(found['mean'])} ({interval(found, 100.0)})"
 
 
 def command_of(campaign: Campaign) -> str:

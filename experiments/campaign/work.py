@@ -5,6 +5,7 @@ import traceback
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -46,11 +47,13 @@ class Done:
     trial: Trial
     record: bytes
     log: bytes | None = None
+    cpu_s: float = 0.0
+    """How long the job computed, s."""
 
 
 def perform(job: Job) -> Done:
     """Run one trial; whatever goes wrong in it becomes its record, with the reason, and the campaign goes on."""
-    log = None
+    log, began = None, process_time()
     try:
         if job.trial.association is None:
             record, log = _drive(job)
@@ -60,7 +63,7 @@ def perform(job: Job) -> Done:
         record = failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
     if job.keep_log and log is None:
         log = npz_bytes({"reason": record.summary["reason"]})
-    return Done(job.trial, pack(record), log)
+    return Done(job.trial, pack(record), log, process_time() - began)
 
 
 def failed(job: Job, reason: str, trace: str = "") -> Record:

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slam.consistency import bound_margin
+from slam.consistency import bound_margins
 from viz import palette
 from viz.curves import paint_map
 from viz.panels import MARGIN_M, paint_curves, paint_ellipses, panels
@@ -50,7 +50,7 @@ LEAST = "least trace over the start's"
 def _numbers(name: str, results: list[TrialResult], seed: int) -> dict[str, Value]:
     logs = [log_of(result) for result in results]
     margins = [
-        bound_margin(log.estimated_world, log.estimated_cov, result.scenario.start_cov)
+        float(bound_margins(log.estimated_world, log.estimated_cov, result.scenario.start_cov).min())
         for log, result in zip(logs, results, strict=True)
     ]
     return {
