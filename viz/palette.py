@@ -2,7 +2,7 @@
 
 from slam.backends import BACKENDS
 
-BACKEND_COLOURS = ("#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#1A1A1A", "#6B2C91")
+BACKEND_COLOURS = ("#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#3A3A3A", "#6B2C91")
 """Okabe and Ito's set without its yellow, which white paper swallows; a dark purple in its place. With any colour
 vision two of them are as easily told apart as any two of that set (tests/viz/test_palette.py simulates it)."""
 
@@ -14,8 +14,8 @@ def of_backend(name: str) -> str:
     return BACKEND_COLOURS[turn % len(BACKEND_COLOURS)]
 
 
-CLOSED = ("#0072B2", "#009E73", "#56B4E9", "#7B4FA3", "#1B7F8C", "#4C5FD5", "#6B8E23", "#A0527F")
-"""Closed chains, in turn."""
+CLOSED = ("#0072B2", "#7B4FA3", "#56B4E9", "#1F3F7A", "#A68BD0", "#4C5FD5", "#2A8FA8", "#5B2A86")
+"""Closed chains, in turn; none is green, which stands for segments that were fused."""
 OPEN = "#E69F00"
 """Chains with open ends ..."""
 OPEN_SHADES = (OPEN, "#B86E00", "#F2C45A", "#8C5A1E")

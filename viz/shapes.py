@@ -38,6 +38,17 @@ def hessian_cov(
     return moved
 
 
+def spread(heights: Float[np.ndarray, " k"], groups: Int[np.ndarray, " k"], gap: float) -> Float[np.ndarray, " k"]:
+    """Return the heights raised as little as leaves those of one group `gap` or more apart, in their order."""
+    moved = heights.astype(np.float64)
+    for group in np.unique(groups):
+        rows = np.flatnonzero(groups == group)
+        rows = rows[np.argsort(heights[rows], kind="stable")]
+        steps = gap * np.arange(len(rows))
+        moved[rows] = np.maximum.accumulate(heights[rows] - steps) + steps
+    return moved
+
+
 class Changes:
     """Remembers what was last drawn of each thing, so that only what has changed is drawn again."""
 

@@ -16,6 +16,7 @@ from experiments.scenario import TrialConfig, build, load_world
 from experiments.scores import TIMED
 from experiments.timelines import Recording, record_comparison
 from experiments.trial import default_mission, run_scenario
+from viz.timeline.colours import pale
 
 WORLD, STEPS = "paper-fig4", 70
 EXPLORE = ["explore", WORLD, "--max-steps", str(STEPS)]
@@ -88,8 +89,19 @@ def test_every_thing_that_is_shown_has_its_entity(runs):
     assert {
         f"{world}/{name}"
         for name in (
-            *("path", "ellipse", "robot", "robot/body", "robot/scan", "robot/segments", "corners", "open_ends"),
-            *("goal", "to_follow", "swept", "visibility/sights", "visibility/neighbours", "walls/0"),
+            *(
+                "path",
+                "ellipse",
+                "robot",
+                "robot/body",
+                "robot/scan",
+                "robot/segments",
+                "robot/refused",
+                "why_refused",
+                "corners",
+                "open_ends",
+            ),
+            *("goal", "goal/name", "to_follow", "swept", "visibility/sights", "visibility/neighbours", "walls/0"),
         )
     } <= paths
     assert {"/model/full-ekf/walls/0", "/model/full-ekf/seen", "/model/full-ekf/matches"} <= paths
@@ -139,6 +151,34 @@ def test_the_last_walls_drawn_are_those_of_the_map(runs):
         n = np.array([np.cos(alpha), np.sin(alpha)])
         ends = anchor + d * n + extent[:, None] * np.array([-n[1], n[0]])
         np.testing.assert_allclose(strips[-1][0], ends, atol=0.01)
+
+
+def test_ellipses_in_the_model_space_have_the_colour_of_their_walls_at_once(runs):
+    paths = {str(path) for path in RrdReader(runs.rrd).store().schema().entity_paths()}
+    changed = 0
+    for path in (path for path in paths if path.startswith("/model/full-ekf/walls/")):
+        times, ellipses = read(runs.rrd, path, "LineStrips2D:colors")
+        for step, colour in zip(*read(runs.rrd, path.replace("model", "world"), "LineStrips2D:colors"), strict=True):
+            shown = ellipses[np.searchsorted(times, step, side="right") - 1]
+            assert shown == colour or shown == pale(np.array(colour, dtype=np.uint32)).tolist()
+            changed += step > 0
+    assert changed > 0
+
+
+def test_refused_segments_say_why_and_the_goal_says_what_it_is(runs):
+    steps, whys = read(runs.rrd, "/world/full-ekf/why_refused", "Points2D:labels")
+    strips_at, strips = read(runs.rrd, "/world/full-ekf/robot/refused", "LineStrips2D:strips")
+    np.testing.assert_array_equal(steps, strips_at)
+    assert [len(why or ()) for why in whys] == [len(strip or ()) for strip in strips]
+    assert all(word.startswith("refused: ") for why in whys for word in why or ())
+    goals = dict(zip(*read(runs.rrd, "/world/full-ekf/goal/name", "Points2D:labels"), strict=True))
+    log = zip(*read(runs.rrd, "/decisions/full-ekf", "TextLog:text"), strict=True)
+    chosen = [(step, line) for step, (line,) in log if "goal: " in line]
+    assert len(chosen) >= 3
+    for step, line in chosen:
+        (name,) = goals[step]
+        assert line.startswith(f"{step:4d}  {name}: ")
+        assert line.endswith(" m to drive")
 
 
 def test_several_back_ends_stand_in_one_recording_on_one_time_axis(runs, tmp_path):

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.geometry.lines import normals
-from viz.shapes import Changes, ellipses, hessian_cov, rounded
+from viz.shapes import Changes, ellipses, hessian_cov, rounded, spread
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -71,3 +71,10 @@ def test_what_was_forgotten_is_drawn_again():
 
 def test_rounding_gives_a_row_for_each_thing():
     assert rounded(np.array([[[0.001, 0.014]]]), 0.005).tolist() == [[0, 3]]
+
+
+def test_labels_of_one_group_are_raised_until_they_stand_apart():
+    heights, groups = np.array([1.0, 0.0, 5.0, 0.1, 0.9]), np.array([0, 0, 0, 1, 1])
+    np.testing.assert_allclose(spread(heights, groups, 0.5), heights)
+    np.testing.assert_allclose(spread(heights, np.zeros(5, dtype=int), 0.5), [1.5, 0.0, 5.0, 0.5, 1.0])
+    assert spread(np.zeros(0), np.zeros(0, dtype=int), 0.5).shape == (0,)

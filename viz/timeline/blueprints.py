@@ -14,7 +14,7 @@ from .robot_layers import POSE_TIMES
 from .sights import UNITS_PER_M
 
 WHITE = (255, 255, 255)
-CHAINS_NAME = "chains, and closed ones"
+STEP_MS_NAME, STEP_MS_SPAN = "time of a step, ms (cut at 200)", (0.0, 200.0)
 TRACE_NAME = "trace of the pose covariance, m² + rad²"
 
 
@@ -24,19 +24,19 @@ Bounds = tuple[tuple[float, float], tuple[float, float]]
 
 def one_run(backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -> rrb.Horizontal:
     """Return the layout of one run: the map large, the estimate's insides beside it, the reasons below."""
-    below = rrb.Horizontal(_decisions(backend), _legend(), column_shares=[1, 1.15])
-    left = rrb.Vertical(map_view(backend, seen_world), below, row_shares=[2.3, 1])
+    below = rrb.Horizontal(_decisions(backend), _legend(), column_shares=[1.2, 1])
+    left = rrb.Vertical(map_view(backend, seen_world), below, row_shares=[2.1, 1])
     right = rrb.Vertical(
         rrb.Horizontal(model_view(backend, plane), graph_view(backend, seen_world)),
-        nees_view(),
-        curve_view(TRACE, TRACE_NAME),
+        nees_view(legend=True),
+        rrb.Horizontal(curve_view(TRACE, TRACE_NAME), curve_view(STEP_MS, STEP_MS_NAME, STEP_MS_SPAN)),
         rrb.Horizontal(
             curve_view(ENDS, "open ends"),
-            curve_view(LINES, "walls in the map"),
-            curve_view((CHAINS, CLOSED), CHAINS_NAME),
+            curve_view(LINES, "walls"),
+            curve_view((CHAINS, CLOSED), "chains"),
+            curve_view(PATH, "path, m"),
         ),
-        rrb.Horizontal(curve_view(PATH, "path length, m"), curve_view(STEP_MS, "time of a step, ms")),
-        row_shares=[2.2, 1.2, 1, 0.9, 0.9],
+        row_shares=[2.2, 1.4, 1, 1],
     )
     return rrb.Horizontal(left, right, column_shares=[1.25, 1], name="run")
 
@@ -55,14 +55,13 @@ def comparison(backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], pl
     )
     curves = rrb.Horizontal(
         rrb.Tabs(
-            curve_view(LOG_NEES, "NEES of the pose as a power of ten, with its 95 % band", (-1.5, 5.0), legend=True),
+            curve_view(LOG_NEES, "log₁₀ of the pose's NEES, its 95 % band in grey", (-1.5, 6.5), legend=True),
             nees_view(legend=True),
         ),
         curve_view(TRACE, TRACE_NAME),
         rrb.Tabs(
-            curve_view(LINES, "walls in the map"), curve_view(ENDS, "open ends"),
-            curve_view((CHAINS, CLOSED), CHAINS_NAME), curve_view(PATH, "path length, m"),
-            curve_view(STEP_MS, "time of a step, ms"),
+            curve_view(LINES, "walls"), curve_view(ENDS, "open ends"), curve_view((CHAINS, CLOSED), "chains"),
+            curve_view(PATH, "path, m"), curve_view(STEP_MS, STEP_MS_NAME, STEP_MS_SPAN),
         ),
         _legend(),
         column_shares=[1.4, 1.2, 1, 0.8],
@@ -76,8 +75,8 @@ def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.Spatial2
     so_far = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=end) for line in (STEP, SIM_TIME)])
     return rrb.Spatial2DView(
         origin="/", contents=["/world/truth/**", f"/world/{backend}/**"], visual_bounds=_bounds(seen_world, 0.6),
-        name=f"{backend}: map  (robot's 3σ ellipse ×{POSE_TIMES:.0f})", background=WHITE, defaults=[style(2.6, 24.0)],
-        overrides={"/world/truth/path": so_far, f"/world/{backend}/path": so_far},
+        name=f"{backend}: map over the truth  (robot's 3σ ×{POSE_TIMES:.0f})", background=WHITE,
+        defaults=[style(2.6, 24.0)], overrides={"/world/truth/path": so_far, f"/world/{backend}/path": so_far},
     )  # fmt: skip
 
 
@@ -97,14 +96,14 @@ def graph_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.GraphV
         origin=f"/graph/{backend}", name=f"{backend}: visibility graph",
         force_link=rrb.archetypes.ForceLink(enabled=False),
         force_many_body=rrb.archetypes.ForceManyBody(enabled=False),
-        background=rrb.archetypes.GraphBackground(color=WHITE), visual_bounds=bounds,
+        visual_bounds=bounds,
     )  # fmt: skip
 
 
 def nees_view(legend: bool = False) -> rrb.TimeSeriesView:
     """Return the pose's NEES with its band; what leaves the scale is far from consistent, however far."""
     high = 2.5 * POSE_BAND[1]
-    return curve_view(NEES, f"NEES of the pose, with its 95 % band (cut at {high:.0f})", (0.0, high), legend)
+    return curve_view(NEES, f"NEES of the pose, its 95 % band in grey (cut at {high:.0f})", (-1.0, high), legend)
 
 
 def curve_view(

@@ -18,14 +18,14 @@ Row = Mapping[str, Any]
 CELL = ("world", "strategy", "mode", "association")
 """What the back ends of one cell have in common."""
 CURVES = {
-    "pose_anees": "pose ANEES over the trials as a power of ten, and the 95 % band of its mean",
+    "pose_anees": "log₁₀ of the pose's ANEES over the trials (0 is ideal), and the 95 % band of its mean",
     "pose_error_rms_m": "pose error, rms over the trials, m",
 }
 POWERS = ("pose_anees", "band_low", "band_high")
 """Curves drawn as powers of ten: an overconfident filter would flatten all others."""
 DOTS = {"pose_anees": "pose ANEES", "map_anees": "map ANEES"}
-WIDTH = 1.6
-"""How far apart the back ends stand among the dots, for a power of ten of 1."""
+WIDTH, HEIGHT = 1.6, 1.5
+"""How far apart the back ends stand among the dots, and how high a power of ten is."""
 
 
 class Summary:
@@ -39,7 +39,7 @@ class Summary:
         self._out = out
         self._cells = list(dict.fromkeys(_cell(row) for row in trials))
         self._counts: list[int] = []
-        out.fixed("/campaign", rr.Transform3D(scale=[WIDTH, -1.0, 1.0]))
+        out.fixed("/campaign", rr.Transform3D(scale=[WIDTH, -HEIGHT, 1.0]))
         for k, cell in enumerate(self._cells):
             here = [row for row in trials if _cell(row) == cell]
             self._counts.append(len({row["backend"] for row in here}))
@@ -85,7 +85,8 @@ class Summary:
             lines = [[[-0.6, level], [len(names) - 0.4, level]] for level in levels]
             strong = np.where(levels == 0.0, packed(palette.INK), packed(palette.GRID_STRONG)).astype(np.uint32)
             self._out.fixed(f"{entity}/{name}/levels", rr.LineStrips2D(lines, colors=strong), style(0.7, 1.0))
-            marks = [[-0.75, level] for level in levels]
+            # A label hangs below its point.
+            marks = [[-0.8, level + 0.13] for level in levels]
             white = rr.Points2D(marks, colors=packed(palette.PAGE), labels=[f"{10.0**level:g}" for level in levels])
             self._out.fixed(f"{entity}/{name}/marks", white)
 
@@ -135,7 +136,9 @@ def _spread(seed: int) -> float:
 def _table(cells: Sequence[tuple[str, ...]], trials: Sequence[Row]) -> str:
     columns = ("pose_anees", "pose_nees_in_band", "map_anees", "pose_rmse_m", "coverage", "path_length_m")
     lines = [
-        "Means over the trials; in a cell all back ends met the same worlds, starts and noise.\n",
+        "Means over the trials; in a cell all back ends met the same worlds, starts and noise. "
+        "ANEES: the squared error in units of the stated uncertainty; 1 is ideal, above it an estimator is surer of "
+        "itself than its errors allow, below it too cautious.\n",
         "| cell | back end | trials | complete | " + " | ".join(name.replace("_", " ") for name in columns) + " |",
         "|" + "---|" * (4 + len(columns)),
     ]
@@ -156,12 +159,14 @@ def _dots_view(entity: str, words: str, count: int) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin="/", contents=[f"{entity}/**"], name=f"{words}, a dot a trial; 1 is ideal",
         background=(255, 255, 255),
-        visual_bounds=rrb.VisualBounds2D(x_range=(-2.4, WIDTH * count), y_range=(-4.2, 1.9)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-2.0, WIDTH * (count - 0.2)), y_range=(-3.6 * HEIGHT, 1.8 * HEIGHT)),
     )  # fmt: skip
 
 
 def _curve_view(entity: str, words: str) -> rrb.TimeSeriesView:
+    is_power = entity.rpartition("/")[2] in POWERS
     return rrb.TimeSeriesView(
         origin=entity, name=words, background=rrb.archetypes.PlotBackground(color=(255, 255, 255), show_grid=False),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        axis_y=rrb.ScalarAxis(range=(-1.5, 4.5)) if is_power else None,
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop if is_power else rrb.Corner2D.LeftTop),
     )  # fmt: skip

@@ -8,6 +8,7 @@ from slam.consistency import chi2_band
 from .. import palette
 from .block import Block
 from .colours import packed
+from .map_layers import goal_words
 from .moment import Moment
 from .recording import Recording
 
@@ -19,9 +20,9 @@ POSE_BAND = chi2_band(3)
 """The 95 % band of the pose's NEES."""
 
 
-def curve_style(backend: str, of: str = "") -> rr.SeriesLines:
+def curve_style(backend: str, of: str = "", width: float = 1.6) -> rr.SeriesLines:
     """Return the look of a back end's curves; `of` says more where it has two in one plot."""
-    return rr.SeriesLines(colors=packed(palette.of_backend(backend)), names=backend + of, widths=1.6)
+    return rr.SeriesLines(colors=packed(palette.of_backend(backend)), names=backend + of, widths=width)
 
 
 class Curves:
@@ -30,7 +31,8 @@ class Curves:
     def __init__(self, out: Recording, backend: str) -> None:
         self._out, self._backend = out, backend
         for plot in (TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS):
-            out.fixed(f"/plots/{plot}/{backend}", curve_style(backend, ", closed" if plot == CLOSED else ""))
+            more = (", closed", 4.0) if plot == CLOSED else ()
+            out.fixed(f"/plots/{plot}/{backend}", curve_style(backend, *more))
 
     def send(self, block: Block) -> None:
         """Send the values of some steps."""
@@ -74,13 +76,15 @@ class Decisions:
         self._aside = {(end.wall, end.side) for end in row.set_aside}
         goal = None if row.goal is None else (row.goal.kind, row.goal.wall, row.goal.side, row.goal.reason)
         if row.goal is not None and goal != self._goal:
-            where = f"open end of wall {row.goal.wall}" if row.goal.wall is not None else row.goal.kind
-            follow = f"; follow walls {' '.join(map(str, row.follow))}" if row.follow else ""
-            news.append((f"goal: {where}: {row.goal.reason}{follow}", "INFO"))
+            news.append((f"{goal_words(row.goal)}: {row.goal.reason}", "INFO"))
+            if row.follow:
+                news.append((f"follow walls {' '.join(map(str, row.follow))}", "INFO"))
         self._goal = goal
         if row.ended is not None:
             news.append((f"{row.ended}: {row.reason}", "INFO"))
         elif row.reason and row.reason != self._doing:
-            news.append((row.reason, "DEBUG"))
+            # The reason of the goal stands in a line of its own.
+            why = "" if row.goal is None else f" ({row.goal.reason})"
+            news.append((row.reason.removesuffix(why), "DEBUG"))
         self._doing = row.reason
         return news

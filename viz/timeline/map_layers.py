@@ -5,19 +5,21 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from explore.goal import Goal
 from slam.geometry.lines import normals
 
 from .. import palette
 from .block import Block
 from .colours import packed
-from .moment import Moment
 from .per_wall import PerWall
 from .recording import Recording
 
 END_M = 0.16
 """Radius of the circle at an open end, m."""
+PLACES = {"unseen": "unseen floor", "known-walls": "walls known well", "start": "the start"}
+"""Goals that are no open ends, by their kind, in words."""
 QUANTUM_M = 0.005
 """A thing is drawn again when it has moved by about this."""
 
@@ -25,6 +27,13 @@ QUANTUM_M = 0.005
 def style(radius: float, order: float, **more: Any) -> rr.LineStrips2D:
     """Return what holds for all lines of an entity: half their width in points of the screen, and what lies on top."""
     return rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(radius), draw_order=order, **more)
+
+
+def words_only() -> rr.Points2D:
+    """Return what holds for points that are there for their labels: the viewer gives a label its point's colour."""
+    return rr.Points2D.from_fields(
+        radii=rr.Radius.ui_points(0.1), colors=packed(palette.PAGE), draw_order=50.0, show_labels=True
+    )
 
 
 class Walls:
@@ -77,10 +86,6 @@ class Corners:
             self._out.points(self._entity, block.moments.take(chosen), counts, np.concatenate(tables))
 
 
-def _corners(row: Moment) -> Float[np.ndarray, "c 2"]:
-    return np.concatenate([np.zeros((0, 2)), *(chain.corners_world for chain in row.chains)])
-
-
 class OpenEnds:
     """Circles at open ends; grey where exploration gave one up."""
 
@@ -117,38 +122,55 @@ class Plan:
         self._goal, self._follow = _Sparse(), _Sparse()
         colour = packed(palette.GOAL)
         out.fixed(
-            f"{self._world}/goal",
-            rr.Points2D.from_fields(radii=rr.Radius.ui_points(6), colors=colour, draw_order=42, show_labels=True),
+            f"{self._world}/goal", rr.Points2D.from_fields(radii=rr.Radius.ui_points(7), colors=colour, draw_order=47)
         )
-        out.fixed(f"{self._world}/to_follow", style(6.0, 22.0, colors=packed(palette.TO_FOLLOW)))
+        out.fixed(f"{self._world}/goal/name", words_only())
+        out.fixed(f"{self._world}/to_follow", style(6.0, 22.0, colors=packed(palette.TO_FOLLOW), show_labels=True))
 
     def send(self, block: Block) -> None:
         """Send goal and walls where they changed."""
-        goals = [
-            np.zeros((0, 2)) if row.goal is None or row.ended else row.goal.position_world[None] for row in block.rows
+        goals = [None if row.ended else row.goal for row in block.rows]
+        tables = [
+            np.zeros((0, 3)) if goal is None else np.array([[*goal.position_world, _number(goal.wall)]])
+            for goal in goals
         ]
-        chosen = self._goal.changed(goals)
+        chosen = self._goal.changed(tables)
         if chosen:
-            counts = np.array([len(goals[at]) for at in chosen])
-            places = np.concatenate([goals[at] for at in chosen])
-            self._out.points(
-                f"{self._world}/goal", block.moments.take(chosen), counts, places, labels=["goal"] * len(places)
-            )
+            counts = np.array([len(tables[at]) for at in chosen])
+            places = np.concatenate([tables[at] for at in chosen])[:, :2]
+            labels = [goal_words(goal) for goal in (goals[at] for at in chosen) if goal is not None]
+            when = block.moments.take(chosen)
+            self._out.points(f"{self._world}/goal", when, counts, places)
+            self._out.points(f"{self._world}/goal/name", when, counts, places, labels=labels)
         walls = [_to_follow(block, at) for at in range(len(block))]
-        chosen = self._follow.changed([ends.reshape(-1, 4) for ends in walls])
+        chosen = self._follow.changed([np.column_stack([ids, ends.reshape(-1, 4)]) for ids, ends in walls])
         if chosen:
-            counts = np.array([len(walls[at]) for at in chosen])
-            ends = np.concatenate([walls[at] for at in chosen])
-            self._out.strips(f"{self._world}/to_follow", block.moments.take(chosen), counts, ends)
+            counts = np.array([len(walls[at][0]) for at in chosen])
+            ends = np.concatenate([walls[at][1] for at in chosen])
+            # The goal's label names its own wall.
+            ends_at = [row.goal.wall if row.goal is not None else None for row in (block.rows[at] for at in chosen)]
+            labels = [
+                "" if wall == end else f"wall {wall}"
+                for at, end in zip(chosen, ends_at, strict=True)
+                for wall in walls[at][0]
+            ]
+            self._out.strips(f"{self._world}/to_follow", block.moments.take(chosen), counts, ends, labels=labels)
 
 
-def _to_follow(block: Block, at: int) -> Float[np.ndarray, "k 2 2"]:
+def goal_words(goal: Goal) -> str:
+    """Return a goal in few words, without its reason."""
+    return f"goal: {PLACES.get(goal.kind, goal.kind)}" if goal.wall is None else f"goal: open end of wall {goal.wall}"
+
+
+def _number(wall: int | None) -> int:
+    return -1 if wall is None else wall
+
+
+def _to_follow(block: Block, at: int) -> tuple[Int[np.ndarray, " k"], Float[np.ndarray, "k 2 2"]]:
     """Return the walls to follow, moved a little to their free side so that the walls themselves stay to be seen."""
     row, here = block.rows[at], block.walls_at(at)
-    if not row.follow or row.ended:
-        return np.zeros((0, 2, 2))
-    chosen = np.isin(row.ids, row.follow)
-    return block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]
+    chosen = np.isin(row.ids, () if row.ended else row.follow)
+    return row.ids[chosen], block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]
 
 
 class Swept:

@@ -15,11 +15,11 @@ from .moment import NO_ELLIPSES
 from .per_wall import PerWall
 from .recording import Recording
 
-TIMES = 5.0
+TIMES = 10.0
 """How much its ellipses are enlarged."""
-VAGUE_RAD = float(np.deg2rad(2.0))
+VAGUE_RAD = float(np.deg2rad(1.0))
 """Walls of a less certain direction (short faces, seen from afar) are drawn pale: their ellipses are huge."""
-QUANTUM = 0.015
+QUANTUM = 0.02
 """An enlarged ellipse is drawn again when it has changed by about this, rad or m."""
 
 

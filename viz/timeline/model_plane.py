@@ -34,10 +34,10 @@ class Plane:
         low, high = self.low - 0.5, self.high + 0.5
         ticks = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * np.pi
         step = 5.0 if high - low > 12.0 else 2.0
-        levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+        levels = step * np.arange(np.ceil((low + 0.1 * (high - low)) / step), np.floor(high / step) + 1.0)
         upright = np.array([[[alpha, low], [alpha, high]] for alpha in ticks])
         level = np.array([[[-np.pi, r], [np.pi, r]] for r in levels])
-        names = ["-π", "-π/2", "α = 0", "π/2", "π", *(f"r {r:.0f} m" for r in levels)]
+        names = ["-π", "-π/2", "α = 0", "π/2", "π", *(f"r = {r:.0f} m" for r in levels)]
         places = np.concatenate(
             [np.column_stack([ticks, np.full(5, low - 0.01 * (high - low))]), [[-np.pi - 0.5, r] for r in levels]]
         )

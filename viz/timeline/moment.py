@@ -96,31 +96,40 @@ class Keeper:
 
     def __init__(self) -> None:
         self._own = FreeSpace(FreeSpaceConfig(cell_m=OWN_CELL_M))
-        self._graph_size = (-1, -1)
+        self._graph_shown: tuple[object, bytes] = ((), b"")
         self._colours = ChainColours()
+        self._coloured = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint32))
 
     def moment(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> Moment:
         """Return what is drawn of a step; it asks the step's belief, so before the back end moves on."""
         belief, walls = step.map.belief, step.map
         last = step.ended is not None
+        ids, colours = walls.ids.copy(), self._colours.of_walls(walls.ids, step.chains)
         return Moment(
             step.index, step.time_s, belief.pose_world.copy(), belief.pose_cov.copy(), true_pose_world, step.scan,
-            step.segments, step.matches, step.walls_of_segments, walls.ids.copy(), belief.means.copy(),
-            belief.anchors.copy(), walls.extents.copy(), self._colours.of_walls(walls.ids, step.chains),
-            _ellipses(step, last), step.chains, step.set_aside, step.goal, step.walls_to_follow, step.reason,
-            step.ended, self._sights(step.graph, step.index, last), self._swept(step, last), step.path_length_m,
-            step.seconds,
+            step.segments, step.matches, step.walls_of_segments, ids, belief.means.copy(), belief.anchors.copy(),
+            walls.extents.copy(), colours, _ellipses(step, last, self._recoloured(ids, colours)), step.chains,
+            step.set_aside, step.goal, step.walls_to_follow, step.reason, step.ended,
+            self._sights(step.graph, step.index, last), self._swept(step, last), step.path_length_m, step.seconds,
         )  # fmt: skip
+
+    def _recoloured(self, ids: Int[np.ndarray, " n"], colours: UInt32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        """Return which walls are new or have another colour than at the step before."""
+        (old_ids, old), self._coloured = self._coloured, (ids, colours)
+        if colours is old or not len(old_ids):
+            return np.full(len(ids), colours is not old)
+        rows = np.minimum(np.searchsorted(old_ids, ids), len(old_ids) - 1)
+        return (old_ids[rows] != ids) | (old[rows] != colours)
 
     def _sights(self, graph: "nx.DiGraph[int]", index: int, last: bool) -> Sights | None:
         if not last and index % EVERY_GRAPH:
             return None
-        size = (graph.number_of_nodes(), graph.number_of_edges())
-        if size == self._graph_size:
-            return None
-        self._graph_size = size
         kinds = [(a, b, says["kind"] == NEIGHBOUR) for a, b, says in graph.edges(data=True)]
         table = np.array(kinds, dtype=np.int64).reshape(-1, 3)
+        shown = (tuple(graph.nodes), table.tobytes())
+        if shown == self._graph_shown:
+            return None
+        self._graph_shown = shown
         return Sights(tuple(graph.nodes), table[:, :2], table[:, 2].astype(bool))
 
     def _swept(self, step: Step, last: bool) -> Swept | None:
@@ -134,18 +143,19 @@ class Keeper:
         return _picture(free_space)
 
 
-def _ellipses(step: Step, last: bool) -> Ellipses | None:
-    """Ask for the covariance of the walls just seen, or now and then of all; None at the steps between."""
+def _ellipses(step: Step, last: bool, recoloured: Bool[np.ndarray, " n"]) -> Ellipses | None:
+    """Ask for the covariance of the walls to be drawn anew: just seen, recoloured, now and then all; None for none."""
     belief = step.map.belief
     ids = belief.ids
     if not last and step.index % EVERY_ALL:
-        if step.index % EVERY_SEEN or not len(ids):
+        chosen = recoloured.copy()
+        if step.index % EVERY_SEEN == 0 and len(ids):
+            owners = step.walls_of_segments
+            rows = np.minimum(np.searchsorted(ids, owners), len(ids) - 1)
+            chosen[rows[ids[rows] == owners]] = True
+        if not chosen.any():
             return None
-        owners = step.walls_of_segments
-        rows = np.minimum(np.searchsorted(ids, owners), len(ids) - 1)
-        seen = np.zeros(len(ids), dtype=bool)
-        seen[rows[ids[rows] == owners]] = True
-        ids = ids[seen]
+        ids = ids[chosen]
     joint = belief.joint(ids)
     m = len(ids)
     blocks = joint.cov[3:, 3:].reshape(m, 2, m, 2)[np.arange(m), :, np.arange(m), :]

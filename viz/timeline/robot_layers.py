@@ -4,16 +4,20 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
+from slam.geometry.lines import directions, normals
+
 from .. import palette
-from ..shapes import ellipses
+from ..shapes import ellipses, spread
 from .block import REFUSED, Block
 from .colours import packed
-from .map_layers import style
+from .map_layers import style, words_only
 from .recording import Moments, Recording
 
 ROBOT_M = 0.2
 POSE_TIMES = 10.0
 """How much the robot's ellipse is enlarged."""
+LABEL_M = 0.5
+"""How far apart labels of one step stand at least, m."""
 
 
 class Robot:
@@ -37,13 +41,13 @@ class Robot:
         self._before = send_path(self._out, f"{self._entity}/path", moments, poses, self._before)
 
 
-def body(colour: str) -> rr.LineStrips2D:
-    """Return the robot's outline and nose in its own frame."""
+def body(colour: str, radius: float = 1.6, order: float = 46.0) -> rr.LineStrips2D:
+    """Return the robot's outline and nose in its own frame; half its lines' width in points of the screen."""
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
     outline = ROBOT_M * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     return rr.LineStrips2D(
-        [outline, [[0.0, 0.0], [1.6 * ROBOT_M, 0.0]]], radii=rr.Radius.ui_points(1.6), colors=packed(colour),
-        draw_order=46,
+        [outline, [[0.0, 0.0], [1.6 * ROBOT_M, 0.0]]], radii=rr.Radius.ui_points(radius), colors=packed(colour),
+        draw_order=order,
     )  # fmt: skip
 
 
@@ -61,16 +65,20 @@ def send_path(
 
 
 class Seen:
-    """What one scan showed, in the robot's frame: points, segments, and what matching made of each."""
+    """What one scan showed, in the robot's frame: points, segments, and what matching made of each.
+
+    Why a segment was refused is written beside it, in the world's frame, so that the words do not lie on each other.
+    """
 
     def __init__(self, out: Recording, backend: str) -> None:
-        self._out, self._entity = out, f"/world/{backend}/robot"
+        self._out, self._entity, self._why = out, f"/world/{backend}/robot", f"/world/{backend}/why_refused"
         out.fixed(
             f"{self._entity}/scan",
             rr.Points2D.from_fields(radii=rr.Radius.ui_points(1.7), colors=packed(palette.SCAN), draw_order=43),
         )
-        out.fixed(f"{self._entity}/segments", style(3.2, 40.0, show_labels=False))
-        out.fixed(f"{self._entity}/refused", style(3.6, 41.0, colors=packed(palette.REFUSED), show_labels=True))
+        out.fixed(f"{self._entity}/segments", style(1.7, 40.0, show_labels=False))
+        out.fixed(f"{self._entity}/refused", style(3.2, 41.0, colors=packed(palette.REFUSED)))
+        out.fixed(self._why, words_only())
 
     def send(self, block: Block) -> None:
         """Send the scan, the segments (fused or new), and those that were refused, with the reason."""
@@ -78,14 +86,20 @@ class Seen:
         kinds, words = block.verdicts
         ends = np.concatenate([row.segments.ends for row in block.rows])
         colours = np.array([packed(palette.UNUSED), packed(palette.FUSED), packed(palette.NEW), 0], dtype=np.uint32)
-        for name, chosen in (("segments", kinds != REFUSED), ("refused", kinds == REFUSED)):
-            counts = block.count(chosen)
-            labels = [words[k] for k in np.flatnonzero(chosen)]
-            tint = colours[kinds[chosen]] if name == "segments" else None
-            when = slice(None) if name == "segments" else np.flatnonzero((counts > 0) | np.append(0, counts[:-1] > 0))
-            self._out.strips(
-                f"{self._entity}/{name}", block.moments.take(when), counts[when], ends[chosen], tint, labels=labels
-            )
+        used, refused = np.flatnonzero(kinds != REFUSED), np.flatnonzero(kinds == REFUSED)
+        self._out.strips(
+            f"{self._entity}/segments", block.moments, block.count(used), ends[used], colours[kinds[used]],
+            labels=[words[k] for k in used],
+        )  # fmt: skip
+        counts = block.count(refused)
+        when = np.flatnonzero((counts > 0) | np.append(0, counts[:-1] > 0))
+        moments = block.moments.take(when)
+        self._out.strips(f"{self._entity}/refused", moments, counts[when], ends[refused])
+        at = block.row_of_segment[refused]
+        (x, y), poses = ends[refused].mean(axis=1).T, block.poses[at]
+        places = x[:, None] * normals(poses[:, 2]) + y[:, None] * directions(poses[:, 2]) + poses[:, :2]
+        places[:, 1] = spread(places[:, 1], at, LABEL_M)
+        self._out.points(self._why, moments, counts[when], places, labels=[f"refused: {words[k]}" for k in refused])
 
     def _scan(self, block: Block) -> None:
         bearings = block.rows[0].scan.bearings_rad

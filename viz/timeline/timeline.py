@@ -81,7 +81,7 @@ class Timeline:
             (1, "swept", packed(palette.SWEPT)),
         ]
         self._out.fixed("/world", rr.AnnotationContext(classes))
-        self._out.fixed("/legend", rr.TextDocument(legend(title), media_type="text/markdown"))
+        self._out.fixed("/legend", rr.TextDocument(legend(title, len(self._lanes) == 1), media_type="text/markdown"))
 
     def _layout(self) -> rrb.Blueprint:
         plane = self._plane()

@@ -20,6 +20,9 @@ NeesOf = Callable[
 """From estimated poses, their covariances and the true poses to the NEES of each; NaN where it has none."""
 
 
+BAND_WORDS = {"high": "above: overconfident", "low": "below: too cautious"}
+
+
 class Truth:
     """The true walls, and the true path as far as it is known; the same for all back ends, so sent once."""
 
@@ -40,8 +43,8 @@ class Truth:
         if not new:
             return
         if not self._next:
-            self._out.fixed("/world/truth/path", style(2.4, 10.0, colors=packed(palette.PATH_TRUE_PALE)))
-            self._out.fixed("/world/truth/robot/body", body(palette.PATH_TRUE))
+            self._out.fixed("/world/truth/path", style(4.0, 10.0, colors=packed(palette.PATH_TRUE_PALE)))
+            self._out.fixed("/world/truth/robot/body", body(palette.PATH_TRUE, 3.6, 45.0))
         moments = block.moments.take(new)
         poses = np.array([block.rows[at].true_pose for at in new])
         self._out.poses("/world/truth/robot", moments, poses)
@@ -57,8 +60,8 @@ class Nees:
         self._band_drawn = False
         for plot in (NEES, LOG_NEES):
             out.fixed(f"/plots/{plot}/{backend}", curve_style(backend))
-            for name in ("low", "high"):
-                line = rr.SeriesLines(colors=packed(palette.BAND), names=f"95 % band, {name}", widths=1.5)
+            for name, words in BAND_WORDS.items():
+                line = rr.SeriesLines(colors=packed(palette.BAND), names=words, widths=2.5)
                 out.fixed(f"/plots/{plot}/band/{name}", line)
 
     def send(self, block: Block) -> None:

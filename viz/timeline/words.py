@@ -4,21 +4,21 @@ from .model_layer import TIMES
 from .robot_layers import POSE_TIMES
 
 
-def legend(title: str) -> str:
-    """Return, in Markdown, what is shown and how to move through it."""
+def legend(title: str, plans: bool) -> str:
+    """Return, in Markdown, what is shown and how to move through it; a replay `plans` nothing."""
+    goal = " Yellow: the goal, and the walls to follow there." if plans else ""
     return f"""**{title}**. Drag the time cursor below: everything moves together.
 
-**Map.** Broad grey: true walls. Pink: true path and robot.
-Warm colours: chains of walls still open; cool: closed chains; grey: walls not yet trusted. Black dots: corners.
-Red circles: open ends, which draw the robot; grey circles: given up. Yellow: the goal, and the walls to follow there.
-Pale blue: floor that the scans swept. Thin lines: the visibility graph.
-Robot with its 3σ ellipse, {POSE_TIMES:.0f} times enlarged; dots: the scan;
+**Map**, the estimate over the truth. Broad grey: true walls; pink: true path and robot.
+Estimated walls: orange and brown in chains still open, blue and violet in closed ones, grey not yet trusted;
+black dots: corners. Red circles: open ends, to be explored; grey circles: given up.{goal}
+Robot with its 3σ ellipse, {POSE_TIMES:.0f} times enlarged; small dots: the scan;
 its segments: green fused, blue new, red refused (and why), grey unused.
+Pale blue: floor seen so far. Thin lines: the visibility graph.
 
-**Model space.** Each wall an ellipse of 3σ about its direction α and distance r, {TIMES:.0f} times enlarged
-(pale where the direction is hardly known); red and green: the segments just seen, joined to the
-walls that they were matched to.
+**Model space**: each wall as the 3σ ellipse of its direction α and distance r, {TIMES:.0f} times enlarged;
+green and red: the segments just seen, joined to the walls they were matched to; pale: direction hardly known.
 
-**NEES** of the pose: within the band in 95 % of the steps if the filter knows its own error; above it,
-the filter is overconfident.
+**NEES**: squared pose error in units of the stated uncertainty; outside the band in 5 % of the steps
+if the estimator knows its own error. **Chains**: thick, the closed ones.
 """
