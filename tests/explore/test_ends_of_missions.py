@@ -21,8 +21,9 @@ from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backend import Belief
 from slam.backends import BACKENDS
-from slam.chains import Chain
+from slam.chains import Chain, connect
 from slam.geometry.lines import normals, through
+from slam.robot import Scan
 from slam.stochastic_map import StochasticMap
 
 ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))
@@ -110,6 +111,26 @@ def test_a_start_that_cannot_be_reached_again_is_told():
     around = Surroundings(last.map, last.free_space, last.scan)
     assert homing.command(around, last.chains, nx.DiGraph()) is None
     assert "the start cannot be reached" in homing.closing_words
+
+
+def test_the_last_two_ends_to_be_given_up_may_still_join():
+    """Between them a short face was missed, and neither can be looked at: the next scan's chains are closed."""
+    ring = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    walls, _ = closed_map(ring)
+    walls.extents[0, 1] -= 0.25
+    scan = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, 0.15), 0.01, 4.0, 0.0)
+    around = Surroundings(walls, FreeSpace(), scan)
+    around.free_space.integrate(walls.belief.pose_world, scan)
+    explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
+    before = connect(walls, explorer.set_aside)
+    assert [chain.is_closed for chain in before] == [False]
+    command = explorer.command(around, before, nx.DiGraph())
+    assert set(explorer.set_aside) == {(end.wall, end.side) for end in before[0].open_ends}
+    assert command is not None
+    after = connect(walls, explorer.set_aside)
+    assert [chain.is_closed for chain in after] == [True]
+    assert explorer.command(around, after, nx.DiGraph()) is None
+    assert explorer.outcome is Outcome.ALL_CLOSED
 
 
 @settings(max_examples=60, deadline=None)
