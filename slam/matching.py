@@ -131,6 +131,7 @@ def match(
     chosen = best[best >= 0]
     if clear_only:
         chosen = _compatible(_clear(found, chosen, fits, config), found, joint, config)
+        chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     firm = ~segments.is_tentative[found.segment]
@@ -171,11 +172,21 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     near = np.abs(model.e[:, 1]) < config.offset_m
     segment, line = segment[near], line[near]
     model = Innovations(model.e[near], model.H_pose[near], model.H_line[near], model.R[near])
-    ends_world = to_world(segments.ends[segment], pose)
-    along = np.sum((ends_world - joint.anchors[line][:, None]) * directions(means[line, 0])[:, None], axis=-1)
-    after = along[:, 0] - walls.extents[line, 1]
-    before = walls.extents[line, 0] - along[:, 1]
-    return _Candidates(segment, line, model, _distances(model, line, joint), np.maximum(after, before))
+    gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
+    return _Candidates(segment, line, model, _distances(model, line, joint), gap)
+
+
+def _gaps(
+    ends_robot: Float[np.ndarray, "c 2 2"],
+    extents: Float[np.ndarray, "c 2"],
+    anchors: Float[np.ndarray, "c 2"],
+    alpha: Float[np.ndarray, " c"],
+    pose_world: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, " c"]:
+    """Return the distance along the line from each segment to its wall, m; negative where they overlap by that much."""
+    offsets = to_world(ends_robot, pose_world) - anchors[:, None]
+    along = np.sum(offsets * directions(alpha)[:, None], axis=-1)
+    return np.maximum(along[:, 0] - extents[:, 1], extents[:, 0] - along[:, 1])
 
 
 def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -> np.ndarray:
@@ -238,6 +249,31 @@ def _compatible(
         ]
         chosen = np.delete(chosen, int(np.argmax(losses)))
     return chosen
+
+
+def _still_overlapping(
+    chosen: Int[np.ndarray, " m"],
+    found: _Candidates,
+    segments: Segments,
+    walls: KnownWalls,
+    joint: Joint,
+    config: MatchingConfig,
+) -> Int[np.ndarray, " k"]:
+    """Drop pairs that no longer overlap at the pose that all of them lead to.
+
+    A slip of the wheels by 2 degrees shifts a piece of wall 3 m away by 0.1 m along its line, past the end of the wall
+    between two rooms and onto the next room's.
+    """
+    if not len(chosen):
+        return chosen
+    model = Innovations(*(part[chosen] for part in vars(found.model).values()))
+    H, R = _stack(model, found.line[chosen], len(joint.mean))
+    PHt = joint.cov @ H.T
+    pose = joint.mean[:3] + PHt[:3] @ np.linalg.solve(H @ PHt + R, model.e.ravel())
+    line = found.line[chosen]
+    alpha = joint.mean[3 + 2 * line]
+    gap = _gaps(segments.ends[found.segment[chosen]], walls.extents[line], joint.anchors[line], alpha, pose)
+    return chosen[gap <= -config.overlap_m]
 
 
 def _stack(

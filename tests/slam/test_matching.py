@@ -7,6 +7,7 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.backend import Joint, Observations
 from slam.backends import BACKENDS
+from slam.geometry.lines import through
 from slam.geometry.poses import compose, inverse, wrap
 from slam.mapper import Mapper
 from slam.matching import KnownWalls, MatchingConfig, match, relocate
@@ -183,3 +184,31 @@ def test_the_walls_beside_a_door_stay_two_also_when_the_robot_drives_through(doo
         assert not np.any((low < 2.0 - door / 2 + 0.15) & (high > 2.0 + door / 2 - 0.15))
         assert np.any(high < 2.0)
         assert np.any(low > 2.0)
+
+
+@pytest.mark.parametrize("slip_rad", [-0.05, -0.04, 0.0, 0.05])
+def test_a_slip_of_the_wheels_does_not_shift_a_wall_onto_the_next_rooms(slip_rad):
+    """Two rooms' walls on one line, a wall of 0.1 m between them; only one of them is in the map yet.
+
+    Turned by the slip the other one reaches past the partition, and both directions are off by 2.5 sigmas: within the
+    gate. The two other walls say how far the robot really turned.
+    """
+    pose = np.array([0.0, 0.0, slip_rad])
+    alphas, anchors = np.array([np.pi / 2, np.pi, 0.0]), np.array([[0.0, 1.5], [-1.0, 0.0], [3.0, -1.0]])
+    walls = KnownWalls(np.arange(3), np.array([[-2.0, 2.0], [-1.5, 1.5], [-1.0, 0.95]]))
+    mean = np.concatenate([pose, np.stack([alphas, np.zeros(3)], axis=-1).ravel()])
+    joint = Joint(mean, np.diag([0.01, 0.01, 0.02, *[0.002, 0.003] * 3]) ** 2, anchors)
+    ends = np.array(
+        [[[1.5, 1.5], [-0.8, 1.5]], [[-1.0, 1.2], [-1.0, -1.2]], [[3.0, -1.8], [3.0, -0.4]], [[3.0, 0.05], [3.0, 1.2]]]
+    )
+    lever = np.sum(ends.mean(axis=1) * np.array([[-1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [0.0, 1.0]]), axis=-1)
+    turn = np.array([[[1.0, 0.0], [t, 1.0]] for t in lever])
+    cov = turn @ np.diag([0.004, 0.003]) ** 2 @ turn.swapaxes(1, 2)
+    segments = Segments(
+        through(ends), cov, ends, np.array([[10 * k, 10 * k + 8] for k in range(4)]), np.full(4, 9), np.full((4, 2), 2)
+    )
+    clear = match(segments, walls, joint, clear_only=True)
+    assert clear.pairs.tolist() == [[0, 0], [1, 1], [2, 2]]
+    rest = match(segments.take(clear.unmatched), walls, relocate(joint, walls.ids, clear.observations(segments)))
+    assert rest.unmatched.tolist() == [0]
+    assert not len(rest.doubtful)
