@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from ..backend import Belief, Joint, Observations, StaleBeliefError
 from ..models import Growth, Innovations, Motion, grow, innovations, move
 from ..robot import Odometry
+from .frame import Frame
 from .linear import POSE, Linear, equality, stack
 
 ONE_WALL = 1e-12 * np.eye(2)
@@ -67,7 +68,11 @@ M = TypeVar("M", bound=GaussianMap)
 
 
 class Ekf(Generic[M]):
-    """An EKF on a map; as it stands, every observation counts once, in one joint update a scan."""
+    """An EKF on a map; as it stands, every observation counts once, in one joint update a scan.
+
+    A map whose first wall comes into sight after a drive begins in a frame of its own (`Frame`); the filter then
+    works in that frame, and only `belief` is in the world's.
+    """
 
     def __init__(self, gaussian: M, at_wall: bool, relinearise: bool = True) -> None:
         """Start from a map without lines.
@@ -77,6 +82,8 @@ class Ekf(Generic[M]):
         """
         self._map = gaussian
         self._at_wall, self._relinearise = at_wall, relinearise
+        self._frame: Frame | None = None
+        self._has_driven = False
         self._version = 0
         self._belief: Belief | None = None
 
@@ -90,6 +97,7 @@ class Ekf(Generic[M]):
     def predict(self, odometry: Odometry) -> None:
         """Move the pose by what the wheels report."""
         self._move_on()
+        self._has_driven = True
         motion = self._motion(odometry)
         self._map.move(motion.pose_world, motion.F, motion.W @ odometry.cov @ motion.W.T)
 
@@ -104,6 +112,8 @@ class Ekf(Generic[M]):
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> Int[np.ndarray, " m"]:
         """Add lines seen in the robot frame and return their ids."""
+        if self._at_wall and self._has_driven and not len(self._map.ids):
+            self._begin_frame()
         self._move_on()
         new = self._growth(lines, centres)
         return self._map.append(new.anchors, new.means, new.G_pose, new.G_line @ cov @ new.G_line.swapaxes(1, 2))
@@ -124,6 +134,11 @@ class Ekf(Generic[M]):
         rows = self.belief.rows(ids)
         self._move_on()
         self._map.drop(rows)
+
+    def _begin_frame(self) -> None:
+        """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
+        self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
+        self._map.move(np.zeros(POSE), np.zeros((POSE, POSE)), np.zeros((POSE, POSE)))
 
     def _motion(self, odometry: Odometry) -> Motion:
         return move(self._map.pose_world, odometry.motion)
@@ -174,10 +189,15 @@ class Ekf(Generic[M]):
         self._belief = None
 
     def _new_belief(self) -> Belief:
-        m = self._map
-        return Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, partial(self._query, self._version))
+        m, query = self._map, partial(self._query, self._version)
+        if self._frame is None:
+            return Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, query)
+        pose = self._frame.joint_world(m.joint(np.zeros(0, dtype=np.int64)))
+        anchors, means = self._frame.anchors_world(m.anchors), self._frame.means_world(m.means)
+        return Belief(pose.mean, pose.cov, m.ids, anchors, means, query)
 
     def _query(self, version: int, wanted: Int[np.ndarray, " m"]) -> Joint:
         if version != self._version:
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
-        return self._map.joint(self.belief.rows(wanted))
+        joint = self._map.joint(self.belief.rows(wanted))
+        return joint if self._frame is None else self._frame.joint_world(joint)

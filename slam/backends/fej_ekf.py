@@ -41,6 +41,10 @@ class FejEkf(Ekf[DenseMap]):
         super().merge(keep, drop)
         self._alpha = np.delete(self._alpha, row)
 
+    def _begin_frame(self) -> None:
+        super()._begin_frame()
+        self._position = np.zeros(2)
+
     def _motion(self, odometry: Odometry) -> Motion:
         motion = move(self._map.pose_world, odometry.motion, self._position)
         self._position = motion.pose_world[:2]

@@ -1,0 +1,63 @@
+"""A frame of the map's own, for a map that begins in the blind: where it lies in the world is kept beside the filter.
+
+What a robot lost before it saw its first wall is the same for all it sees afterwards, and no scan can tell it. In the
+state of a filter it is the largest error of all, and each Jacobian taken elsewhere turns a little of it into
+information that was never measured. Here it is a constant: sound to first order, whatever the filter does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from ..backend import Joint
+from ..geometry.lines import directions, normals
+from ..geometry.poses import J, compose, rotation, wrap
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a map's frame lies in the world; independent of everything in the map."""
+
+    pose_world: Float[np.ndarray, "3"]
+    cov: Float[np.ndarray, "3 3"]
+
+    def anchors_world(self, anchors: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m 2"]:
+        """Return anchors (m, 2) m of the map's frame in the world frame: constants still, since the frame is one."""
+        c, s = np.cos(self.pose_world[2]), np.sin(self.pose_world[2])
+        turned = np.stack([c * anchors[:, 0] - s * anchors[:, 1], s * anchors[:, 0] + c * anchors[:, 1]], axis=-1)
+        return np.asarray(turned + self.pose_world[:2])
+
+    def means_world(self, means: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m 2"]:
+        """Return lines (alpha, d) about their anchors in the world frame; a line and its anchor move as one."""
+        return np.stack([wrap(means[:, 0] + self.pose_world[2]), means[:, 1]], axis=-1)
+
+    def joint_world(self, joint: Joint) -> Joint:
+        """Return the Gaussian of pose and lines in the world frame: the map's own error, and the frame's on top.
+
+        With (s, phi) the error of the frame, everything moves as one: dp = s + J (p - o) phi, d_alpha = phi,
+        dd = n·(s + J (c - o) phi), o the frame's origin.
+        """
+        pose, origin = compose(self.pose_world, joint.mean[:3]), self.pose_world[:2]
+        means, anchors = self.means_world(joint.mean[3:].reshape(-1, 2)), self.anchors_world(joint.anchors)
+        by_frame = np.zeros((len(joint.mean), 3))
+        by_frame[:2, :2], by_frame[:2, 2], by_frame[2, 2] = np.eye(2), J @ (pose[:2] - origin), 1.0
+        by_frame[3::2, 2] = 1.0
+        by_frame[4::2, :2] = normals(means[:, 0])
+        by_frame[4::2, 2] = -np.sum(directions(means[:, 0]) * (anchors - origin), axis=-1)
+        cov = self._turned(joint.cov)
+        # Column by column, so that each entry is the same whatever else is asked for.
+        for column in np.linalg.cholesky(self.cov).T:
+            moves = by_frame[:, 0] * column[0] + by_frame[:, 1] * column[1] + by_frame[:, 2] * column[2]
+            cov += moves[:, None] * moves
+        return Joint(np.concatenate([pose, means.ravel()]), cov, anchors)
+
+    def _turned(self, cov: Float[np.ndarray, "s s"]) -> Float[np.ndarray, "s s"]:
+        """Return a covariance with the position's error turned into the world frame."""
+        c, s = np.cos(self.pose_world[2]), np.sin(self.pose_world[2])
+        turned = cov.copy()
+        turned[0], turned[1] = c * cov[0] - s * cov[1], s * cov[0] + c * cov[1]
+        block = rotation(self.pose_world[2]) @ cov[:2, :2] @ rotation(self.pose_world[2]).T
+        turned[:2, :2] = 0.5 * (block + block.T)
+        turned[2:, :2] = turned[:2, 2:].T
+        return turned
