@@ -1,32 +1,44 @@
 """`chainslam view`: what a run left, in Rerun's viewer."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import tyro
 
-from viz.viewer import Viewer, ViewerError
+from viz.viewer import Viewer, ViewerError, available
 
+from .campaign.film import record_campaign
+from .campaign.store import read_campaigns
 from .explore_command import prepare
-from .replay import read_run, replay
+from .replay import RecordedRun, read_run, replay
 from .results import LOG, RECORDING
 from .scenario import UsageError, load_world
 from .timelines import Recording
 
+TRIALS = "trials.csv"
+"""A folder that holds it is that of a campaign."""
+
 
 @dataclass(frozen=True)
 class View:
-    """Open a recording in Rerun's viewer, or a results folder: its recording, or one made now from its log."""
+    """Open a recording in Rerun's viewer, or a results folder: its recording, or one made now and kept in it.
+
+    From a run's log, from the logs of several back ends that replayed one run, or from a campaign's tables.
+    """
 
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
-    """A .rrd file, a run's log.npz, or a results folder that holds either."""
+    """A .rrd file, a run's log.npz, or the folder that `explore`, `replay` or `compare` left."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError where there is nothing to open."""
-        files = recordings_at(self.path)
+        recordings = recordings_at(self.path)
         try:
+            available()
+            files = recordings()
             Viewer(files)
         except ViewerError as error:
             print(f"chainslam: {error}", file=sys.stderr)
@@ -35,29 +47,49 @@ class View:
         return 0
 
 
-def recordings_at(path: Path) -> list[Path]:
-    """Return the recordings at a place, one made from the log if there is none; raises UsageError."""
+def recordings_at(path: Path) -> Callable[[], list[Path]]:
+    """Return what gives the recordings at a place, made now if there are none; raises UsageError for other places."""
     if path.suffix == ".rrd" and path.is_file():
-        return [path]
+        return lambda: [path]
     found = sorted(path.glob("*.rrd")) if path.is_dir() else []
     if found:
-        return found
+        return lambda: found
+    if (path / TRIALS).is_file():
+        return lambda: [_made(path, lambda target: record_campaign(path, read_campaigns(path)[0], target))]
     log = path if path.name == LOG else path / LOG
-    if not log.is_file():
+    logs = [log] if log.is_file() else sorted(path.glob(f"*/{LOG}"))
+    if not logs:
         raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found {path}: name what a run left")
-    return [_made_from(log)]
+    runs = [read_run(each) for each in logs]
+    if not all(_is_same(runs[0], run) for run in runs):
+        raise UsageError(f"expected one run, found several in {path}: name the folder of one")
+    return lambda: [_made(log.parent if len(logs) == 1 else path, lambda target: _record(runs, target))]
 
 
-def _made_from(log: Path) -> Path:
-    """Replay a run's log through the back end that made it, and return the recording beside it."""
-    run = read_run(log)
-    trial, target = run.trial, log.with_name(RECORDING)
-    prepare(target.parent)
-    world = load_world(trial.world, trial.start, trial.scale)
-    title = f"{world.name}: {trial.backend}, seed {trial.seed}, from its log"
-    recording = Recording(title, [trial.backend], world, trial.errorless, target)
-    replay(run, trial.backend, watch=recording.watch(trial.backend, lambda step: run.true_poses_world[step.index]))
-    problems = recording.close()
+def _is_same(one: RecordedRun, other: RecordedRun) -> bool:
+    """Whether two logs hold the same scans and odometry."""
+    a, b = one.recording, other.recording
+    return np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) and np.array_equal(a.odometry, b.odometry)
+
+
+def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
+    """Return the recording that was made in a folder; raises UsageError where it could not be written."""
+    prepare(folder)
+    target = folder / RECORDING
+    problems = record(target)
     if problems:
-        raise UsageError(f"expected to record {log.name} beside it, found {problems[0]}: free the place and try again")
+        raise UsageError(f"expected to keep a recording in {folder}, found {problems[0]}: free the place and try again")
     return target
+
+
+def _record(runs: list[RecordedRun], target: Path) -> list[str]:
+    """Replay each run's log through the back end that made it, all in one recording; return what went wrong."""
+    run = runs[0]
+    trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
+    world = load_world(trial.world, trial.start, trial.scale)
+    title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, own association"
+    recording = Recording(title, backends, world, trial.errorless, target)
+    for backend in backends:
+        if recording.is_on:
+            replay(run, backend, watch=recording.watch(backend, lambda step: run.true_poses_world[step.index]))
+    return recording.close()

@@ -24,13 +24,7 @@ class Viewer:
 
     def __init__(self, files: Sequence[Path] = ()) -> None:
         """Start it with some recordings, or empty; raises ViewerError."""
-        executable = _executable()
-        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & {
-            name for name, v in os.environ.items() if v
-        }:
-            raise ViewerError(
-                "expected a display for the viewer, found none: record with --rrd FILE and open it where there is one"
-            )
+        executable = available()
         self._port = _free_port()
         command = [executable, "--bind", LOOPBACK, "--port", str(self._port), "--hide-welcome-screen", *map(str, files)]
         # A session of its own: Ctrl-C ends the run, not the picture of it.
@@ -57,6 +51,17 @@ class Viewer:
         raise ViewerError(
             "expected Rerun's viewer to open, found that it ended at once: record with --rrd FILE and try `rerun FILE`"
         )
+
+
+def available() -> str:
+    """Return the viewer's path; raises ViewerError where there is none, or no display to show it on."""
+    executable = _executable()
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not display:
+        raise ViewerError(
+            "expected a display for the viewer, found none: record with --rrd FILE and open it where there is one"
+        )
+    return executable
 
 
 def _executable() -> str:

@@ -271,21 +271,6 @@ def test_without_a_display_the_viewer_is_one_line_and_the_results_are_kept(tmp_p
     assert (tmp_path / "summary.json").is_file()
 
 
-def test_view_opens_a_file_or_makes_a_recording_from_a_log(runs, capsys, monkeypatch):
-    opened = []
-    monkeypatch.setattr("experiments.view_command.Viewer", opened.append)
-    assert main(["view", str(runs.rrd)]) == 0
-    assert main(["view", str(runs.rrd.parent)]) == 0
-    assert main(["view", str(runs.plain)]) == 0
-    assert opened == [[runs.rrd], [runs.rrd], [runs.plain / "run.rrd"]]
-    times, _ = scalars(runs.plain / "run.rrd", "/plots/nees/full-ekf")
-    assert len(times) == STEPS
-    (runs.plain / "run.rrd").unlink()
-    capsys.readouterr()
-    assert main(["view", str(runs.plain / "summary.json")]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-
-
 def test_a_recording_needs_no_pandas_and_leaves_it_as_it_was(tmp_path):
     code = f"""
 import io, sys
