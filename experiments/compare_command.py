@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from .campaign.contrast import contrast, read_contrast
+from .campaign.contrast_page import verdict
 from .campaign.film import record_campaign
 from .campaign.merge import merge
 from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign, trials
@@ -54,6 +56,8 @@ class Compare:
     """Address of a Dask scheduler whose workers run the trials, in place of `--jobs`."""
     merge: tuple[Path, ...] = ()
     """Folders of campaigns to put together into one, in place of running any."""
+    against: tuple[Path, Path] | None = None
+    """Folders of two campaigns to hold against each other, trial by trial, in place of running any."""
 
     rrd: Path | None = None
     """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this file."""
@@ -78,12 +82,8 @@ class Compare:
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
-        if self.merge:
-            if self.rrd is not None:
-                raise UsageError("expected --rrd with a campaign that runs, found --merge: leave one of them out")
-            merge(self.merge, self.out)
-            print(f"results in {self.out}")
-            return 0
+        if self.merge or self.against:
+            return self._of_others()
         campaign = self.campaign
         check_campaign(campaign)
         if self.jobs is not None and self.jobs < 1:
@@ -105,3 +105,19 @@ class Compare:
         for problem in problems:
             print(f"chainslam: not written: {problem}", file=sys.stderr)
         return 1 if problems else 0
+
+    def _of_others(self) -> int:
+        """Merge campaigns or hold two against each other; raises UsageError."""
+        if self.rrd is not None:
+            word = "--merge" if self.merge else "--against"
+            raise UsageError(f"expected --rrd with a campaign that runs, found {word}: leave one of them out")
+        if self.merge and self.against:
+            raise UsageError("expected either --merge or --against, found both: leave one of them out")
+        if self.against is None:
+            merge(self.merge, self.out)
+        else:
+            contrast(*self.against, self.out)
+            for words in verdict(read_contrast(self.out)):
+                print(words)
+        print(f"results in {self.out}")
+        return 0

@@ -43,16 +43,18 @@ class Pictures:
 
     def run(self) -> None:
         """Write the pictures; raises UsageError where a folder holds no run."""
-        runs = [_read(folder) for folder in self.runs]
+        runs = [read_pictured(folder) for folder in self.runs]
         prepare(self.out)
-        for name, draw in _pictures(runs).items():
+        for name, draw in draw_all(runs).items():
             figure = draw()
             for kind in self.kinds:
                 write(self.out / f"{name}.{kind}", saved(figure, kind))
 
 
 @dataclass(frozen=True)
-class _Run:
+class PicturedRun:
+    """What pictures of a run are drawn from."""
+
     trial: TrialConfig
     log: dict[str, Any]
     walls: dict[str, Any]
@@ -60,7 +62,8 @@ class _Run:
     nees: Float[np.ndarray, " s"]
 
 
-def _read(folder: Path) -> _Run:
+def read_pictured(folder: Path) -> PicturedRun:
+    """Read a run's folder; raises UsageError where it holds none."""
     trial = read_trial(folder / "config.json")
     try:
         with np.load(folder / LOG) as log, np.load(folder / "map.npz") as walls:
@@ -72,10 +75,13 @@ def _read(folder: Path) -> _Run:
             table = np.genfromtxt(stream, delimiter=",", usecols=at, ndmin=2)
     except (OSError, ValueError, KeyError) as error:
         raise UsageError(f"expected a run's results in {folder}, found {error}: name what `explore` left") from error
-    return _Run(trial, arrays, mapped, table[:, :3], table[:, 3])
+    return PicturedRun(trial, arrays, mapped, table[:, :3], table[:, 3])
 
 
-def _pictures(runs: list[_Run]) -> dict[str, Callable[[], Figure]]:
+def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
+    """Return, by name, what draws each picture of runs in one world; nothing for no run."""
+    if not runs:
+        return {}
     first = runs[0]
     trial = first.trial
     world = load_world(trial.world, trial.start, trial.scale)

@@ -1,4 +1,4 @@
-"""`chainslam report`: a campaign as one page that a person reads."""
+"""`chainslam report`: a campaign, two held against each other, or a run, as one page that a person reads."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,26 +6,29 @@ from typing import Annotated
 
 import tyro
 
-from viz.report import html, latex
+from viz.report import Page, html, latex
 
+from .campaign.contrast import CONTRAST
+from .campaign.contrast_page import contrast_page
 from .campaign.page import page_of
 from .files import write
+from .run_page import is_run, run_page
 
 REPORT, TABLES = "report.html", "tables.tex"
 
 
 @dataclass(frozen=True)
 class Report:
-    """Write what a campaign found as one HTML file that holds everything, for a screen, a phone or paper."""
+    """Write what a campaign or a run found as one HTML file that holds everything, for a screen, a phone or paper."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """The folder that `compare --out` made."""
+    """The folder that `compare`, `explore` or `replay` left."""
     latex: bool = False
     """Write the tables as LaTeX, too."""
 
     def run(self) -> int:
-        """Run the command and return its exit status; raises UsageError for a folder without a campaign."""
-        page = page_of(self.folder)
+        """Run the command and return its exit status; raises UsageError for a folder without results."""
+        page = _page(self.folder)
         write(self.folder / REPORT, html(page))
         print(f"report in {self.folder / REPORT}")
         if self.latex:
@@ -33,3 +36,10 @@ class Report:
             write(self.folder / TABLES, latex(tables))
             print(f"tables in {self.folder / TABLES}")
         return 0
+
+
+def _page(folder: Path) -> Page:
+    if (folder / CONTRAST).is_file():
+        return contrast_page(folder)
+    # A campaign keeps no summary.json; its recordings lie two folders further down.
+    return run_page(folder) if is_run(folder) else page_of(folder)

@@ -76,16 +76,20 @@ def in_order(found: Iterable[Trial], levels: Campaign) -> list[Trial]:
 def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
     if not store.has(trial):
         raise UsageError(f"expected a campaign that is done, found {store.folder} without {trial.path}: run it again")
-    if trial in found and not _same(found[trial].record(trial), store.record(trial)):
+    if trial in found and not same(found[trial].record(trial), store.record(trial)):
         raise UsageError(f"expected one result of {trial.path}, found two that differ: merge campaigns of one version")
     found.setdefault(trial, store)
 
 
-def _same(first: Record, second: Record) -> bool:
-    summaries = [{k: v for k, v in record.summary.items() if k not in TIMED} for record in (first, second)]
-    arrays = [first.arrays, second.arrays]
-    return (
-        summaries[0] == summaries[1]
-        and arrays[0].keys() == arrays[1].keys()
-        and all(np.array_equal(a, arrays[1][name], equal_nan=True) for name, a in arrays[0].items())
+def same(first: Record, second: Record) -> bool:
+    """Return whether two results are the same, times apart."""
+    keys = [record.summary.keys() - TIMED for record in (first, second)]
+    return keys[0] == keys[1] and first.arrays.keys() == second.arrays.keys() and agree(first, second)
+
+
+def agree(first: Record, second: Record) -> bool:
+    """Return whether two results are the same in all that both hold, times apart: a later version may keep more."""
+    keys, names = first.summary.keys() & second.summary.keys() - TIMED, first.arrays.keys() & second.arrays.keys()
+    return all(first.summary[key] == second.summary[key] for key in keys) and all(
+        np.array_equal(first.arrays[name], second.arrays[name], equal_nan=True) for name in names
     )

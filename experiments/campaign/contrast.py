@@ -1,0 +1,123 @@
+"""Two campaigns held against each other, trial by trial: which trials differ, and by how much on the whole."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ..files import csv_bytes, json_bytes, write
+from ..scenario import UsageError
+from .comparison import MEASURES, Row, difference, select
+from .merge import agree, in_order, union
+from .plan import Trial, trials
+from .store import Store, opened_anew, read_campaigns, read_config
+from .tables import trial_row
+
+CONTRAST, TRIALS = "contrast.json", "contrast.csv"
+SETTINGS = ("driver", "p0", "max_steps")
+NAMES = ("world", "strategy", "backend", "mode", "association", "seed")
+COMPARED = ("status", "steps", "path_length_m", "coverage", *(measure.name for measure in MEASURES))
+"""Columns that are written for both, where a trial differs."""
+
+
+def contrast(first: Path, second: Path, out: Path) -> None:
+    """Write how the second campaign differs from the first; raises UsageError where they share no trial.
+
+    `contrast.csv` has a row for each trial that came out differently, `contrast.json` the paired differences, second
+    less first or second over first, for each back end in each arm.
+    """
+    ours, theirs = _stores(first), _stores(second)
+    _same_worlds(first, second)
+    levels = union([store.campaign for store in (*ours.values(), *theirs.values())])
+    both = in_order(ours.keys() & theirs.keys(), levels)
+    if not both:
+        raise UsageError(f"expected campaigns that share trials, found {first} and {second} with none: name others")
+    rows: tuple[list[Row], list[Row]] = ([], [])
+    different = []
+    for trial in both:
+        records = ours[trial].record(trial), theirs[trial].record(trial)
+        pair = tuple(trial_row(record) for record in records)
+        for side, row in zip(rows, pair, strict=True):
+            side.append(row)
+        if not agree(*records):
+            different.append(_side_by_side(*pair))
+    said = {
+        "first": str(first),
+        "second": str(second),
+        "settings": _settings(first, second),
+        "trials": {
+            "shared": len(both),
+            "the_same": len(both) - len(different),
+            "different": len(different),
+            "only_first": len(ours) - len(both),
+            "only_second": len(theirs) - len(both),
+        },
+        "status": _statuses(*rows),
+        "differences": _differences(*rows),
+        "different_trials": different,
+    }
+    with opened_anew(out):
+        header = list(different[0]) if different else [*NAMES]
+        write(out / TRIALS, csv_bytes(header, [[row[name] for name in header] for row in different]))
+        write(out / CONTRAST, json_bytes(said))
+
+
+def read_contrast(folder: Path) -> dict[str, Any]:
+    """Return what `contrast` left in a folder; raises UsageError."""
+    try:
+        said: dict[str, Any] = json.loads((folder / CONTRAST).read_text())
+        return said
+    except (OSError, ValueError) as error:
+        raise UsageError(f"expected a {CONTRAST} in {folder}, found none: run `compare --against` first") from error
+
+
+def _stores(folder: Path) -> dict[Trial, Store]:
+    """Return where each trial of a campaign stands; those that have no result are left out."""
+    stores = [Store(folder, campaign) for campaign in read_campaigns(folder)]
+    return {trial: store for store in stores for trial in trials(store.campaign) if store.has(trial)}
+
+
+def _same_worlds(first: Path, second: Path) -> None:
+    digests = [read_config(folder)["worlds_sha256"] for folder in (first, second)]
+    for world in sorted(digests[0].keys() & digests[1].keys()):
+        if digests[0][world] != digests[1][world]:
+            raise UsageError(f"expected one world {world}, found two that differ: rename one and run it again")
+
+
+def _settings(first: Path, second: Path) -> dict[str, list[Any]]:
+    """Return what the two were run with where it is not the same: settings, versions, commit."""
+    pair = [_made_with(folder) for folder in (first, second)]
+    names = sorted(pair[0].keys() | pair[1].keys())
+    return {name: [made.get(name) for made in pair] for name in names if pair[0].get(name) != pair[1].get(name)}
+
+
+def _made_with(folder: Path) -> dict[str, Any]:
+    config, campaigns = read_config(folder), read_campaigns(folder)
+    made = config if "versions" in config else config["from"][0]
+    plain: dict[str, Any] = {name: asdict(campaigns[0])[name] for name in SETTINGS}
+    return plain | {"commit": made["commit"]} | made["versions"]
+
+
+def _side_by_side(first: Row, second: Row) -> Row:
+    sides = {"first": first, "second": second}
+    values = {f"{name}_{side}": row.get(name) for name in COMPARED for side, row in sides.items()}
+    return {name: first[name] for name in NAMES} | values
+
+
+def _statuses(first: Sequence[Row], second: Sequence[Row]) -> Mapping[str, int]:
+    """Return how often a trial went from one status to another."""
+    changes = [f"{a['status']} -> {b['status']}" for a, b in zip(first, second, strict=True)]
+    return {change: changes.count(change) for change in dict.fromkeys(changes)}
+
+
+def _differences(first: Sequence[Row], second: Sequence[Row]) -> list[Row]:
+    """Compare by each measure, for each back end in each arm."""
+    cells = dict.fromkeys((row["backend"], row["mode"], row["association"]) for row in first)
+    found = []
+    for (backend, mode, association), measure in product(cells, MEASURES):
+        names = {"backend": backend, "mode": mode, "association": association}
+        pair = (select(second, **names), select(first, **names))
+        found.append(names | difference(*pair, measure))
+    return found
