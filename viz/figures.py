@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from io import BytesIO
+from textwrap import wrap
 from typing import Literal
 
 import matplotlib as mpl
@@ -25,6 +26,8 @@ WALL_M = 0.1
 """How thick true walls are drawn around the floor, m."""
 MARGIN_M = 0.6
 ROBOT_M = 0.2
+LETTER_INCH = 0.072
+"""Mean width of a letter of the subtitle."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,10 @@ def draw_map(picture: Picture) -> Figure:
         *_robot(axes, picture),
     ]
     top = 1.0 + 0.12 / height
-    axes.text(0.0, top + 0.26 / height, picture.title, transform=axes.transAxes, size=13, weight="bold", va="bottom")
-    axes.text(0.0, top, picture.subtitle, transform=axes.transAxes, size=9, color="#5A5A5A", va="bottom")
+    words = wrap(picture.subtitle, int((width + 0.2) / LETTER_INCH))
+    above = top + (0.1 + 0.16 * len(words)) / height
+    axes.text(0.0, above, picture.title, transform=axes.transAxes, size=13, weight="bold", va="bottom")
+    axes.text(0.0, top, "\n".join(words), transform=axes.transAxes, size=9, color="#5A5A5A", va="bottom")
     figure.legend(
         handles=handles, loc="lower center", ncols=4 if width > 6 else 3, frameon=False, fontsize=8, handlelength=2.2
     )
