@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test check bench docs smoke compare random strategies
+.PHONY: setup demo test check bench docs smoke compare random strategies bias heading
 
 setup: .venv/made
 
@@ -29,6 +29,13 @@ bench: setup
 
 random: setup
 	$(BIN)/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
+
+bias: setup
+	$(BIN)/python -m experiments.bias_study --strategies nearest-robot nearest-start --out results/bias.csv
+	$(BIN)/python -m experiments.bias_study --association own --out results/bias-own.csv
+
+heading: setup
+	$(BIN)/python -m experiments.heading_study --out results/heading.csv --picture results/heading.png
 
 strategies: setup
 	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv

@@ -73,10 +73,11 @@ def rows_of(study: Study, task: tuple[Loop, int]) -> Rows:
     """Make one ring and send its drive through every back end."""
     loop, seed = task
     seen = drive(loop, seed)
-    return {study.key(loop, name, seed): _ridden(study.p0, name, loop, seed, seen) for name in study.backends}
+    return {study.key(loop, name, seed): ridden_scores(study.p0, name, loop, seed, seen) for name in study.backends}
 
 
-def _ridden(p0: str, name: str, loop: Loop, seed: int, seen: Sightings) -> Sequence[Any]:
+def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: Sightings) -> Sequence[Any]:
+    """Return the scores of one back end on one ring's drive: None where its covariance is none."""
     ridden = ride(BACKENDS[name].make(*start(seed, seen.true_poses_world[0], p0)), seen)
     heading = np.abs(wrap(ridden.estimated_world[:, 2] - ridden.true_poses_world[:, 2])).max()
     rest = float(np.rad2deg(heading)), len(ridden.true_lines_world)

@@ -31,6 +31,7 @@ MEASURES = (
     Measure("map_anees", True),
     Measure("ate_m", True),
     Measure("wall_rmse_m", True),
+    Measure("wall_shape_m", True),
     Measure("heading_rmse_rad", True),
     Measure("path_length_m", True),
     Measure("duplicate_lines", False),
@@ -39,8 +40,12 @@ MEASURES = (
     Measure("double_entries", False),
 )
 MEANS = (
-    *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "heading_rmse_rad"),
+    *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "heading_rmse_rad"),
     *("nis_mean", "nis_whiteness"),
+)
+AT_MARKS = (
+    *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),
+    "duplicate_lines",
 )
 SUMS = (
     *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"),
@@ -231,10 +236,8 @@ def _marks(rows: Sequence[Row]) -> list[Row]:
     found = []
     for cell, mine in cells.items():
         states = [row["state"] for row in mine]
-        scores = {
-            name: _mean([row.get(name) for row in mine if row["state"] != "failed"])
-            for name in ("pose_error_m", "wall_rmse_m", "pose_anees_so_far", "map_anees", "coverage", "duplicate_lines")
-        }
+        alive = [row for row in mine if row["state"] != "failed"]
+        scores = {name: _mean([row.get(name) for row in alive]) for name in AT_MARKS}
         found.append(
             dict(zip(("world", "strategy", "backend", "arm", "metres"), cell, strict=True))
             | {state: states.count(state) for state in ("driving", "finished", "failed")}

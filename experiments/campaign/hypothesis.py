@@ -16,6 +16,7 @@ DECISIVE = "33"
 """Metres driven at which the verdict is taken: the length of the paper's first experiment."""
 MEASURES = (
     Measure("wall_rmse_m", True),
+    Measure("wall_shape_m", True),
     Measure("pose_error_m", True, 1e-4),
     Measure("pose_anees_so_far", True),
     Measure("uncovered", False),

@@ -38,6 +38,10 @@ def page_of(folder: Path) -> Page:
         raise UsageError(
             f"expected a campaign that is done, found {folder} without its comparison.json: run `compare` to its end"
         ) from error
+    if "findings" not in said:
+        raise UsageError(
+            f"expected a comparison of this version, found an earlier one in {folder}: run `compare` again"
+        )
     made = config if "versions" in config else config["from"][0]
     return Page(
         "What neglecting the cross-correlations costs",
@@ -112,12 +116,13 @@ _HONESTY_WORDS = (
     " ideally 1 and 0.",
 )
 _ERROR_HEADER = (
-    *("back end", "walls, cm", "path, cm", "heading, degrees", "entered twice", "of these merged", "false matches"),
-    *("missed matches %", "sightings"),
+    *("back end", "walls, cm", "shape, cm", "path, cm", "heading, degrees", "entered twice", "of these merged"),
+    *("false matches", "missed matches %", "sightings"),
 )
 _ERROR_WORDS = (
-    "Over all worlds and strategies; walls, path and heading are rms errors. Matches are held against the truth; a gate"
-    " of 99 % misses 1 % of them where the estimate is honest.",
+    "Over all worlds and strategies, rms. Walls: after undoing the error of the start; shape: after the best shift and"
+    " turn of the whole map. Matches are held against the truth; a gate of 99 % misses 1 % of them where the estimate"
+    " is honest.",
 )
 
 
@@ -142,7 +147,7 @@ def _nis_row(row: dict[str, Any]) -> tuple[str, ...]:
 def _error_row(row: dict[str, Any]) -> tuple[str, ...]:
     return (
         row["backend"],
-        *(mean(row[name], scale=100.0) for name in ("wall_rmse_m", "ate_m")),
+        *(mean(row[name], scale=100.0) for name in ("wall_rmse_m", "wall_shape_m", "ate_m")),
         mean(row["heading_rmse_rad"], scale=180.0 / pi),
         *(number(row[name]) for name in ("double_entries", "merges", "matches_false")),
         percent(row["missed_share"] and row["missed_share"]["mean"]),

@@ -11,7 +11,7 @@ from slam.backend import Joint
 from slam.chains import Chain
 from slam.consistency import bound_margins
 from slam.geometry.lines import normals
-from slam.geometry.poses import to_world, wrap
+from slam.geometry.poses import J, to_world, wrap
 from slam.stochastic_map import StochasticMap
 from slam.trajectories import ate, position_errors, rpe
 
@@ -71,7 +71,7 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
         "ate_aligned_m": ate(log.estimated_world, log.true_world, align=True),
         "rpe_m": shift,
         "rpe_rad": turn,
-        **{key: summary["marks"][END][key] for key in ("wall_rmse_m", "joint_anees")},
+        **{key: summary["marks"][END][key] for key in ("wall_rmse_m", "wall_shape_m", "joint_anees")},
         **association_counts(observer.fates, result.votes),
         "nis_mean": None,
         "nis_whiteness": None,
@@ -108,6 +108,7 @@ class _Scorer:
         k, walls, log = moment.index, moment.map, self.log
         firm, labels = ~walls.tentative, self.votes.walls_of(walls.ids)
         among, true_pose = firm & (labels >= 0), log.true_world[k]
+        off, shape = wall_errors(walls, self.votes, among, self.to_true)
         return {
             "step": k,
             "path_length_m": moment.path_length_m,
@@ -117,7 +118,8 @@ class _Scorer:
             "pose_anees_so_far": _or_none(np.mean(self.nees[: k + 1]) / 3.0),
             "pose_trace": float(np.trace(log.estimated_cov[k])),
             "coverage": self.coverage(moment),
-            "wall_rmse_m": wall_rmse(walls, self.votes, among, self.to_true),
+            "wall_rmse_m": off,
+            "wall_shape_m": shape,
             "map_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among),
             "joint_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among, with_pose=True),
             "lines": len(walls),
@@ -129,14 +131,28 @@ def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def wall_rmse(walls: StochasticMap, votes: Votes, among: np.ndarray, to_true: Float[np.ndarray, "3"]) -> float | None:
-    """Return how far the ends of mapped walls lie from the lines of their true walls, rms, m."""
+def wall_errors(
+    walls: StochasticMap, votes: Votes, among: np.ndarray, to_true: Float[np.ndarray, "3"]
+) -> tuple[float | None, float | None]:
+    """Return how far the ends of mapped walls lie from the lines of their true walls, rms, m; None without a wall.
+
+    First as the map lies, then after the small shift and turn of the whole map that make it least: its shape alone.
+    """
     if not among.any():
-        return None
+        return None, None
     lines = votes.truth.lines[votes.faces_of(walls.ids[among])]
     ends = to_world(walls.ends_world[among], to_true)
-    across = np.einsum("mei,mi->me", ends, normals(lines[:, 0])) - lines[:, 1, None]
-    return float(np.sqrt(np.mean(across**2)))
+    return offsets(ends, lines)
+
+
+def offsets(points: Float[np.ndarray, "m k 2"], lines: Float[np.ndarray, "m 2"]) -> tuple[float, float]:
+    """Return the rms distance of points from a line each, m, as they lie and after the best small shift and turn."""
+    n = np.repeat(normals(lines[:, 0]), points.shape[1], axis=0)
+    flat = points.reshape(-1, 2)
+    across = np.sum(flat * n, axis=1) - np.repeat(lines[:, 1], points.shape[1])
+    by_motion = np.column_stack([n, np.sum(n * (flat @ J.T), axis=1)])
+    rest = across - by_motion @ np.linalg.lstsq(by_motion, across, rcond=None)[0]
+    return float(np.sqrt(np.mean(across**2))), float(np.sqrt(np.mean(rest**2)))
 
 
 def _step_arrays(log: Log, nees: Float[np.ndarray, " s"]) -> dict[str, np.ndarray]:

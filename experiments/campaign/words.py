@@ -13,6 +13,7 @@ MEASURE_WORDS = {
     "map_anees": "map ANEES",
     "ate_m": "error of the path",
     "wall_rmse_m": "error of the walls",
+    "wall_shape_m": "error of the map's shape",
     "heading_rmse_rad": "error of the heading",
     "path_length_m": "way driven",
     "duplicate_lines": "walls left twice in the map",
@@ -33,7 +34,7 @@ def verdict(hypothesis: dict[str, Any] | None) -> tuple[str, ...]:
         )
     mark = hypothesis["decisive_mark"]
     at = hypothesis["marks"][mark]
-    wall, honesty = at["wall_rmse_m"], at["pose_anees_so_far"]
+    wall, shape, honesty = at["wall_rmse_m"], at["wall_shape_m"], at["pose_anees_so_far"]
     contender, baseline = hypothesis["contender"], hypothesis["baseline"]
     where = "at the end of the run" if mark == END else f"after {mark} m driven"
     if wall["value"] is None:
@@ -48,8 +49,18 @@ def verdict(hypothesis: dict[str, Any] | None) -> tuple[str, ...]:
         f"{answer}: {where}, {says[hypothesis['verdict']]}: the walls of its map are"
         f" {number(wall['value'])} times as far off (95 % interval {interval(wall)}; {wall['runs']} pairs of runs;"
         f" a match is an interval below {hypothesis['matches_within']}).",
+        _shape(shape),
         _honesty(honesty),
         f"{_states(at['contender'], contender)}; {_states(at['baseline'], baseline)}. {_covered(at['uncovered'])}",
+    )
+
+
+def _shape(ratio: dict[str, Any]) -> str:
+    if ratio["value"] is None:
+        return "How well the shapes of the maps compare cannot be told."
+    return (
+        "The shape of its map alone, wherever the map as a whole has drifted to, is"
+        f" {number(ratio['value'])} times as far off (95 % interval {interval(ratio)})."
     )
 
 

@@ -1,12 +1,19 @@
 """What the studies of back ends rest on: sightings told wall by wall, noise as stated, rings of corridors."""
 
+import csv
+from dataclasses import replace
+
 import jaxtyping
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.bias_study import Study as BiasStudy
+from experiments.campaign.score import offsets
 from experiments.corridor import FIRM_RAD, Loop, drive, on_ring
+from experiments.faults import Fault, faulty
+from experiments.heading_study import Study as HeadingStudy
 from experiments.loop_study import SCORES, Study
 from experiments.oracles import as_stated
 from experiments.origin_study import Study as OriginStudy
@@ -19,6 +26,7 @@ from experiments.study_table import bootstrap
 from experiments.trial import run_trial
 from slam.backends import BACKENDS
 from slam.backends.full_ekf import FullEkf
+from slam.geometry.poses import compose, to_world, wrap
 from slam.models import innovations
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
@@ -144,6 +152,94 @@ def test_the_origin_matters_to_lines_that_are_measured_from_it_alone():
     here, there, apart = study.ridden(FullEkf, False, 1)
     assert apart > 1e-3
     assert there > 1.2 * here
+
+
+def test_a_map_that_has_only_moved_keeps_its_shape():
+    """Offsets of points from their lines: all of a small shift and turn, none once they are undone."""
+    rng = np.random.default_rng(8)
+    lines = np.stack([rng.uniform(-np.pi, np.pi, 9), rng.uniform(1.0, 5.0, 9)], axis=-1)
+    n, t = (
+        np.stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])], -1),
+        np.stack([-np.sin(lines[:, 0]), np.cos(lines[:, 0])], -1),
+    )
+    points = lines[:, 1, None, None] * n[:, None] + np.array([-1.0, 2.0])[:, None] * t[:, None]
+    assert offsets(points, lines) == pytest.approx((0.0, 0.0), abs=1e-12)
+    off, shape = offsets(to_world(points.reshape(-1, 2), np.array([0.02, -0.01, 1e-3])).reshape(-1, 2, 2), lines)
+    assert off > 0.01
+    assert shape < 1e-5
+    points[0] += 0.05 * n[0]
+    assert offsets(points, lines)[1] > 0.005
+
+
+def test_a_fault_changes_what_is_reported_and_nothing_else():
+    run = recorded(run_trial(TrialConfig("paper-fig4", seed=4, max_steps=12)))
+    old = run.recording
+    assert faulty(run, Fault()) is run
+    again = faulty(run, Fault("range-noise", old.sigma_m))
+    np.testing.assert_array_equal(again.recording.ranges_m, old.ranges_m)
+    np.testing.assert_array_equal(again.true_face_of_beam, run.true_face_of_beam)
+    louder = faulty(run, Fault("range-noise", 2 * old.sigma_m)).recording
+    assert louder.sigma_m == 2 * old.sigma_m
+    assert np.nanmax(np.abs(louder.ranges_m - old.ranges_m)) > 2 * old.sigma_m
+    longer = faulty(run, Fault("wheel-scale", 0.1)).recording
+    np.testing.assert_allclose(longer.odometry, 1.1 * old.odometry)
+    bent = faulty(run, Fault("heading", 10.0)).recording.odometry - old.odometry
+    way = np.hypot(*old.odometry[:, :2].T)
+    np.testing.assert_allclose(bent, np.outer(way, [0.0, 0.0, np.deg2rad(10.0)]), atol=1e-15)
+    off = faulty(run, Fault("range", 0.02)).recording.ranges_m - old.ranges_m
+    np.testing.assert_allclose(off[np.isfinite(off)], 0.02, atol=1e-12)
+    with pytest.raises(ValueError, match="expected a fault"):
+        faulty(run, Fault("gravity", 1.0))
+
+
+def test_the_bias_study_sends_every_fault_through_every_back_end(tmp_path, capsys):
+    def study(**more):
+        BiasStudy(
+            world="paper-fig4", seeds=1, backends=("block-ekf", "full-ekf"), faults=("range",), range_m=(0.02,),
+            max_steps=25, jobs=1, out=tmp_path / "bias.csv", recordings=tmp_path / "recordings", **more,
+        ).run()  # fmt: skip
+        with (tmp_path / "bias.csv").open() as file:
+            return {(r["association"], r["fault"], r["backend"]): r for r in csv.DictReader(file)}
+
+    rows = study()
+    assert len(rows) == 4
+    for name in ("block-ekf", "full-ekf"):
+        assert float(rows["true", "range", name]["shape_cm"]) > float(rows["true", "none", name]["shape_cm"])
+    assert "range 20 mm" in capsys.readouterr().out
+    rows = study(association="own")
+    assert len(rows) == 8
+    assert "false matches" in capsys.readouterr().out
+
+
+def test_a_robot_that_turns_back_comes_home_before_it_closes_the_ring():
+    loop = Loop(24.0, homings=2, after_m=4.0)
+    way = loop.way_m
+    assert np.count_nonzero(way == 0.0) == 3
+    np.testing.assert_allclose(np.abs(np.diff(way)), loop.step_m)
+    assert way[loop.closing_step] == 24.0
+    assert way[: loop.closing_step].max() < 24.0
+    seen = drive(loop, 1)
+    moved = np.array([compose(pose, motion) for pose, motion in zip(seen.true_poses_world, seen.odometry[1:])])  # noqa: B905
+    off = moved - seen.true_poses_world[1:]
+    assert np.abs(off[:, :2]).max() < 0.1
+    assert np.abs(wrap(off[:, 2])).max() < 0.05
+    homewards = np.flatnonzero(np.diff(way) < 0)
+    ahead = np.sum((seen.true_poses_world[homewards + 1] - seen.true_poses_world[homewards])[:, :2]
+                   * np.stack([np.cos(h := seen.true_poses_world[homewards, 2]), np.sin(h)], -1), axis=1)  # fmt: skip
+    assert ahead.min() > 0.2
+
+
+def test_the_map_of_anees_is_drawn_from_rows_that_are_kept(tmp_path, capsys):
+    study = HeadingStudy(
+        backends=("full-ekf",), length_m=(20.0,), heading_deg=(0.6, 2.4), homings=(0, 1), seeds=1, jobs=1,
+        out=tmp_path / "heading.csv", picture=tmp_path / "heading.svg",
+    )  # fmt: skip
+    study.run()
+    assert len((tmp_path / "heading.csv").read_text().splitlines()) == 1 + 2 * 2
+    assert (tmp_path / "heading.svg").read_bytes().startswith(b"<?xml")
+    assert "full-ekf, 1 times back, 20 m, 2.4:" in capsys.readouterr().out
+    with pytest.raises(UsageError, match="kind of picture"):
+        replace(study, picture=tmp_path / "heading.bmp").run()
 
 
 @pytest.mark.usefixtures("_unchecked")

@@ -105,7 +105,13 @@ def test_a_folder_without_a_campaign_gets_one_line_and_status_2(tmp_path, capsys
 def test_the_verdict_says_answer_interval_and_failures():
     ratio = {"value": 2.0, "low": 1.5, "high": 2.5, "runs": 12}
     states = {"driving": 3, "finished": 8, "failed": 1}
-    at = {"wall_rmse_m": ratio, "pose_anees_so_far": ratio, "contender": states, "baseline": states}
+    at = {
+        "wall_rmse_m": ratio,
+        "wall_shape_m": ratio,
+        "pose_anees_so_far": ratio,
+        "contender": states,
+        "baseline": states,
+    }
     said = {
         "decisive_mark": "33", "marks": {"33": at | {"uncovered": {"value": 0.02}}}, "matches_within": 1.1,
         "contender": "A", "baseline": "B", "verdict": "does not match",
@@ -113,8 +119,9 @@ def test_the_verdict_says_answer_interval_and_failures():
     words = verdict(said)
     assert words[0].startswith("No: after 33 m driven, A does not match B")
     assert "95 % interval 1.5 to 2.5" in words[0]
-    assert "1 have failed" in words[2]
-    assert "2.0 percentage points more" in words[2]
+    assert "shape of its map alone" in words[1]
+    assert "1 have failed" in words[3]
+    assert "2.0 percentage points more" in words[3]
     assert "not tested" in verdict(None)[0]
 
 
