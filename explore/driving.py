@@ -115,7 +115,7 @@ class Pilot:
         for row in range(last, 0, -1):
             if self._planner.clear_ahead(position_world, self._points[self._at + row]):
                 return self._points[self._at + row]
-        return self._points[min(self._at + 4, len(self._points) - 1)]
+        return self._points[min(self._at + 2, len(self._points) - 1)]
 
     def _careful(
         self, command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace
@@ -164,11 +164,17 @@ def _centred(
     distance = float(np.hypot(aim_robot[0], aim_robot[1]))
     ahead = aim_robot / max(distance, 1e-9)
     offset = points_robot - aim_robot
-    sideways = (offset @ (J @ ahead))[np.abs(offset @ ahead) < 0.1]
-    left, right = sideways[sideways > 0].min(initial=np.inf), -sideways[sideways < 0].max(initial=-np.inf)
-    if distance < 1e-9 or not config.fits_m < left + right < config.narrow_m:
+    beside = points_robot[np.abs(offset @ ahead) < 0.1]
+    sideways = (beside - aim_robot) @ (J @ ahead)
+    left, right = beside[sideways > 0], beside[sideways < 0]
+    if distance < 1e-9 or not len(left) or not len(right):
         return aim_robot, False
-    return aim_robot + 0.5 * (left - right) * (J @ ahead), True
+    # The nearest two, since a gap that is crossed at a slant is as wide as one that is crossed straight.
+    gaps = np.hypot(*(left[:, None] - right).transpose(2, 0, 1))
+    k, m = divmod(int(np.argmin(gaps)), len(right))
+    if not config.fits_m < gaps[k, m] < config.narrow_m:
+        return aim_robot, False
+    return aim_robot + ((0.5 * (left[k] + right[m]) - aim_robot) @ (J @ ahead)) * (J @ ahead), True
 
 
 def _is_safe(

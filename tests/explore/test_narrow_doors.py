@@ -28,9 +28,12 @@ def explored(door_m, turn_deg, errorless):
     return last, robot, max(float(pose[:2] @ right) for pose in robot.record.poses_world)
 
 
-@pytest.mark.parametrize(("turn_deg", "errorless"), [(0, True), (13, False), (37, True)])
-def test_a_door_that_leaves_two_centimetres_on_each_side_is_passed(turn_deg, errorless):
-    last, robot, farthest = explored(0.45, turn_deg, errorless)
+@pytest.mark.parametrize(
+    ("door_m", "turn_deg", "errorless"),
+    [(0.45, 0, True), (0.45, 13, False), (0.45, 37, True), (0.442, 0, True), (0.442, 22, True), (0.442, 37, True)],
+)
+def test_a_door_that_leaves_two_centimetres_on_each_side_is_passed(door_m, turn_deg, errorless):
+    last, robot, farthest = explored(door_m, turn_deg, errorless)
     assert last.ended is not None
     assert robot.record.collisions == 0
     assert farthest > 2.7
