@@ -11,7 +11,18 @@ from jaxtyping import Bool, Float, Int
 from .line_fit import Beams, Fit, crossing, fit_runs, polar, prediction, prefix_sums, refit
 from .robot import Scan
 from .segments import EndKind, Segments
-from .splitting import MIN_FIT, Pieces, Returns, SplitConfig, candidates, choose, returns_of, rolled, split_gains
+from .splitting import (
+    MIN_FIT,
+    Pieces,
+    Returns,
+    SplitConfig,
+    candidates,
+    choose,
+    returns_of,
+    rolled,
+    settled,
+    split_gains,
+)
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,7 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
         pieces = choose(sums, candidates(gains, returns.breaks, config.split), returns.breaks, config.split)
         if len(pieces.start) == 0:
             return _none()
+        pieces = settled(pieces, sums, returns.breaks)
         fit, pieces, is_corner, in_doubt = _sharpen(pieces, sums, returns, config)
         return _fitted(fit, pieces, is_corner, in_doubt, returns, config)
 

@@ -171,6 +171,28 @@ def test_an_errorless_room_is_four_walls_with_exact_corners(heading):
     np.testing.assert_allclose(np.sort(corners), np.sort(np.hypot(*(CLOSED[:, 0] - [1.0, 1.1]).T)), atol=1e-9)
 
 
+@pytest.mark.parametrize("is_noisy", [False, True])
+def test_the_cut_between_two_walls_lies_where_they_meet_however_little_they_turn(is_noisy):
+    """A bend of 3 degrees: the best cut of any one scale lies many beams off, and both lines would be wrong."""
+    turn = np.deg2rad(3.0)
+    bent = loop((-3, 0), (0, 0), (3 * np.cos(turn), 3 * np.sin(turn)), (3, 4), (-3, 4))
+    rng, off, sigma = np.random.default_rng(3), [], []
+    for _ in range(60):
+        pose = np.array([*rng.uniform((-1.5, 0.4), (1.5, 1.5)), rng.uniform(-3.0, 3.0)])
+        segments = extract(scan_of(bent, pose, rng if is_noisy else None))
+        alpha = wrap(segments.lines[:, 0] + pose[2])
+        below = np.abs(alpha + np.pi / 2 - turn / 2) < np.deg2rad(5.0)
+        below = np.flatnonzero(below & (segments.beam_counts >= 10))
+        if len(below) == 2:  # else one line was taken for both: there is no cut
+            first, second = below[np.argsort(alpha[below])]
+            off.append([alpha[first] + np.pi / 2, alpha[second] + np.pi / 2 - turn])
+            sigma.append(np.sqrt(segments.cov[[first, second], 0, 0]))
+    worst, nees = np.abs(off).max(), np.mean(np.square(np.array(off) / sigma))
+    print(f"{len(off)} cuts: at worst {worst:.1e} rad, squared error over its variance {nees:.2f}")
+    assert len(off) > 30
+    assert nees < 1.6 if is_noisy else worst < 1e-9
+
+
 def test_what_a_pillar_hides_is_occluded_and_what_runs_out_of_range_is_open():
     faces = np.concatenate([loop((-0.2, 1.0), (-0.2, 1.2), (0.2, 1.2), (0.2, 1.0)), [[[9.0, 2.0], [-9.0, 2.0]]]])
     segments = extract(scan_of(faces, np.zeros(3)))
