@@ -1,4 +1,4 @@
-"""What finds one wall that stands in the map twice: the segments that bridge two lines, their places, or both.
+"""What becomes of walls that stand in the map twice, where they are merged and where not.
 
 .venv/bin/python -m experiments.duplicates_study --world paper-fig8 --seeds 2 --backends full-ekf block-ekf
 
@@ -32,7 +32,7 @@ COLUMNS = ("duplicate_lines", "merges", "false_merges", "false_matches", "lines"
 
 @dataclass(frozen=True)
 class Study:
-    """Replay recordings with matching blind in a few scans, and print a row for each way of finding duplicates."""
+    """Replay recordings with matching blind in a few scans, and print a row with and without merging."""
 
     world: str = "paper-fig8"
     """A bundled name or a file."""
@@ -60,14 +60,8 @@ class BlindMatcher:
 
 
 def ways(config: MapperConfig) -> dict[str, MapperConfig]:
-    """Return the ways of finding duplicates, by name."""
-    never = replace(config.matching, bridge_m=1e9)
-    return {
-        "neither": replace(config, duplicates=None, matching=never),
-        "bridges": replace(config, duplicates=None),
-        "places": replace(config, matching=never),
-        "both": config,
-    }
+    """Return the ways of dealing with duplicates, by name."""
+    return {"kept": replace(config, duplicates=None), "merged": config}
 
 
 def record(config: TrialConfig) -> RecordedRun:
@@ -83,7 +77,7 @@ def main() -> int:
     """Run the study that the command line names and return the exit status."""
     study = tyro.cli(Study, prog="experiments.duplicates_study")
     table = Table(title=f"{study.world}, matching blind in {len(BLIND)} scans", title_justify="left")
-    for column in ("seed", "back end", "found by", *COLUMNS):
+    for column in ("seed", "back end", "duplicates", *COLUMNS):
         table.add_column(column, justify="right")
     around: Callable[[Matcher], Matcher] = BlindMatcher
     try:

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from .backend import Joint
 from .geometry.lines import directions, normals
-from .matching import same_line
+from .matching import gate_level
 from .stochastic_map import StochasticMap
 
 
@@ -25,6 +25,9 @@ class DuplicatesConfig:
     0.1 m deep, however little is known about where the two stand."""
     touch_m: float = 0.03
     """Along the line they overlap, or stand no farther apart than this."""
+    turn_sigma_rad: float = float(np.deg2rad(1.0))
+    """The turn from one to the other is known to this, sigma: the direction of half a metre seen twice is known to a
+    degree or two, and a wall that turns by as much would be made straight for good."""
 
 
 def duplicate_of(
@@ -41,7 +44,9 @@ def duplicate_of(
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
     for pair, rows in zip(pairs.tolist(), np.searchsorted(ids, pairs), strict=True):
-        if same_line(_of_two(joint, rows), config.gate):
+        two = _of_two(joint, rows)
+        turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
+        if turn <= config.turn_sigma_rad**2 and same_line(two, config.gate):
             return pair[0], pair[1]
     return None
 
@@ -76,3 +81,14 @@ def _of_two(joint: Joint, rows: Int[np.ndarray, "2"]) -> Joint:
     """Return the pose and two of the lines."""
     index = np.concatenate([np.arange(3), (3 + 2 * rows[:, None] + np.arange(2)).ravel()])
     return Joint(joint.mean[index], joint.cov[np.ix_(index, index)], joint.anchors[rows])
+
+
+def same_line(joint: Joint, gate: float) -> bool:
+    """Whether the two lines of a joint Gaussian may be one, by the chi-square gate on their difference."""
+    (alpha_a, d_a), (alpha_b, d_b) = joint.mean[3:].reshape(2, 2)
+    shift = joint.anchors[1] - joint.anchors[0]
+    lever = directions(alpha_b) @ shift
+    e = np.array([np.sin(alpha_b - alpha_a), d_b + normals(alpha_b) @ shift - d_a])
+    D = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, lever, 1.0]])
+    S = D @ joint.cov[3:, 3:] @ D.T + 1e-12 * np.eye(2)
+    return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= gate_level(gate, 2))

@@ -13,7 +13,7 @@ from .extraction import extract
 from .faint import FaintConfig, FaintLines
 from .gaps import Gaps, GapsConfig
 from .geometry.lines import distance_to_segments
-from .matching import KnownWalls, Matches, MatchingConfig, match, relocate, same_line
+from .matching import KnownWalls, Matches, MatchingConfig, match, relocate
 from .pieces import sure_pieces
 from .robot import Odometry, Scan
 from .segments import Segments
@@ -95,7 +95,7 @@ class Mapper:
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, self._firm(matches, segments))
         owners = self._store(scan, segments, matches)
-        merged = self._merge(matches, owners)
+        merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         walls = self._walls.map(self.backend.belief)
         self._gaps.see(walls, scan)
@@ -146,27 +146,21 @@ class Mapper:
             self.backend.remove(forgotten.tolist())
         return owners
 
-    def _merge(self, matches: Matches, owners: Int[np.ndarray, " s"]) -> tuple[tuple[int, int], ...]:
-        """Make one of two walls that one segment lies on, or that lie along each other, if the joint covariance agrees.
+    def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[tuple[int, int], ...]:
+        """Make one of two walls that lie along each other, if the joint covariance agrees.
 
         `owners` is brought up to date. Returns the ids (kept, dropped).
         """
+        if self.config.duplicates is None:
+            return ()
         merged: list[tuple[int, int]] = []
-
-        def merge(keep: int, drop: int) -> None:
+        touched = set(owners[owners >= 0].tolist())
+        while twice := duplicate_of(self._walls.map(self.backend.belief), touched, self.config.duplicates):
+            keep, drop = twice
             self._walls.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)
             owners[owners == drop] = keep
-            merged.append((keep, drop))
-
-        for pair in {tuple(sorted(map(int, bridge))) for bridge in matches.bridges}:
-            belief = self.backend.belief
-            if np.all(np.isin(pair, belief.ids)) and same_line(belief.joint(pair), self.config.matching.gate):
-                merge(*pair)
-        if self.config.duplicates is not None:
-            touched = set(owners[owners >= 0].tolist())
-            while twice := duplicate_of(self._walls.map(self.backend.belief), touched, self.config.duplicates):
-                merge(*twice)
+            merged.append(twice)
         return tuple(merged)
 
 
@@ -178,7 +172,6 @@ def _both(clear: Matches, again: Matches) -> Matches:
     return Matches(
         np.concatenate([clear.pairs, more]),
         np.concatenate([clear.distances, again.distances]),
-        np.concatenate([clear.bridges, again.bridges]),
         rest[again.unmatched],
         rest[again.doubtful],
         {int(rest[k]): why for k, why in again.refusals.items()},

@@ -4,7 +4,7 @@ A chi-square gate on the joint covariance of the pose and the lines, an overlap 
 beside a door stay two), and the side from which each was seen (so that two faces of a thin wall stay two).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from scipy.stats import chi2
 
 from .backend import Joint, Observations
-from .geometry.lines import directions, normals
+from .geometry.lines import directions
 from .geometry.poses import to_world
 from .models import Innovations, innovations
 from .segments import Segments
@@ -33,8 +33,6 @@ class MatchingConfig:
     overlap_m: float = 0.02
     """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
     apart than a wall is thick."""
-    bridge_m: float = 0.05
-    """A segment that overlaps two walls by this much shows that they may be one."""
     short_m: float = 0.3
     """Shorter segments are too poor in direction for the gate alone: they are in doubt also beside a wall."""
     beside_m: float = 0.08
@@ -53,8 +51,6 @@ class Matches:
     """Rows (index of the segment, id of the wall)."""
     distances: Float[np.ndarray, " m"]
     """Squared Mahalanobis distance of each pair."""
-    bridges: Int[np.ndarray, "b 2"]
-    """Pairs of walls that one segment lies on, overlapping both: perhaps one wall entered twice."""
     unmatched: Int[np.ndarray, " u"]
     """Indices of the segments that belong to no wall."""
     doubtful: Int[np.ndarray, " d"]
@@ -69,9 +65,8 @@ class Matches:
 
 
 NO_MATCHES = Matches(
-    np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros((0, 2), dtype=np.int64),
-    np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), {},
-)  # fmt: skip
+    np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), {}
+)
 
 
 @dataclass(frozen=True)
@@ -118,10 +113,7 @@ def match(
     count = len(segments)
     ids = walls.ids
     if not len(ids) or not count:
-        return Matches(
-            NO_MATCHES.pairs, NO_MATCHES.distances, NO_MATCHES.bridges,
-            np.arange(count), NO_MATCHES.doubtful, {},
-        )  # fmt: skip
+        return replace(NO_MATCHES, unmatched=np.arange(count))
     found = _candidates(segments, walls, joint, config)
     level = gate_level(config.gate, 2)
     fits = (found.d2 <= level) & (found.gap <= -config.overlap_m)
@@ -134,7 +126,6 @@ def match(
         chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
-    firm = ~segments.is_tentative[found.segment]
     beside = _is_beside(found, segments, config)
     doubt = beside | ((found.d2 <= gate_level(config.doubt, 2)) & (found.gap <= 0.0))
     doubtful = np.zeros(count, dtype=bool)
@@ -142,7 +133,6 @@ def match(
     return Matches(
         np.stack([found.segment[chosen], ids[found.line[chosen]]], axis=-1),
         found.d2[chosen],
-        ids[_bridges(found, chosen, fits & firm & (found.gap < -config.bridge_m))],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
         _refusals(found, ids, ~matched, level, config),
@@ -290,15 +280,6 @@ def _stack(
     return H.reshape(2 * m, size), R.reshape(2 * m, 2 * m)
 
 
-def _bridges(found: _Candidates, chosen: Int[np.ndarray, " m"], overlaps: np.ndarray) -> Int[np.ndarray, "b 2"]:
-    """Rows of pairs of lines that one matched segment overlaps both."""
-    pairs = []
-    for pair in chosen[overlaps[chosen]]:
-        others = np.flatnonzero(overlaps & (found.segment == found.segment[pair]))
-        pairs += [(found.line[pair], found.line[other]) for other in others if other != pair]
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
 def _refusals(
     found: _Candidates, ids: Int[np.ndarray, " n"], unmatched: np.ndarray, level: float, config: MatchingConfig
 ) -> dict[int, str]:
@@ -314,14 +295,3 @@ def _refusals(
             why = f"wall {wall} is not the only one that fits"
         reasons[int(found.segment[pair])] = why
     return reasons
-
-
-def same_line(joint: Joint, gate: float) -> bool:
-    """Whether the two lines of a joint Gaussian may be one, by the chi-square gate on their difference."""
-    (alpha_a, d_a), (alpha_b, d_b) = joint.mean[3:].reshape(2, 2)
-    shift = joint.anchors[1] - joint.anchors[0]
-    lever = directions(alpha_b) @ shift
-    e = np.array([np.sin(alpha_b - alpha_a), d_b + normals(alpha_b) @ shift - d_a])
-    D = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, lever, 1.0]])
-    S = D @ joint.cov[3:, 3:] @ D.T + 1e-12 * np.eye(2)
-    return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= gate_level(gate, 2))

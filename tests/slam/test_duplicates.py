@@ -89,6 +89,16 @@ def test_the_joint_covariance_decides_where_geometry_does_not():
     assert duplicate_of(walls(lines, common=0.5), {3}) is None
 
 
+def test_two_walls_are_not_made_straight_before_their_turn_is_known():
+    """Half a metre seen twice, beside a long wall: it may turn by 2 degrees, and one cannot take a merge back."""
+    lines = [(0.3, (1.0, 2.0), 3.0), (0.3 + np.deg2rad(2.2), beside(0.3, (1.0, 2.0), 1.6), 0.5)]
+    assert duplicate_of(walls(lines, sigma=(0.015, 0.005)), {3}) is None
+    straight = [lines[0], (0.3, beside(0.3, (1.0, 2.0), 1.6), 0.5)]
+    assert duplicate_of(walls(straight, sigma=(0.015, 0.005)), {3}) is None
+    assert duplicate_of(walls(straight, sigma=(0.01, 0.005)), {3}) == (3, 10)
+    assert duplicate_of(walls(lines, sigma=(0.008, 0.005)), {3}) is None
+
+
 def test_tentative_walls_are_left_alone():
     lines = [(0.3, (1.0, 2.0), 2.0), (0.3, (1.0, 2.0), 2.0)]
     assert duplicate_of(walls(lines, tentative=[False, True]), {3, 10}) is None

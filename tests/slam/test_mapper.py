@@ -1,5 +1,7 @@
 """The seven steps over exact scans of drawn rooms, and with oracles in place of extraction and matching."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -9,7 +11,7 @@ from slam.backends import BACKENDS
 from slam.extraction import extract
 from slam.geometry.poses import compose, inverse
 from slam.mapper import Mapper
-from slam.matching import NO_MATCHES, Matches, match
+from slam.matching import NO_MATCHES, match
 from slam.robot import Odometry, Scan
 
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
@@ -92,8 +94,7 @@ def test_a_matcher_given_in_its_place_is_asked_twice_a_scan_and_believed():
 
 
 def nothing(segments, walls, joint, config, *, clear_only=False):
-    none = NO_MATCHES
-    return Matches(none.pairs, none.distances, none.bridges, np.arange(len(segments)), none.doubtful, {})
+    return replace(NO_MATCHES, unmatched=np.arange(len(segments)))
 
 
 def test_a_matcher_that_knows_no_wall_makes_every_segment_a_new_one():
@@ -105,8 +106,8 @@ def test_a_matcher_that_knows_no_wall_makes_every_segment_a_new_one():
 
 def test_doubtful_segments_are_neither_fused_nor_entered():
     def doubter(segments, walls, joint, config, *, clear_only=False):
-        every, none = np.arange(len(segments)), NO_MATCHES
-        return Matches(none.pairs, none.distances, none.bridges, every, every, {})
+        every = np.arange(len(segments))
+        return replace(NO_MATCHES, unmatched=every, doubtful=every)
 
     for update in walk(SQUARE, PLACES[:3], matcher=doubter):
         assert len(update.map) == 0
@@ -185,8 +186,7 @@ def test_walls_that_were_entered_twice_are_merged(backend):
     def blind(segments, walls, joint, config, *, clear_only=False):
         scans["at"] += clear_only
         if scans["at"] in (3, 4):
-            every, none = np.arange(len(segments)), NO_MATCHES
-            return Matches(none.pairs, none.distances, none.bridges, every, none.doubtful, {})
+            return nothing(segments, walls, joint, config)
         return match(segments, walls, joint, config, clear_only=clear_only)
 
     updates = list(walk(SQUARE, PLACES * 2, backend, matcher=blind))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from slam.backend import Joint
-from slam.matching import same_line
+from slam.duplicates import same_line
 
 
 def pair(rng, turn=0.0, offset=0.0):
