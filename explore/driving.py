@@ -40,8 +40,10 @@ class DrivingConfig:
     """Where less than the margin is left already, a step may take this much of it, ..."""
     least_margin_m: float = 0.004
     """... down to this."""
-    fits_m: float = 0.44
+    fits_m: float = 0.425
     """... and does not try where they leave less than this: returns tell the width to a centimetre or two."""
+    beside_m: float = 0.1
+    """Beside the way are returns from this far behind the robot to this far beyond its aim."""
     obstructed_m: float = 0.17
     """A return this near to the path ahead is in the way: less than the radius, since the path keeps to a grid."""
     arrived_m: float = 0.08
@@ -163,18 +165,18 @@ def _centred(
     """Return the aim, moved to the middle between returns on both sides where these are near, and whether they are."""
     distance = float(np.hypot(aim_robot[0], aim_robot[1]))
     ahead = aim_robot / max(distance, 1e-9)
-    offset = points_robot - aim_robot
-    beside = points_robot[np.abs(offset @ ahead) < 0.1]
-    sideways = (beside - aim_robot) @ (J @ ahead)
-    left, right = beside[sideways > 0], beside[sideways < 0]
+    along, sideways = points_robot @ ahead, points_robot @ (J @ ahead)
+    beside = (along > -config.beside_m) & (along < distance + config.beside_m)
+    left, right = points_robot[beside & (sideways > 0)], points_robot[beside & (sideways < 0)]
     if distance < 1e-9 or not len(left) or not len(right):
         return aim_robot, False
-    # The nearest two, since a gap that is crossed at a slant is as wide as one that is crossed straight.
+    # The nearest two stand straight across the gap, however the way slants.
     gaps = np.hypot(*(left[:, None] - right).transpose(2, 0, 1))
     k, m = divmod(int(np.argmin(gaps)), len(right))
     if not config.fits_m < gaps[k, m] < config.narrow_m:
         return aim_robot, False
-    return aim_robot + ((0.5 * (left[k] + right[m]) - aim_robot) @ (J @ ahead)) * (J @ ahead), True
+    middle, through = 0.5 * (left[k] + right[m]), J.T @ (left[k] - right[m]) / gaps[k, m]
+    return middle + max(through @ (aim_robot - middle), config.beside_m - through @ middle) * through, True
 
 
 def _is_safe(

@@ -30,7 +30,10 @@ def explored(door_m, turn_deg, errorless):
 
 @pytest.mark.parametrize(
     ("door_m", "turn_deg", "errorless"),
-    [(0.45, 0, True), (0.45, 13, False), (0.45, 37, True), (0.442, 0, True), (0.442, 22, True), (0.442, 37, True)],
+    [
+        *((0.45, 0, True), (0.45, 13, False), (0.45, 25.7, True), (0.45, 37, True), (0.45, 72.7, False)),
+        *((0.442, 0, True), (0.442, 22, True), (0.442, 37, True), (0.434, 0, True)),
+    ],
 )
 def test_a_door_that_leaves_two_centimetres_on_each_side_is_passed(door_m, turn_deg, errorless):
     last, robot, farthest = explored(door_m, turn_deg, errorless)
