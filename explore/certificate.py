@@ -13,9 +13,11 @@ from slam.stochastic_map import StochasticMap
 
 from .driving_field import DrivingField
 from .free_space import FreeSpace
+from .goal import LeftPlace
 from .outcome import Outcome
 from .paths import PathConfig
 from .step import Step
+from .sweep import SweepConfig
 from .unseen import unseen_borders
 
 LEAST_BORDER_CELLS = 4
@@ -87,7 +89,7 @@ def certify(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> Cer
         outcome,
         found,
         left_open(step, outcome),
-        left_unseen(step, outcome, paths, sweep) if kept else None,
+        left_unseen(step, paths, sweep) if kept else None,
         float(floor.area),
         unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
     )
@@ -143,14 +145,34 @@ def left_open(step: Step, outcome: Outcome) -> tuple[LeftOpen, ...]:
     )
 
 
-def left_unseen(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen, ...]:
+def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen, ...]:
     """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
-    why = "not visited yet" if outcome.status != "complete" else "visited in vain, or the way was blocked"
-    why = why if sweep else "unseen floor was not to be visited"
     field = DrivingField(step.free_space, step.pose_world[:2], paths)
     borders = unseen_borders(step.free_space, field, LEAST_BORDER_CELLS)
     cell = step.free_space.config.cell_m
-    return tuple(LeftUnseen(border, len(border) * cell, why) for border in borders)
+    return tuple(
+        LeftUnseen(
+            border,
+            len(border) * cell,
+            _why_unseen(border, step.left_places) if sweep else "unseen floor was not to be visited",
+        )
+        for border in borders
+    )
+
+
+def _why_unseen(border: Float[np.ndarray, "n 2"], places: tuple[LeftPlace, ...]) -> str:
+    """Return what came of the visits of a border of unseen floor."""
+    troubles = [
+        place.trouble
+        for place in places
+        if np.hypot(*(place.position_world - border.mean(axis=0))) < SweepConfig().near_m
+    ]
+    if not troubles:
+        return "not visited yet"
+    in_the_way = [trouble for trouble in troubles if trouble]
+    if in_the_way:
+        return f"not reached: {in_the_way[-1]}"
+    return f"visited {len(troubles)} times, and no scan from there shows what lies behind"
 
 
 def unseen_area(free_space: FreeSpace, floor: shapely.Polygon | shapely.MultiPolygon) -> float:

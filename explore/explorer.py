@@ -11,13 +11,13 @@ from jaxtyping import Float
 from slam.chains import Chain, OpenEnd
 from slam.robot import MotionCommand
 
-from .goal import Goal, SetAside
+from .goal import Goal, LeftPlace, SetAside
 from .navigation import route
 from .outcome import Outcome
 from .ping_pong import WallErrand
 from .spots import Spots
 from .strategies import Choice, Place, Situation, Strategy
-from .strategies.nearest import nearest_unseen
+from .sweep import Sweep, SweepConfig
 from .unseen import known_floor
 from .visibility import followed_wall
 from .wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
@@ -40,6 +40,7 @@ class ExplorerConfig:
     """Before it ends, the robot turns on the spot this often while there are walls that it saw only once."""
     sweep: bool = True
     """After the last chain, visit what is reachable and unseen."""
+    sweeping: SweepConfig = field(default_factory=SweepConfig)
 
 
 class Explorer:
@@ -54,7 +55,7 @@ class Explorer:
         self._sweeping = False
         self._steps_on_goal = 0
         self._attempts = Spots(0.3)
-        self._visited = Spots(0.3)
+        self._sweep = Sweep(config.sweeping, config.sweep)
         self._walked: set[tuple[int, int]] = set()
         self._floor_known: dict[tuple[int, int], int] = {}
         self.set_aside: dict[tuple[int, int], SetAside] = {}
@@ -85,6 +86,11 @@ class Explorer:
     def still_open(self) -> tuple[SetAside, ...]:
         """The ends that were set aside and are open still."""
         return tuple(aside for key, aside in self.set_aside.items() if key in self._open)
+
+    @property
+    def left_places(self) -> tuple[LeftPlace, ...]:
+        """The borders of unseen floor that were to be visited, and what was in the way."""
+        return self._sweep.left
 
     @property
     def outcome(self) -> Outcome:
@@ -166,12 +172,12 @@ class Explorer:
             self._retry(around, ends)
         situation = Situation(
             around, chains, self._candidates(ends), graph, self._start, followed_wall(around.walls), self._step,
-            lambda place: self._visited.count(place) >= 2, following.paths, following.looks,
+            self._sweep.was_in_vain, following.paths, following.looks,
         )  # fmt: skip
         choice = self.strategy.choose(situation)
         self._sweeping = choice is None and not situation.open_ends
         if choice is None:
-            choice = self._sweep(situation) if self._sweeping else _straight_to_nearest(situation)
+            choice = self._sweep.choose(situation) if self._sweeping else _straight_to_nearest(situation)
         if choice is None:
             return False
         self._set_out(choice, situation)
@@ -189,12 +195,6 @@ class Explorer:
             self._errand = PlaceErrand(target.points_world, f"to where {target.what}", following)
             self.goal = Goal(target.kind, None, None, target.centre_world, choice.reason)
 
-    def _sweep(self, situation: Situation) -> Choice | None:
-        """Go to the nearest floor that borders on unseen floor."""
-        if not len(situation.map):
-            return nearest_unseen(situation, "no wall is in sight yet")
-        return nearest_unseen(situation, "every chain is done, unseen floor is left") if self._config.sweep else None
-
     def _drop(self) -> None:
         self._errand = self._choice = self.goal = None
 
@@ -204,11 +204,13 @@ class Explorer:
         assert errand is not None
         assert choice is not None
         target, following = choice.target, self._config.following
+        in_time = self._steps_on_goal <= self._config.patience_steps
+        late = "" if in_time else f"not reached in {self._config.patience_steps} steps"
         if isinstance(target, Place):
             self._drop()
-            self._visited.add(target.centre_world)
+            self._sweep.ended(target, late or errand.trouble)
             return
-        key, in_time = (target.wall, target.side), self._steps_on_goal <= self._config.patience_steps
+        key = (target.wall, target.side)
         if in_time and isinstance(errand, WallErrand):
             self._errand = EndErrand(target, (target.wall,), following)
             return
@@ -219,7 +221,7 @@ class Explorer:
         self._drop()
         end = errand.end if isinstance(errand, EndErrand) else target
         if not in_time:
-            reason = f"not reached in {self._config.patience_steps} steps"
+            reason = late
         elif errand.looks_done:
             reason = f"still open after {errand.looks_done} looks"
         else:

@@ -30,3 +30,11 @@ class SetAside:
     side: int
     position_world: Float[np.ndarray, "2"]
     reason: str
+
+
+@dataclass(frozen=True)
+class LeftPlace:
+    """A border of unseen floor that was to be visited, and what was in the way; nothing, if the robot got there."""
+
+    position_world: Float[np.ndarray, "2"]
+    trouble: str

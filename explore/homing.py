@@ -10,7 +10,7 @@ from slam.chains import Chain
 from slam.robot import MotionCommand
 
 from .explorer import Explorer
-from .goal import Goal, SetAside
+from .goal import Goal, LeftPlace, SetAside
 from .outcome import Outcome
 from .paths import cells_within
 from .wall_following import FollowingConfig, PlaceErrand, Surroundings
@@ -42,6 +42,11 @@ class Homing:
     def still_open(self) -> tuple[SetAside, ...]:
         """Those of them that are open still."""
         return self._explorer.still_open
+
+    @property
+    def left_places(self) -> tuple[LeftPlace, ...]:
+        """The borders of unseen floor that were to be visited, and what was in the way."""
+        return self._explorer.left_places
 
     @property
     def goal(self) -> Goal | None:

@@ -17,7 +17,7 @@ from slam.robot import MotionCommand, Odometry, Robot
 
 from .explorer import Explorer, ExplorerConfig
 from .free_space import FreeSpace, FreeSpaceConfig
-from .goal import Goal, SetAside
+from .goal import Goal, LeftPlace, SetAside
 from .homing import Homing
 from .limits import Limits, limited
 from .outcome import Outcome
@@ -68,6 +68,11 @@ class Decider(Protocol):
     @property
     def still_open(self) -> tuple[SetAside, ...]:
         """The ends that were set aside and are open still."""
+        ...
+
+    @property
+    def left_places(self) -> tuple[LeftPlace, ...]:
+        """The borders of unseen floor that were to be visited, and what was in the way."""
         ...
 
     @property
@@ -143,7 +148,7 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
             index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
             update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
             decider.still_open, command, path_length, time.perf_counter() - began, decided,
-            outcome, reason, update.merged,
+            outcome, reason, update.merged, decider.left_places,
         )  # fmt: skip
         if command is None:
             return

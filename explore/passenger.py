@@ -7,7 +7,7 @@ import networkx as nx
 from slam.chains import Chain
 from slam.robot import MotionCommand
 
-from .goal import Goal, SetAside
+from .goal import Goal, LeftPlace, SetAside
 from .outcome import Outcome
 from .wall_following import Surroundings
 
@@ -19,6 +19,7 @@ class Passenger:
         self._left = scans
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self.still_open: tuple[SetAside, ...] = ()
+        self.left_places: tuple[LeftPlace, ...] = ()
         self.needs_floor = False
         self.goal: Goal | None = None
         self.walls_to_follow: tuple[int, ...] = ()

@@ -15,7 +15,7 @@ from slam.segments import Segments
 from slam.stochastic_map import StochasticMap
 
 from .free_space import FreeSpace
-from .goal import Goal, SetAside
+from .goal import Goal, LeftPlace, SetAside
 from .outcome import Outcome
 
 
@@ -56,6 +56,8 @@ class Step:
     """What the robot is doing and why; at the last step, why it ended."""
     merged: tuple[tuple[int, int], ...] = ()
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
+    left_places: tuple[LeftPlace, ...] = ()
+    """The borders of unseen floor that were to be visited so far, and what was in the way."""
 
     @property
     def ended(self) -> str | None:

@@ -233,4 +233,7 @@ class PlaceErrand(Errand):
     def _plan(self, around: Surroundings) -> bool:
         if self._stage > 0:
             return False
-        return any(self._drive(self._planner(around, window), self._places) for window in (self._config.window_m, None))
+        windows = (self._config.window_m, None)
+        found = any(self._drive(self._planner(around, window), self._places) for window in windows)
+        self.trouble = self.trouble if found else self.trouble or "no way leads there"
+        return found

@@ -1,5 +1,7 @@
 """Limits, the way home, and the certificate that a mission leaves."""
 
+from dataclasses import replace
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from explore.certificate import certify, contours, floor_of, unseen_area
 from explore.explorer import Explorer, ExplorerConfig
 from explore.free_space import FreeSpace
+from explore.goal import LeftPlace
 from explore.homing import Homing
 from explore.limits import Limits, limited
 from explore.mission import MissionConfig, explore_mission
@@ -100,6 +103,25 @@ def test_what_a_stopped_mission_has_not_seen_yet_is_told():
     assert certificate.unseen
     assert {border.why for border in certificate.unseen} == {"not visited yet"}
     assert all(border.length_m >= 0.2 for border in certificate.unseen)
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
+    mission, _ = steps(max_steps=2)
+    *_, last = mission
+    borders = certify(last, last.outcome, PathConfig(), sweep=True).unseen
+    assert borders
+    near, far = borders[0].cells_world.mean(axis=0), borders[0].cells_world.mean(axis=0) + 5.0
+    for troubles, words in (
+        ([(near, ""), (near, "")], "visited 2 times"),
+        ([(near, ""), (near, "the way was blocked")], "not reached: the way was blocked"),
+        ([(far, "the way was blocked")], "not visited yet"),
+    ):
+        left = tuple(LeftPlace(place, trouble) for place, trouble in troubles)
+        certificate = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep=True)
+        assert words in certificate.unseen[0].why
+    without = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep=False)
+    assert {border.why for border in without.unseen} == {"unseen floor was not to be visited"}
 
 
 @pytest.mark.usefixtures("_unchecked")
