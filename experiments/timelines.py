@@ -1,5 +1,6 @@
 """Truth meets timeline: runs become recordings, and whatever happens to a recording, the run goes on."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from jaxtyping import Float
 
 from explore.step import Step
 from sim.worlds import World
-from viz.viewer import Viewer
+from viz.viewer import Viewer, ViewerError
 
 from .files import probe, write_anywhere
 from .replay import RecordedRun, ReplayOptions, replay
@@ -77,6 +78,8 @@ class Recording:
             # Tried before the run, so that nobody waits for a recording that cannot be.
             probe(self._rrd)
         viewer_url = Viewer().url if view else None
+        # Rerun's own words on a viewer that went would come between ours; what matters it raises, too.
+        os.environ.setdefault("RUST_LOG", "off")
         from viz.timeline import Timeline  # imports rerun: only where a recording is asked for
 
         nees_of = None if errorless else nees_of_poses
@@ -85,7 +88,14 @@ class Recording:
     def _finish(self) -> None:
         if self._timeline is None:
             return
-        content = self._timeline.close()
+        try:
+            content = self._timeline.close()
+        except RuntimeError as error:
+            if self._rrd is not None:
+                raise
+            raise ViewerError(
+                "expected the viewer to stay open till the end, found it closed: `chainslam view DIR` shows the run"
+            ) from error
         if self._rrd is not None:
             write_anywhere(self._rrd, content)
 

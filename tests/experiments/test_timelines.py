@@ -1,6 +1,7 @@
 import csv
 import json
 import os
+import resource
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -258,6 +259,36 @@ def test_a_trouble_while_recording_is_told_and_the_run_goes_on(tmp_path, monkeyp
     assert len(run_scenario(scenario, watch, default_mission).log) == len(seen) == 2
     assert recording.close() == [f"{tmp_path / 'x.rrd'}: out of ink"]
     assert not (tmp_path / "x.rrd").exists()
+
+
+def test_a_viewer_that_went_is_one_line_and_the_results_are_kept(tmp_path, capsys, monkeypatch):
+    def severed(*_, **__):
+        raise RuntimeError("gRPC connection severed")
+
+    monkeypatch.setattr("experiments.timelines.Viewer", lambda: SimpleNamespace(url="rerun+http://127.0.0.1:9/proxy"))
+    monkeypatch.setattr(rr.RecordingStream, "connect_grpc", lambda *_: None)
+    monkeypatch.setattr(rr.RecordingStream, "flush", severed)
+    status = main(["explore", WORLD, "--max-steps", "2", "--out", str(tmp_path), "--view"])
+    (said,) = capsys.readouterr().err.splitlines()
+    assert status == 1
+    assert "expected the viewer to stay open till the end, found it closed" in said
+    assert json.loads((tmp_path / "summary.json").read_text())["steps"] == 2
+
+
+def test_the_file_may_grow_too_large_for_the_disk_and_costs_one_line(tmp_path, capsys):
+    target, out = tmp_path / "run.rrd", tmp_path / "out"
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # Enough for every other file of a run.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
+    try:
+        status = main(["explore", WORLD, "--max-steps", "30", "--out", str(out), "--rrd", str(target)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert status == 1
+    assert capsys.readouterr().err.splitlines() == [f"chainslam: not written: {target}: File too large"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+    assert json.loads((out / "summary.json").read_text())["steps"] == 30
+    assert (out / "map.png").is_file()
 
 
 def test_without_a_display_the_viewer_is_one_line_and_the_results_are_kept(tmp_path, capsys, monkeypatch):

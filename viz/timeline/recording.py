@@ -17,6 +17,8 @@ from .arrow import settle
 
 APPLICATION = "chainslam"
 STEP, SIM_TIME = "step", "sim_time"
+PATIENCE_S = 30.0
+"""So long a viewer may take over what it was sent last."""
 _VEC2 = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
 _STRIP = pa.list_(pa.field("item", _VEC2, nullable=False))
 
@@ -54,8 +56,11 @@ class Recording:
         self._stream.send_blueprint(blueprint, make_active=True, make_default=True)
 
     def finish(self) -> bytes:
-        """Wait until all that was sent has arrived, and return the bytes of an .rrd file; none with a viewer."""
-        self._stream.flush()
+        """Wait until all that was sent has arrived, and return the bytes of an .rrd file; none with a viewer.
+
+        Raises RuntimeError where a viewer has gone, or does not answer.
+        """
+        self._stream.flush(timeout_sec=PATIENCE_S)
         return b"" if self._memory is None else self._memory.drain_as_bytes()
 
     def fixed(self, entity: str, *archetypes: Any) -> None:

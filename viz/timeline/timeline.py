@@ -71,7 +71,8 @@ class Timeline:
 
     def discard(self) -> None:
         """Throw away what was recorded; without this, Rerun would complain of it in its own words."""
-        self._out.finish()
+        if not self._is_live:
+            self._out.finish()
 
     def _fixtures(self, title: str) -> None:
         """Log what holds at all times: frames, words, classes of floor."""
