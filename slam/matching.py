@@ -220,25 +220,30 @@ def _clear(
 def _compatible(
     chosen: Int[np.ndarray, " m"], found: _Candidates, joint: Joint, config: MatchingConfig
 ) -> Int[np.ndarray, " k"]:
-    """Drop pairs, the worst first, until the whole set passes the gate on its joint innovation."""
-    while len(chosen) > 1:
-        model = Innovations(
-            found.model.e[chosen], found.model.H_pose[chosen], found.model.H_line[chosen], found.model.R[chosen]
-        )
-        H, R = _stack(model, found.line[chosen], len(joint.mean))
-        S = H @ joint.cov @ H.T + R
-        weighted = np.linalg.solve(S, model.e.ravel())
-        if model.e.ravel() @ weighted <= gate_level(config.gate, 2 * len(chosen)):
+    """Drop pairs, the worst first, until each passes the gate given all others, and their joint innovation its own.
+
+    After a step in which the wheels may have slipped by a degree each wall alone allows for that error; the other
+    walls tell what it was.
+    """
+    model = Innovations(*(part[chosen] for part in vars(found.model).values()))
+    H, R = _stack(model, found.line[chosen], len(joint.mean))
+    S, e = H @ joint.cov @ H.T + R, model.e.ravel()
+    kept = np.arange(len(chosen))
+    while len(kept) > 1:
+        rows = (2 * kept[:, None] + np.arange(2)).ravel()
+        inverse = np.linalg.inv(S[np.ix_(rows, rows)])
+        weighted = inverse @ e[rows]
+        # What the sum of squares loses when one pair is left out is that pair's own, given all others.
+        each = np.arange(len(kept))
+        own = inverse.reshape(len(kept), 2, len(kept), 2)[each, :, each]
+        w = weighted.reshape(-1, 2, 1)
+        losses = (w.swapaxes(1, 2) @ np.linalg.solve(own, w))[:, 0, 0]
+        worst = int(np.argmax(losses))
+        in_sum = e[rows] @ weighted <= gate_level(config.gate, 2 * len(kept))
+        if in_sum and losses[worst] <= gate_level(config.gate, 2):
             break
-        # What the sum of squares loses when one pair is left out: e' S^-1 of its block of the inverse.
-        inverse = np.linalg.inv(S)
-        losses = [
-            weighted[2 * i : 2 * i + 2]
-            @ np.linalg.solve(inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2], weighted[2 * i : 2 * i + 2])
-            for i in range(len(chosen))
-        ]
-        chosen = np.delete(chosen, int(np.argmax(losses)))
-    return chosen
+        kept = np.delete(kept, worst)
+    return chosen[kept]
 
 
 def _still_overlapping(
