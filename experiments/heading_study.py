@@ -76,11 +76,14 @@ class Study:
         found = fill(self.out, (KEY, SCORES), tasks, functools.partial(rows_of, self), self.jobs)
         fields = [[self.field(found, name, homings) for name in self.backends] for homings in self.homings]
         rows, columns = ([f"{value:g}" for value in values] for values in (self.heading_deg, self.length_m))
-        labels = "heading lost by the wheels, degrees per root metre", "length of the ring, m"
+        labels = (
+            "heading lost by the wheels, degrees per root metre",
+            "length of the ring, m; small figures: worst heading error on the way, median over the rings",
+        )
         self.picture.parent.mkdir(parents=True, exist_ok=True)
         write(self.picture, saved(anees_map(fields, rows, columns, labels), KINDS[self.picture.suffix]))
-        print(f"a quarter of the ring unseen; {self.seeds} rings each; mean pose ANEES (95 % interval), median; worst")
-        print("heading error, median")
+        print(f"the last {self.gap_share:.0%} of the ring unseen, {self.seeds} rings each:")
+        print("mean pose ANEES (95 % interval), median; worst heading error on the way, degrees, median")
         for homings, name in itertools.product(self.homings, self.backends):
             for length, heading in itertools.product(self.length_m, self.heading_deg):
                 runs = self.runs(found, name, self.loop(length, heading, homings))
@@ -111,7 +114,7 @@ class Study:
                 broken = f", {len(runs) - len(sound)} broke" if len(sound) < len(runs) else ""
                 line.append(f"{np.median(runs[:, 3]):.1f}°{broken}")
             notes.append(tuple(line))
-        times = f", {homings} times back to the start" if homings else ""
+        times = f", {homings} times back" if homings else ""
         return Field(f"{name}{times}", anees, tuple(notes))
 
 

@@ -18,6 +18,7 @@ from slam.extraction import extract
 from slam.mapper import Mapper, MapperConfig, Matcher
 from slam.matching import match
 from slam.robot import MotionCommand, Odometry, Scan
+from slam.segments import Segments
 from slam.walls import WallsConfig
 
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
@@ -113,10 +114,12 @@ def replay(
     watch: Callable[[Step], None] = lambda step: None,
     world: World | None = None,
     around: Callable[[Matcher], Matcher] = lambda matcher: matcher,
+    extractor: Callable[[Scan], Segments] = extract,
 ) -> TrialResult:
     """Map a recording with one back end; raises UsageError before anything is computed.
 
-    `world` saves loading it again; `around` may wrap the matcher, to listen to it.
+    `world` saves loading it again; `around` may wrap the matcher, to listen to it; `extractor` finds the
+    segments of a scan unless the options put the truth in its place.
     """
     config = replace(run.trial, backend=backend, strategy=STRATEGY_OF_REPLAYS)
     check(config)
@@ -142,7 +145,7 @@ def replay(
         mapper = Mapper(
             scenario.backend,
             scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper),
-            PerfectExtraction(witness, config.seed) if options.perfect_extraction else extract,
+            PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(match if oracle is None else oracle),
         )
         return ride_mission(scenario.robot, len(recording), scenario.backend, scenario.config.mission, mapper)

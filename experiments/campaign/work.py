@@ -2,6 +2,7 @@
 
 import json
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
@@ -11,6 +12,9 @@ from typing import Any
 import numpy as np
 
 from sim.worlds import World
+from slam.extraction import extract
+from slam.robot import Scan
+from slam.segments import Segments
 
 from ..files import json_bytes, npz_bytes
 from ..replay import RecordedRun, ReplayOptions, replay, run_of
@@ -119,6 +123,22 @@ def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
     return run_of(arrays, lambda: config)
 
 
+@lru_cache(maxsize=2)
+def remembered(log: bytes) -> Callable[[Scan], Segments]:
+    """Return an extraction that works out each scan of a recording once: whoever replays it sees the same segments."""
+    known: dict[float, Segments] = {}
+
+    def extracted(scan: Scan) -> Segments:
+        if scan.time_s not in known:
+            known[scan.time_s] = extract(scan)
+            for values in vars(known[scan.time_s]).values():
+                if isinstance(values, np.ndarray):
+                    values.setflags(write=False)
+        return known[scan.time_s]
+
+    return extracted
+
+
 def _drive(job: Job) -> tuple[Record, bytes | None]:
     scenario = build(job.config, _world(job.config.world))
     walls = truth_of(scenario.world, job.config.robot).walls
@@ -139,7 +159,7 @@ def _replay(job: Job) -> Record:
     ear = InnovationEar(job.config.mission.mapper.firm_heading_rad) if association == "true" else None
     result = replay(
         run, job.trial.backend, ReplayOptions(association), observer, world,
-        ear.around if ear is not None else lambda matcher: matcher,
+        ear.around if ear is not None else lambda matcher: matcher, remembered(job.log),
     )  # fmt: skip
     return _finish(job, result, observer, ear)
 

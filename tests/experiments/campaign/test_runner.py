@@ -9,13 +9,18 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from experiments.campaign.plan import Campaign, trials
+from experiments.campaign import work
+from experiments.campaign.plan import Campaign, Trial, config_of, trials
 from experiments.campaign.runner import on_cores, run_campaign
 from experiments.campaign.store import opened, read_campaigns
 from experiments.campaign.tables import TIMINGS, write_tables
+from experiments.campaign.work import Job, perform
 from experiments.cli import main
+from slam.extraction import extract
+from slam.robot import Scan
 
 ROOT = Path(__file__).parents[3]
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 2, max_steps=12)
@@ -145,3 +150,19 @@ def test_bad_words_get_one_line_and_status_2(change, tmp_path, capsys):
     assert said.startswith("chainslam: ")
     assert "\n" not in said
     assert not (tmp_path / "out").exists()
+
+
+def test_replays_of_one_recording_extract_each_scan_once_and_see_what_extraction_finds():
+    trial = Trial("paper-fig4", "nearest-robot", "block-ekf", "closed", 1)
+    config = config_of(CAMPAIGN, trial)
+    log = perform(Job(trial, config, keep_log=True)).log
+    run = work._recording(log, config)
+    scans = [Scan(run.recording.bearings_rad, ranges, run.recording.sigma_m, run.recording.range_max_m, float(time_s))
+             for ranges, time_s in zip(run.recording.ranges_m, run.recording.time_s, strict=True)]  # fmt: skip
+    extracted = work.remembered(log)
+    assert len({scan.time_s for scan in scans}) == len(scans)
+    for scan in scans:
+        assert extracted(scan) is extracted(scan)
+        np.testing.assert_array_equal(extracted(scan).lines, extract(scan).lines)
+        with pytest.raises(ValueError, match="read-only"):
+            extracted(scan).lines[0] = 0.0
