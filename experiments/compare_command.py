@@ -9,7 +9,7 @@ from .campaign.contrast import contrast, read_contrast
 from .campaign.contrast_page import verdict
 from .campaign.film import record_campaign
 from .campaign.merge import merge
-from .campaign.plan import ARMS, CLOSED, PRESETS, Campaign, check_campaign, trials
+from .campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_campaign, trials
 from .campaign.runner import on_cores, on_dask, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
@@ -48,8 +48,8 @@ class Compare:
     """The back end that drives the recordings."""
     p0: P0 = "small"
     """Covariance of the start."""
-    max_steps: int = 5000
-    """A trial is stopped, and counts as a failure, after this many scans."""
+    max_steps: int | None = None
+    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
     jobs: int | None = None
     """Number of processes; all cores by default. The results are the same."""
     dask: str | None = None
@@ -66,7 +66,8 @@ class Compare:
     def campaign(self) -> Campaign:
         """The campaign that the options describe; raises UsageError where they leave something open."""
         given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
-        chosen = (PRESETS[self.preset] if self.preset else {}) | {k: v for k, v in given.items() if v is not None}
+        named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
+        chosen = {"max_steps": MAX_STEPS} | (PRESETS[self.preset] if self.preset else {}) | named
         missing = [f"--{name}" for name in given if name not in chosen]
         if missing:
             raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
@@ -75,7 +76,6 @@ class Compare:
         settings: dict[str, Any] = {
             "driver": self.driver,
             "p0": self.p0,
-            "max_steps": self.max_steps,
             "first_seed": self.first_seed,
         }
         return Campaign(**chosen, arms=tuple(arms), **settings)

@@ -47,9 +47,10 @@ AT_MARKS = (
     *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),
     "duplicate_lines",
 )
+SOUND = ("complete", "stopped")
 SUMS = (
     *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"),
-    *("merges", "false_merges", "sightings", "double_entries", "distances"),
+    *("merges", "false_merges", "sightings", "double_entries"),
 )
 """Columns that are added up over runs."""
 BASELINE_BACKEND, BASELINE_STRATEGY = "full-ekf", "nearest-robot"
@@ -77,12 +78,12 @@ def arm_of(row: Row) -> str:
     return CLOSED if row["mode"] == CLOSED else f"replay-{row['association']}"
 
 
-def runs_of(rows: Iterable[Row], measure: Measure) -> Runs:
-    """Return the measure of each run, averaged over what else differs; runs that failed or lack it are missing."""
+def runs_of(rows: Iterable[Row], measure: Measure, ended: Sequence[str] = ("complete",)) -> Runs:
+    """Return the measure of each run, averaged over what else differs; others than `ended`, or without it, are out."""
     found: dict[tuple[str, int], list[float]] = {}
     for row in rows:
         value = row.get(measure.name)
-        if value is None or row["status"] != "complete" or not math.isfinite(value):
+        if value is None or row["status"] not in ended or not math.isfinite(value):
             continue
         if measure.is_ratio:
             if value + measure.floor <= 0:
@@ -158,22 +159,29 @@ def _cells(rows: Sequence[Row]) -> list[Row]:
 
 
 def cell_scores(rows: Sequence[Row]) -> Row:
-    """Return the scores of some trials together, over the runs that completed; the others are counted."""
+    """Return the scores of some trials together.
+
+    Means are over the runs that completed, the others are counted; what went wrong in matching, and extremes, are those
+    of all runs that did not break down: one that was lost and drove on to its limit has most to tell there.
+    """
     complete = [row for row in rows if row["status"] == "complete"]
-    scores: Row = {"trials": len(rows), "complete": len(complete)}
+    sound = [row for row in rows if row["status"] in SOUND]
+    scores: Row = {"trials": len(rows), "complete": len(complete), "sound": len(sound)}
     for name in MEANS:
         runs = runs_of(complete, Measure(name, False))
         found = estimate(runs)
         scores[name] = None if found is None else asdict(found) | {"median": float(np.median(list(runs.values())))}
     for name in SUMS:
-        scores[name] = sum(row.get(name) or 0 for row in complete)
+        scores[name] = sum(row.get(name) or 0 for row in sound)
+    scores["distances"] = sum(row.get("distances") or 0 for row in complete)
     for name in ("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"):
-        found = estimate(runs_of(complete, Measure(name, False)))
+        of = SOUND if name in ("missed_share", "doubles_beyond_gate") else ("complete",)
+        found = estimate(runs_of(rows, Measure(name, False), of))
         scores[name] = None if found is None else asdict(found)
     for name in ("trace_least", "bound_margin"):
-        values = [row[name] for row in complete if row.get(name) is not None]
+        values = [row[name] for row in sound if row.get(name) is not None]
         scores[name] = min(values) if values else None
-    below = [row for row in complete if row.get("bound_first_m") is not None]
+    below = [row for row in sound if row.get("bound_first_m") is not None]
     scores["bound_runs_below"] = len(below)
     for name in ("bound_margin", "bound_first_m", "bound_worst_m"):
         scores[f"{name}_median"] = float(np.median([row[name] for row in below])) if below else None

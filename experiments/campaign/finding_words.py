@@ -42,7 +42,7 @@ def _trace(found: Row) -> str:
 
 
 def _below(found: Row) -> str:
-    runs = f"{number(found['bound_runs_below'])} of {number(found['complete'])} runs"
+    runs = f"{number(found['bound_runs_below'])} of {number(found['sound'])} runs"
     if not found["bound_runs_below"]:
         return runs
     first, worst = (number(found[f"bound_{name}_m_median"]) for name in ("first", "worst"))

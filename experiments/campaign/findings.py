@@ -89,7 +89,7 @@ def _never_below(row: Row) -> tuple[Row, bool | None]:
 
 def _below(row: Row) -> tuple[Row, bool | None]:
     names = ("bound_margin", "bound_runs_below", "bound_margin_median", "bound_first_m_median", "bound_worst_m_median")
-    return {name: row[name] for name in (*names, "complete")}, None
+    return {name: row[name] for name in (*names, "sound")}, None
 
 
 def _anees(row: Row) -> tuple[Row, bool | None]:

@@ -10,6 +10,9 @@ from .score import END
 CONTENDER = ("nearest-start", "block-ekf")
 MATCHES_WITHIN = 1.1
 """Two errors match if the 95 % interval of their ratio stays below this; they do not if it stays above."""
+DECIDING = ("wall_rmse_m", "wall_shape_m")
+"""Where the walls of the map lie, and its shape alone: the full EKF moves its map as a whole, which says nothing of
+how well the walls lie to each other (docs/results.md, "Bias and the precision of the scanner")."""
 LEAST_PAIRS = 10
 """Fewer pairs of runs decide nothing: the bootstrap's interval of a handful is too narrow."""
 DECISIVE = "33"
@@ -44,17 +47,21 @@ def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
             "baseline": _states(baseline, mark),
             **{m.name: difference(first, second, m) for m in MEASURES},
         }
-    ratio = found["marks"][DECISIVE]["wall_rmse_m"]
-    enough = ratio["runs"] >= LEAST_PAIRS
-    found["verdict"] = verdict(ratio["low"], ratio["high"]) if enough else "undecided"
+    ratios = [found["marks"][DECISIVE][name] for name in DECIDING]
+    enough = min(ratio["runs"] for ratio in ratios) >= LEAST_PAIRS
+    found["verdict"] = verdict([(ratio["low"], ratio["high"]) for ratio in ratios]) if enough else "undecided"
     return found
 
 
-def verdict(low: float | None, high: float | None) -> str:
-    """Return `matches`, `does not match` or `undecided` for the interval of a ratio of errors."""
-    if low is None or high is None:
-        return "undecided"
-    return "matches" if high <= MATCHES_WITHIN else "does not match" if low > MATCHES_WITHIN else "undecided"
+def verdict(intervals: Sequence[tuple[float | None, float | None]]) -> str:
+    """Return `matches`, `does not match` or `undecided` for the intervals of some ratios of errors.
+
+    All must match for a match; one that does not decides against it.
+    """
+    known = [(low, high) for low, high in intervals if low is not None and high is not None]
+    if any(low > MATCHES_WITHIN for low, _ in known):
+        return "does not match"
+    return "matches" if len(known) == len(intervals) and all(h <= MATCHES_WITHIN for _, h in known) else "undecided"
 
 
 def _alive(rows: Sequence[Row]) -> list[Row]:

@@ -84,7 +84,8 @@ def _counts(said: dict[str, Any]) -> tuple[str, ...]:
     counts = said["counts"]
     return (
         f"{counts['trials']} trials: {counts['complete']} complete, {counts['stopped']} stopped by a limit,"
-        f" {counts['failed']} failed. A trial that is not complete is in no mean and is counted beside it.",
+        f" {counts['failed']} failed. A trial that is not complete is in no mean and is counted beside it;"
+        " wrong matches, walls entered twice and the extremes are those of stopped runs, too.",
     )
 
 

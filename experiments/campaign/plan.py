@@ -17,6 +17,7 @@ CLOSED, RECORDING = "closed", "recording"
 ARMS = (CLOSED, "replay-own", "replay-true")
 """Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
 Replay with the true association: the algebra alone."""
+MAX_STEPS = 5000
 PAPER_BACKENDS = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf", "graph")
 PAPER_STRATEGIES = ("nearest-robot", "same-chain", "nearest-start")
 
@@ -34,7 +35,7 @@ class Campaign:
     driver: str = "full-ekf"
     """The back end that drives the recordings: one for each world, strategy and seed, shared by all that replay it."""
     p0: P0 = "small"
-    max_steps: int = 5000
+    max_steps: int = MAX_STEPS
     """A trial is stopped, and counts as a failure, after this many scans."""
     first_seed: int = 1
 
@@ -86,6 +87,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "backends": PAPER_BACKENDS,
         "strategies": PAPER_STRATEGIES,
         "trials": 20,
+        # Four times the longest run that is not lost; a lost one would go round to the default limit.
+        "max_steps": 2500,
     },
     "full": {
         "worlds": tuple(WORLDS),

@@ -47,20 +47,11 @@ def verdict(hypothesis: dict[str, Any] | None) -> tuple[str, ...]:
     }
     return (
         f"{answer}: {where}, {says[hypothesis['verdict']]}: the walls of its map are"
-        f" {number(wall['value'])} times as far off (95 % interval {interval(wall)}; {wall['runs']} pairs of runs;"
-        f" a match is an interval below {hypothesis['matches_within']}).",
-        _shape(shape),
+        f" {number(wall['value'])} times as far off (95 % interval {interval(wall)}), and its shape alone, wherever the"
+        f" map as a whole has drifted to, {number(shape['value'])} times (95 % interval {interval(shape)};"
+        f" {wall['runs']} pairs of runs; a match needs both intervals below {hypothesis['matches_within']}).",
         _honesty(honesty),
         f"{_states(at['contender'], contender)}; {_states(at['baseline'], baseline)}. {_covered(at['uncovered'])}",
-    )
-
-
-def _shape(ratio: dict[str, Any]) -> str:
-    if ratio["value"] is None:
-        return "How well the shapes of the maps compare cannot be told."
-    return (
-        "The shape of its map alone, wherever the map as a whole has drifted to, is"
-        f" {number(ratio['value'])} times as far off (95 % interval {interval(ratio)})."
     )
 
 

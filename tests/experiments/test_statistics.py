@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.campaign.comparison import Measure, difference
+from experiments.campaign.comparison import Measure, cell_scores, difference
 from experiments.campaign.hypothesis import hypothesis, verdict
 from experiments.statistics import estimate, paired, share_better
 
@@ -69,8 +69,8 @@ def test_a_difference_counts_the_runs_that_it_cannot_compare():
 def mark(strategy, backend, seed, metres, wall, state="driving"):
     return {
         "world": "w", "strategy": strategy, "backend": backend, "mode": "closed", "association": "own", "seed": seed,
-        "status": "complete", "metres": metres, "state": state, "wall_rmse_m": wall, "pose_error_m": wall,
-        "pose_anees_so_far": 1.0, "coverage": 0.9,
+        "status": "complete", "metres": metres, "state": state, "wall_rmse_m": wall, "wall_shape_m": wall,
+        "pose_error_m": wall, "pose_anees_so_far": 1.0, "coverage": 0.9,
     }  # fmt: skip
 
 
@@ -98,4 +98,24 @@ def test_a_handful_of_runs_decides_nothing():
 
 def test_without_both_sides_there_is_no_verdict():
     assert hypothesis([mark("nearest-robot", "full-ekf", 1, "33", 0.1)]) is None
-    assert verdict(None, None) == verdict(0.9, 1.3) == "undecided"
+    assert verdict([(None, None)]) == verdict([(0.9, 1.3)]) == "undecided"
+
+
+def test_a_match_is_one_of_place_and_of_shape():
+    good, bad, open_ = (0.8, 1.0), (1.5, 2.0), (0.9, 1.3)
+    assert verdict([good, good]) == "matches"
+    assert verdict([good, bad]) == verdict([bad, open_]) == "does not match"
+    assert verdict([good, open_]) == verdict([good, (None, None)]) == "undecided"
+
+
+def test_what_a_lost_run_did_is_counted_though_it_is_in_no_mean():
+    same = {"world": "w", "seed": 1, "bound_margin": -0.1, "bound_first_m": 1.0, "bound_worst_m": 2.0}
+    done = same | {"status": "complete", "pose_anees": 1.0, "double_entries": 1, "sightings": 100}
+    lost = same | {"seed": 2, "status": "stopped", "pose_anees": 900.0, "double_entries": 19, "sightings": 400,
+                   "bound_margin": -3.0, "missed_share": 0.2}  # fmt: skip
+    scores = cell_scores([done, lost, same | {"seed": 3, "status": "failed", "double_entries": 50}])
+    assert (scores["trials"], scores["complete"], scores["sound"]) == (3, 1, 2)
+    assert scores["pose_anees"]["mean"] == 1.0
+    assert (scores["double_entries"], scores["sightings"]) == (20, 500)
+    assert (scores["bound_margin"], scores["bound_runs_below"]) == (-3.0, 2)
+    assert scores["missed_share"]["mean"] == 0.2

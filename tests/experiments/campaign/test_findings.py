@@ -18,7 +18,7 @@ def told(mean, low=None, high=None):
 
 def row(backend, arm="closed", **scores):
     good = {
-        "trials": 20, "complete": 20, "steps_outside_band": 0.0, "matches_false": 0, "double_entries": 1,
+        "trials": 20, "complete": 20, "sound": 20, "steps_outside_band": 0.0, "matches_false": 0, "double_entries": 1,
         "sightings": 1000, "distances": 500, "trace_least": 1.0, "trace_below": told(0.0), "bound_margin": 0.0,
         "bound_runs_below": 0, "bound_margin_median": None, "bound_first_m_median": None, "bound_worst_m_median": None,
         "pose_anees": told(1.0, 0.95, 1.05), "distances_in_95": told(0.95), "doubles_beyond_gate": told(-9.0),
