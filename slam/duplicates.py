@@ -16,15 +16,17 @@ from .stochastic_map import StochasticMap
 class DuplicatesConfig:
     """When two entries of a map may be one wall."""
 
-    gate: float = 0.99
-    """Probability level of the chi-square gate on the difference of the two lines."""
+    gate: float = 0.9999
+    """Probability level of the chi-square gate on the difference of the two lines: one true pair in so many is refused,
+    and stays, since each sighting goes to the entry that it fits better, which keeps them apart."""
     turn_rad: float = float(np.deg2rad(5.0))
     """Largest difference in direction; the other face of a wall differs by pi."""
     across_m: float = 0.05
     """Largest distance of the shorter one from the other's line, at both its ends: a wall's thickness or a niche is
     0.1 m deep, however little is known about where the two stand."""
-    touch_m: float = 0.03
-    """Along the line they overlap, or stand no farther apart than this."""
+    overlap_m: float = 0.05
+    """Along the line they overlap by at least this: two rooms' walls on one line stand 0.1 m apart, and where the robot
+    sees nothing but such walls it knows its place along them, and so their ends, to a few centimetres only."""
     turn_sigma_rad: float = float(np.deg2rad(1.0))
     """The turn from one to the other is known to this, sigma: the direction of half a metre seen twice is known to a
     degree or two, and a wall that turns by as much would be made straight for good."""
@@ -59,7 +61,7 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
     middle, length = ends.mean(axis=1), walls.extents[:, 1] - walls.extents[:, 0]
     # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
     between = middle[ours, None] - middle[firm]
-    reach = 0.5 * (length[ours, None] + length[firm]) + config.touch_m + config.across_m
+    reach = 0.5 * (length[ours, None] + length[firm]) + config.across_m
     meets = between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2
     near = np.argwhere(meets & (np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad)))
     pairs = np.stack([ours[near[:, 0]], firm[near[:, 1]]], axis=-1)
@@ -70,7 +72,7 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
     across = np.abs(_dot(off, normals(alpha[longer]))).max(axis=1)
     along = _dot(off, directions(alpha[longer]))
     apart = np.maximum(along[:, 0] - length[longer], -along[:, 1])
-    return walls.ids[pairs[(across <= config.across_m) & (apart <= config.touch_m)]]
+    return walls.ids[pairs[(across <= config.across_m) & (apart <= -config.overlap_m)]]
 
 
 def _dot(points: Float[np.ndarray, "p 2 2"], vectors: Float[np.ndarray, "p 2"]) -> Float[np.ndarray, "p 2"]:
