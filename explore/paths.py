@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.ndimage import label
 from skimage.graph import MCP_Geometric
 
 from .blocks import BLOCK, blocks_with_any, cells_of
@@ -87,8 +88,11 @@ class Planner:
         corridor = self._corridor(cells[usable])
         if corridor is None:
             return None
-        # A block may hold cells that do not hang together; then the way by blocks may be none.
-        found = self._cheapest(cells[usable], corridor) or self._cheapest(cells[usable], np.ones_like(corridor))
+        found = self._cheapest(cells[usable], corridor)
+        if found is None:
+            # A block may hold cells that do not hang together, so that the way by blocks may be none.
+            usable = usable[self._is_connected[tuple(cells[usable].T)]]
+            found = self._cheapest(cells[usable], np.ones_like(corridor))
         if found is None:
             return None
         way, cost, reached = found
@@ -146,6 +150,12 @@ class Planner:
         metre = np.where(self._passable[box], metre_costs(self._clearance[box], self._roomy[box], self._config), -1.0)
         metre[self._escape[box]] = ESCAPE_COST
         return metre
+
+    @cached_property
+    def _is_connected(self) -> Bool[np.ndarray, "h w"]:
+        """Which cells hang together with the start."""
+        labels, _ = label(self._passable, structure=np.ones((3, 3)))
+        return np.asarray(labels == labels[tuple(self._start)])
 
     @cached_property
     def _roomy_blocks(self) -> Bool[np.ndarray, "p q"]:

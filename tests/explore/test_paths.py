@@ -214,3 +214,26 @@ def test_a_path_is_sought_only_around_the_shortest_way_by_blocks(seed, monkeypat
     blocks, cells = searched
     assert blocks < floor / 8
     assert cells < floor / 2
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_only_blocks_connect_costs_no_search_of_the_whole_floor(seed, monkeypatch):
+    _, grid, places = explored(seed)
+    planner, searched = Planner(grid, places[0], CONFIG), []
+    column = planner._start[1]
+    to_right = planner._passable[:, column + 6 :].sum() > 400
+    across = column + 5 if to_right else column - 6
+    planner._passable[:, across] = planner._roomy[:, across] = False
+    beyond = planner._passable.copy()
+    beyond[planner._is_connected] = False
+    cells = np.argwhere(beyond)
+
+    def noted(costs):
+        searched.append(int(np.count_nonzero(costs > 0)))
+        return MCP_Geometric(costs)
+
+    monkeypatch.setattr(paths, "MCP_Geometric", noted)
+    assert planner.to(grid.points(cells + planner._corner)) is None
+    assert len(searched) == 2
+    others = np.argwhere(planner._is_connected)
+    assert planner.to(grid.points(others[[-1, 0]] + planner._corner)) is not None
