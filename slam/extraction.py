@@ -16,11 +16,10 @@ from .splitting import (
     Pieces,
     Returns,
     SplitConfig,
-    candidates,
-    choose,
     returns_of,
     rolled,
     settled,
+    split,
     split_gains,
 )
 
@@ -63,7 +62,7 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
             returns = rolled(returns, int(gains.max(axis=0).argmax()))
             sums = prefix_sums(returns.beams, returns.sigma_m)
             gains = split_gains(returns, sums, config.split)
-        pieces = choose(sums, candidates(gains, returns.breaks, config.split), returns.breaks, config.split)
+        pieces = split(gains, sums, returns.breaks, config.split)
         if len(pieces.start) == 0:
             return _none()
         pieces = settled(pieces, sums, returns.breaks)

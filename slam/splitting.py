@@ -139,6 +139,26 @@ def candidates(
     return is_cut.nonzero()[0]
 
 
+def bends(stretches: Pieces, sums: Float[np.ndarray, "6 m1"], config: SplitConfig) -> Int[np.ndarray, " c"]:
+    """Return where two lines save more chi-square than a segment costs, the best place of each stretch.
+
+    A long wall that bends by a degree or two is straight at every scale of the candidates, and hundreds in chi-square
+    from straight as a whole.
+    """
+    start, stop = stretches
+    places = np.maximum(stop - start - 2 * MIN_FIT + 1, 0)
+    k = places.nonzero()[0]
+    if not len(k):
+        return k
+    offsets = places[k].cumsum() - places[k]
+    stretch = k.repeat(places[k])
+    cut = np.arange(len(stretch)) + (start[k] + MIN_FIT - offsets).repeat(places[k])
+    gains = fit_runs(sums, start[k], stop[k])[1].repeat(places[k])
+    gains = gains - fit_runs(sums, start[stretch], cut)[1] - fit_runs(sums, cut, stop[stretch])[1]
+    worth = np.fmax.reduceat(gains, offsets) > config.segment_cost
+    return np.asarray(cut[np.lexsort((-gains, stretch))[offsets[worth]]])
+
+
 def rolled(returns: Returns, first: int) -> Returns:
     """Return the returns of a ring, beginning with the one at position `first`."""
     beams = Beams(*(np.concatenate((x[first:], x[:first])) for x in returns.beams))
@@ -162,6 +182,30 @@ def choose(
     costs = fit_runs(sums, start, stop)[1] + config.segment_cost
     costs[stop - start < MIN_FIT] = np.inf
     return _least(costs.tolist(), run_start.tolist(), cuts, config.loose_cost)
+
+
+def split(
+    gains: Float[np.ndarray, "s m1"],
+    sums: Float[np.ndarray, "6 m1"],
+    breaks: Int[np.ndarray, " b"],
+    config: SplitConfig,
+) -> Pieces:
+    """Return the best segments between candidate cuts; where a segment, or what became none, bends is one, too."""
+    cuts = candidates(gains, breaks, config)
+    while True:
+        pieces = choose(sums, cuts, breaks, config)
+        more = np.setdiff1d(bends(_stretches(pieces, cuts), sums, config), cuts)
+        if not len(more):
+            return pieces
+        cuts = np.union1d(cuts, more)
+
+
+def _stretches(pieces: Pieces, cuts: Int[np.ndarray, " c"]) -> Pieces:
+    """Return the pieces, and what lies between neighbouring cuts outside them."""
+    start, stop = cuts[:-1], cuts[1:]
+    reached = np.append(0, pieces.stop)[pieces.start.searchsorted(start, side="right")]
+    loose = stop > reached
+    return Pieces(np.append(pieces.start, start[loose]), np.append(pieces.stop, stop[loose]))
 
 
 def _least(costs: list[float], run_start: list[int], cuts: Int[np.ndarray, " c"], loose_cost: float) -> Pieces:

@@ -193,6 +193,23 @@ def test_the_cut_between_two_walls_lies_where_they_meet_however_little_they_turn
     assert nees < 1.6 if is_noisy else worst < 1e-9
 
 
+@pytest.mark.parametrize("is_noisy", [False, True])
+def test_a_long_wall_that_bends_a_little_is_two_walls(is_noisy):
+    """1.8 degrees, 0.4 m away: at a scale of 20 beams nothing, hundreds in chi-square over the whole wall."""
+    turn = np.deg2rad(1.8)
+    bent = np.array([[[-4.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [4 * np.cos(turn), 4 * np.sin(turn)]]])
+    rng, scores = np.random.default_rng(4), []
+    for _ in range(60):
+        pose = np.array([*rng.uniform((-0.4, 0.35), (0.4, 0.45)), rng.uniform(-3.0, 3.0)])
+        segments = extract(scan_of(bent, pose, rng if is_noisy else None))
+        long = segments.beam_counts >= 10
+        alpha = np.sort(wrap(segments.lines[long, 0] + pose[2] + np.pi / 2))
+        assert len(alpha) == 2, "one line for both walls"
+        sigma = np.sqrt(segments.cov[long, 0, 0][np.argsort(wrap(segments.lines[long, 0] + pose[2]))])
+        scores.append((alpha - [0.0, turn]) / sigma)
+    assert np.mean(np.square(scores)) < 1.6 if is_noisy else np.abs(scores).max() < 1e-6
+
+
 def test_what_a_pillar_hides_is_occluded_and_what_runs_out_of_range_is_open():
     faces = np.concatenate([loop((-0.2, 1.0), (-0.2, 1.2), (0.2, 1.2), (0.2, 1.0)), [[[9.0, 2.0], [-9.0, 2.0]]]])
     segments = extract(scan_of(faces, np.zeros(3)))
