@@ -32,6 +32,8 @@ class ExplorerConfig:
     """An end that was set aside is tried again when it has moved this far."""
     attempts: int = 3
     """So many ends set aside at one place (within 0.3 m) are enough: it is not tried again."""
+    returns: int = 8
+    """An end that was gone so often while the robot was about it, and came back, is set aside."""
     grown: float = 0.1
     """An end that could not be looked at is tried again when so much more of the floor around it is known."""
     patience_steps: int = 400
@@ -57,6 +59,7 @@ class Explorer:
         self._attempts = Spots(0.3)
         self._sweep = Sweep(config.sweeping, config.sweep)
         self._walked: set[tuple[int, int]] = set()
+        self._gone = Spots(0.3)
         self._floor_known: dict[tuple[int, int], int] = {}
         self.set_aside: dict[tuple[int, int], SetAside] = {}
         self._looked_again = 0
@@ -150,6 +153,8 @@ class Explorer:
         holds = self._choice.holds(around) and not (self._sweeping and self._candidates(ends))
         if isinstance(self._choice.target, OpenEnd):
             key = (self._choice.target.wall, self._choice.target.side)
+            if key not in ends:
+                self._gone.add(self._choice.target.position_world)
             holds = holds and key in ends and key not in self.set_aside
             if holds and isinstance(self._errand, EndErrand):
                 self._errand.follow(ends[key])
@@ -168,6 +173,7 @@ class Explorer:
     ) -> bool:
         """Ask the strategy where to go, and set out; False when there is nowhere left."""
         following = self._config.following
+        self._tire(ends)
         if not self._candidates(ends):
             self._retry(around, ends)
         situation = Situation(
@@ -182,6 +188,13 @@ class Explorer:
             return False
         self._set_out(choice, situation)
         return True
+
+    def _tire(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
+        """Set aside what opens and closes without end, as a chain can that looks closed from one side only."""
+        for end in self._candidates(ends):
+            if (times := self._gone.count(end.position_world)) >= self._config.returns:
+                reason = f"open again after it was gone {times} times"
+                self.set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
 
     def _set_out(self, choice: Choice, situation: Situation) -> None:
         self._choice, self._steps_on_goal = choice, 0

@@ -155,6 +155,21 @@ def test_the_last_two_ends_to_be_given_up_may_still_join():
     assert explorer.outcome is Outcome.ALL_CLOSED
 
 
+def test_an_end_that_opens_and_closes_without_end_is_set_aside_with_its_reason(scene_of):
+    """Seen from where the robot looks at it the chain is closed, seen from anywhere else it is not."""
+    scene = scene_of(3)
+    pose = np.append(scene.places[0], 0.0)
+    sides = [scene.situation(pose, chains) for chains in ([(0, 1)], [])]
+    explorer = Explorer(STRATEGIES["nearest-robot"].make(), pose[:2], replace(ExplorerConfig(), sweep=False))
+    for turn in range(100):
+        situation = sides[turn % 2]
+        if explorer.command(situation.around, situation.chains, nx.DiGraph()) is None and turn % 2 == 0:
+            break
+    assert 2 * ExplorerConfig().returns <= turn < 50
+    assert len(explorer.still_open) == 2
+    assert all("open again" in aside.reason for aside in explorer.still_open)
+
+
 @settings(max_examples=60, deadline=None)
 @example([(-3.2109375, 0.0), (1.0, 2.0)])
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=2, max_size=9, unique=True))
