@@ -25,6 +25,7 @@ from .files import write
 from .results import LOG
 from .saved import read_trial
 from .scenario import TrialConfig, UsageError, load_world
+from .scores import wheels_path
 from .timelines import true_rings
 
 BAD_USAGE = 2
@@ -91,12 +92,13 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     count = len(lines)
     blocks = first.walls["cov"][3:, 3:].reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count), :]
     covs = hessian_cov(lines[:, 0], first.walls["anchors"], blocks)
+    true, wheels = first.log["true_poses"], wheels_path(first.log["true_poses"][0], first.log["odometry"])
     colours = [palette.of_backend(trial.backend)] * count
     return {
-        "paths": lambda: draw_trajectories(first.log["true_poses"], paths, rings, title),
-        "nees": lambda: draw_nees({run.trial.backend: run.nees for run in runs}, title),
+        "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and believed", wheels),
+        "nees": lambda: draw_nees({run.trial.backend: run.nees for run in runs}, f"{title}: NEES of the pose"),
         "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
-        "traversals": lambda: draw_traversal(first.log["true_poses"], rings, title),
+        "traversals": lambda: draw_traversal(true, rings, f"{title}: how often each stretch was driven"),
     }
 
 

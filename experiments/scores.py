@@ -69,8 +69,13 @@ def nees_of_poses(
 
 def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
     """Return where the wheels alone, from the true start on, say the robot was."""
-    poses = [log.true_world[0]]
-    for motion in log.odometry[1:]:
+    return wheels_path(log.true_world[0], log.odometry)
+
+
+def wheels_path(start_world: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
+    """Return the poses from a start on by the wheels' motions alone; the first motion led to the start."""
+    poses = [start_world]
+    for motion in odometry[1:]:
         poses.append(compose(poses[-1], motion))
     return np.array(poses)
 

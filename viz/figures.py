@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, Patch, PathPatch
@@ -21,11 +22,14 @@ from slam.chains import Chain
 from slam.stochastic_map import StochasticMap
 
 from . import palette
+from .shapes import ellipses
 
 WALL_M = 0.1
 """How thick true walls are drawn around the floor, m."""
 MARGIN_M = 0.6
 ROBOT_M = 0.2
+ENLARGED = 10.0
+"""How much ellipses are enlarged that could not be seen else."""
 LETTER_INCH = 0.072
 """Mean width of a letter of the subtitle."""
 
@@ -42,6 +46,9 @@ class Picture:
     subtitle: str = ""
     set_aside: tuple[SetAside, ...] = ()
     true_path_world: Float[np.ndarray, "s 3"] | None = None
+    corners_world: Float[np.ndarray, "c 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """Corners whose covariance is known, m."""
+    corner_covs: Float[np.ndarray, "c 2 2"] = field(default_factory=lambda: np.zeros((0, 2, 2)))
     true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
     """Rings of the true floor, the exterior first; empty where the truth is not known."""
 
@@ -64,6 +71,7 @@ def draw_map(picture: Picture) -> Figure:
         *_walls(axes, picture),
         *_paths(axes, picture),
         *_ends(axes, picture),
+        *_corner_ellipses(axes, picture),
         *_robot(axes, picture),
     ]
     top = 1.0 + 0.12 / height
@@ -185,6 +193,31 @@ def _ends(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     return handles
 
 
+def _corner_ellipses(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    """Draw three standard deviations of the corners, enlarged where most could not be seen; the few large ones pale."""
+    if not len(picture.corners_world):
+        return []
+    radii = 3.0 * np.sqrt(np.maximum(np.trace(picture.corner_covs, axis1=1, axis2=2), 0.0))
+    times = _enlarged(float(np.median(radii)))
+    contours = ellipses(picture.corners_world, picture.corner_covs, times, vertices=33)
+    for chosen, alpha in ((radii > 5.0 * np.median(radii), 0.2), (radii <= 5.0 * np.median(radii), 1.0)):
+        axes.add_collection(
+            PolyCollection(
+                list(contours[chosen]), facecolors="none", edgecolors=palette.INK, linewidths=0.7, alpha=alpha,
+                zorder=4.5,
+            )
+        )  # fmt: skip
+    return [_marker("o", "none", palette.INK, 7, "3σ ellipse of a corner" + _times_words(times))]
+
+
+def _enlarged(radius_m: float) -> float:
+    return 1.0 if radius_m >= 0.1 else ENLARGED
+
+
+def _times_words(times: float) -> str:
+    return "" if times == 1.0 else f", {times:.0f} times enlarged"
+
+
 def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     """Draw the body, and the ellipse of three standard deviations, ten times as large where it could not be seen."""
     x, y, heading = picture.path_world[-1]
@@ -195,7 +228,7 @@ def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     axes.plot(*nose.T, color=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.6)
     variances, vectors = np.linalg.eigh(picture.map.belief.pose_cov[:2, :2])
     radii = 3.0 * np.sqrt(np.maximum(variances, 0.0))
-    times = 1.0 if radii.max() >= 0.1 else 10.0
+    times = _enlarged(float(radii.max()))
     angle = float(np.rad2deg(np.arctan2(vectors[1, 1], vectors[0, 1])))
     axes.add_patch(
         Ellipse(
@@ -203,7 +236,7 @@ def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
             facecolor="#D55E0033", edgecolor=palette.ALARM, linewidth=1.0, zorder=6.7,
         )
     )  # fmt: skip
-    label = "robot and its 3σ ellipse" + ("" if times == 1.0 else ", ten times enlarged")
+    label = "robot and its 3σ ellipse" + _times_words(times)
     return [_marker("o", "#D55E0033", palette.ALARM, 7, label)]
 
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from slam.consistency import chi2_band
 
 from . import palette
-from .shapes import ellipses
+from .shapes import VAGUE_RAD, ellipses
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
@@ -30,6 +30,7 @@ Rings = Sequence[Float[np.ndarray, "_ 2"]]
 def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str, dof: int = 3) -> Figure:
     """Return the NEES of each back end against the step, on a logarithmic axis, with its 95 % band."""
     figure, axes = _figure(title, (7.2, 3.2))
+    axes.margins(x=0.01)
     low, high = chi2_band(dof)
     axes.axhspan(low, high, color=palette.SWEPT, zorder=1, label="95 % band")
     for backend, values in curves.items():
@@ -52,14 +53,16 @@ def draw_trajectories(
     figure, axes = _plan(rings, title)
     if true_world is not None:
         axes.plot(
-            true_world[:, 0], true_world[:, 1], color=palette.PATH_TRUE, linewidth=3.0, alpha=0.6, label="true path"
+            true_world[:, 0], true_world[:, 1], color=palette.PATH_TRUE, linewidth=4.5, alpha=0.6, label="true path"
         )
     if wheels_world is not None:
         axes.plot(
             wheels_world[:, 0], wheels_world[:, 1], ":", color=palette.TENTATIVE, linewidth=1.2, label="wheels alone"
         )
-    for backend, path in estimated_world.items():
-        axes.plot(path[:, 0], path[:, 1], color=palette.of_backend(backend), linewidth=1.0, label=backend)
+    # Estimates that agree lie on each other: each is drawn narrower than the one below it.
+    widths = np.linspace(2.4, 0.8, len(estimated_world)) if len(estimated_world) > 1 else np.ones(1)
+    for (backend, path), width in zip(estimated_world.items(), widths, strict=False):
+        axes.plot(path[:, 0], path[:, 1], color=palette.of_backend(backend), linewidth=width, label=backend)
     axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figure
 
@@ -69,18 +72,27 @@ def draw_model_space(
     covs: Float[np.ndarray, "n 2 2"],
     colours: Sequence[str],
     title: str,
-    times: float = 5.0,
+    times: float = 10.0,
 ) -> Figure:
-    """Return the walls as ellipses of three standard deviations in the plane of (alpha rad, r m), `times` enlarged."""
-    figure, axes = _figure(f"{title} (3σ ellipses, {times:g} times enlarged)", (5.2, 4.6))
-    axes.add_collection(
-        PolyCollection(list(ellipses(lines_world, covs, times)), facecolors="none", edgecolors=colours, linewidths=1.0)
-    )
-    axes.scatter(lines_world[:, 0], lines_world[:, 1], s=3.0, c=list(colours), zorder=3)
+    """Return the walls as ellipses of three standard deviations in the plane of (alpha rad, r m), `times` enlarged.
+
+    Walls of a direction less certain than VAGUE_RAD, whose ellipses are huge, are pale.
+    """
+    figure, axes = _figure(f"{title}\n3σ ellipses of the walls, {times:g} times enlarged", (5.2, 4.6))
+    vague = np.sqrt(covs[:, 0, 0]) > VAGUE_RAD
+    contours = ellipses(lines_world, covs, times, vertices=49)
+    for chosen, alpha, width in ((vague, 0.25, 0.6), (~vague, 1.0, 1.0)):
+        axes.add_collection(
+            PolyCollection(
+                list(contours[chosen]), facecolors="none", edgecolors=np.array(colours)[chosen], linewidths=width,
+                alpha=alpha, zorder=2 + alpha,
+            )
+        )  # fmt: skip
+    axes.grid(color=palette.GRID, linewidth=0.5)
+    axes.scatter(lines_world[:, 0], lines_world[:, 1], s=2.0, c=list(colours), zorder=4)
     axes.set_xlim(-1.05 * np.pi, 1.05 * np.pi)
     axes.set_ylim(lines_world[:, 1].min(initial=0.0) - 1.0, lines_world[:, 1].max(initial=0.0) + 1.0)
-    axes.xaxis.set_major_locator(MultipleLocator(0.5 * np.pi))
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value / np.pi:g} π" if abs(value) > 1e-9 else "0")
+    axes.set_xticks(0.5 * np.pi * np.arange(-2, 3), ["-π", "-π/2", "0", "π/2", "π"])
     axes.set_xlabel("direction α, rad")
     axes.set_ylabel("distance r, m")
     return figure

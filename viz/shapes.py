@@ -8,6 +8,8 @@ from slam.geometry.lines import directions
 VERTICES = 17
 """An ellipse is a closed strip of so many points, the first again at its end."""
 SIGMAS = 3.0
+VAGUE_RAD = float(np.deg2rad(1.0))
+"""Walls of a less certain direction (short faces, seen from afar) are drawn pale: their ellipses are huge."""
 
 
 def ellipses(

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,3 +41,13 @@ def test_the_picture_is_a_png_and_the_same_bytes_again(size):
     one, two = (png(draw_map(picture(closed=True, size=size))) for _ in range(2))
     assert one.startswith(b"\x89PNG")
     assert one == two
+
+
+@pytest.mark.parametrize(("sigma_m", "words"), [(0.005, ", 10 times enlarged"), (0.1, "")])
+def test_ellipses_of_corners_that_could_not_be_seen_are_enlarged_and_the_legend_says_so(sigma_m, words):
+    plain = picture(closed=True)
+    corners = plain.chains[0].corners_world
+    assert not any("of a corner" in label for label in labels(draw_map(plain)))
+    covs = np.tile(sigma_m**2 * np.eye(2), (len(corners), 1, 1))
+    shown = labels(draw_map(replace(plain, corners_world=corners, corner_covs=covs)))
+    assert f"3σ ellipse of a corner{words}" in shown

@@ -7,7 +7,7 @@ from slam.geometry.lines import normals
 from slam.geometry.poses import wrap
 
 from .. import palette
-from ..shapes import VERTICES, ellipses, hessian_cov
+from ..shapes import VAGUE_RAD, VERTICES, ellipses, hessian_cov
 from .block import FUSED, REFUSED, Block
 from .colours import packed, pale
 from .map_layers import style
@@ -17,8 +17,6 @@ from .recording import Recording
 
 TIMES = 10.0
 """How much its ellipses are enlarged."""
-VAGUE_RAD = float(np.deg2rad(1.0))
-"""Walls of a less certain direction (short faces, seen from afar) are drawn pale: their ellipses are huge."""
 QUANTUM = 0.02
 """An enlarged ellipse is drawn again when it has changed by about this, rad or m."""
 
