@@ -1,14 +1,22 @@
-"""The picture beside a trial's results: the estimate, and the truth moved by the initial pose error under it."""
+"""The picture of a run's map: the estimate, and the truth moved by the initial pose error under it."""
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import shapely
 from jaxtyping import Float
 
+from explore.goal import SetAside
+from sim.worlds import World
+from slam.chains import Chain
 from slam.geometry.poses import compose, inverse, to_world
+from slam.stochastic_map import StochasticMap
 from viz.figures import Picture, draw_map, png
 
 from .corners import corners
 from .coverage import alignment
+from .scenario import TrialConfig
 from .trial import TrialResult
 
 
@@ -16,13 +24,37 @@ def picture_of(result: TrialResult) -> bytes:
     """Return the PNG of a trial's map; raises ValueError where there was no step to draw."""
     if result.log is None or result.last is None:
         raise ValueError("expected a run of at least one step, found none: there is no map to draw")
-    log, summary, config = result.log, result.summary, result.scenario.config
-    to_estimate = inverse(alignment(result.scenario.start_estimate, log.true_world[0]))
-    free = result.scenario.world.free
-    rings = tuple(
-        to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in (free.exterior, *free.interiors)
-    )
-    known, covs = _corners(result)
+    log, last, scenario = result.log, result.last, result.scenario
+    known = [
+        (corner.position_world, cov)
+        for corner in corners(last.map, last.chains)
+        if result.joint is not None and (cov := corner.cov(result.joint)) is not None
+    ]
+    return png(
+        draw_map(
+            over_truth(
+                scenario.world, scenario.config, result.summary, last.map, last.chains, last.set_aside, known,
+                log.estimated_world, log.true_world, scenario.start_estimate,
+            )
+        )
+    )  # fmt: skip
+
+
+def over_truth(
+    world: World,
+    config: TrialConfig,
+    summary: Mapping[str, Any],
+    walls: StochasticMap,
+    chains: tuple[Chain, ...],
+    set_aside: tuple[SetAside, ...],
+    corners_with_covs: list[tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"]]],
+    estimated_world: Float[np.ndarray, "s 3"],
+    true_world: Float[np.ndarray, "s 3"],
+    start_estimate: Float[np.ndarray, "3"],
+) -> Picture:
+    """Return what the picture of a map shows."""
+    to_estimate = inverse(alignment(start_estimate, true_world[0]))
+    rings = (world.free.exterior, *world.free.interiors)
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
@@ -30,35 +62,15 @@ def picture_of(result: TrialResult) -> bytes:
         f"pose error {100 * summary['pose_rmse_m']:.1f} cm rms (wheels alone: {summary['odometry_max_m']:.2f} m)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"
-    return png(
-        draw_map(
-            Picture(
-                map=result.last.map,
-                chains=result.last.chains,
-                path_world=log.estimated_world,
-                title=f"{result.scenario.world.name}   {config.backend}, {config.strategy}, {noise}",
-                subtitle="grid 1 m;  " + ";  ".join(words),
-                set_aside=result.last.set_aside,
-                true_path_world=np.array([compose(to_estimate, pose) for pose in log.true_world]),
-                corners_world=known,
-                corner_covs=covs,
-                true_floor=rings,
-            )
-        )
-    )
-
-
-def _corners(result: TrialResult) -> tuple[Float[np.ndarray, "c 2"], Float[np.ndarray, "c 2 2"]]:
-    """Return the corners of the last map whose covariance is known, and their covariances."""
-    if result.last is None or result.joint is None:
-        return np.zeros((0, 2)), np.zeros((0, 2, 2))
-    joint = result.joint
-    known = [
-        (corner.position_world, cov)
-        for corner in corners(result.last.map, result.last.chains)
-        if (cov := corner.cov(joint)) is not None
-    ]
-    return (
-        np.array([place for place, _ in known]).reshape(-1, 2),
-        np.array([cov for _, cov in known]).reshape(-1, 2, 2),
+    return Picture(
+        map=walls,
+        chains=chains,
+        path_world=estimated_world,
+        title=f"{world.name}   {config.backend}, {config.strategy}, {noise}",
+        subtitle="grid 1 m;  " + ";  ".join(words),
+        set_aside=set_aside,
+        true_path_world=np.array([compose(to_estimate, pose) for pose in true_world]),
+        corners_world=np.array([place for place, _ in corners_with_covs]).reshape(-1, 2),
+        corner_covs=np.array([cov for _, cov in corners_with_covs]).reshape(-1, 2, 2),
+        true_floor=tuple(to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings),
     )

@@ -1,7 +1,7 @@
 """Pictures for papers from the folders that runs left: `python -m experiments.pictures DIR ... --out PICTURES`.
 
-Paths and NEES of several folders (replays of one log) come together; the model space and the traversals are of the
-first. The map itself is in each folder as `map.png`.
+Paths and NEES of several folders (replays of one log) come together; the map, the model space and the traversals are of
+the first.
 """
 
 import sys
@@ -16,7 +16,7 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from viz import palette
-from viz.figures import saved
+from viz.figures import draw_map, saved
 from viz.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
 from viz.shapes import hessian_cov
 
@@ -24,6 +24,7 @@ from .explore_command import prepare
 from .files import write
 from .results import LOG
 from .saved import read_trial
+from .saved_map import saved_map
 from .scenario import TrialConfig, UsageError, load_world
 from .scores import wheels_path
 from .timelines import true_rings
@@ -33,7 +34,7 @@ BAD_USAGE = 2
 
 @dataclass(frozen=True)
 class Pictures:
-    """Draw paths, NEES, model space and traversals of the runs in some folders."""
+    """Draw map, paths, NEES, model space and traversals of the runs in some folders."""
 
     runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR")]
     """Folders of runs in one world."""
@@ -45,8 +46,11 @@ class Pictures:
     def run(self) -> None:
         """Write the pictures; raises UsageError where a folder holds no run."""
         runs = [read_pictured(folder) for folder in self.runs]
+        first = runs[0]
+        shown = saved_map(self.runs[0], first.trial, first.log, first.walls, first.estimated_world)
         prepare(self.out)
-        for name, draw in draw_all(runs).items():
+        pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown), **draw_all(runs)}
+        for name, draw in pictures.items():
             figure = draw()
             for kind in self.kinds:
                 write(self.out / f"{name}.{kind}", saved(figure, kind))

@@ -1,0 +1,72 @@
+"""The picture of a map from the files that a run left, so that it can be drawn again as vectors."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.goal import SetAside
+from slam.backend import Belief, Joint, StaleBeliefError
+from slam.chains import HEAD, TAIL, Chain, OpenEnd
+from slam.stochastic_map import StochasticMap
+from viz.figures import Picture
+
+from .picture import over_truth
+from .scenario import TrialConfig, UsageError, load_world
+
+
+def saved_map(
+    folder: Path,
+    trial: TrialConfig,
+    log: Mapping[str, np.ndarray],
+    walls: Mapping[str, np.ndarray],
+    estimated_world: Float[np.ndarray, "s 3"],
+) -> Picture:
+    """Return the picture of a run's map from its folder and its arrays; raises UsageError where a file is missing."""
+    try:
+        features = json.loads((folder / "map.geojson").read_text())["features"]
+        summary = json.loads((folder / "summary.json").read_text())
+    except (OSError, ValueError, KeyError) as error:
+        raise UsageError(f"expected a run's results in {folder}, found {error}: name what `explore` left") from error
+    covs = [
+        (np.array(feature["geometry"]["coordinates"]), np.array(feature["properties"]["covariance_xy_m2"]))
+        for feature in _of_kind(features, "corner")
+        if feature["properties"]["covariance_xy_m2"] is not None
+    ]
+    aside = [
+        SetAside(end["wall"], end["side"], np.array(end["position_m"]), end["why"])
+        for end in summary.get("set_aside") or ()
+    ]
+    belief = Belief(
+        walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
+    )
+    return over_truth(
+        load_world(trial.world, trial.start, trial.scale), trial, summary,
+        StochasticMap(belief, walls["extents"], walls["sightings"], walls["tentative"]), _chains(features),
+        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
+    )  # fmt: skip
+
+
+def _not_to_be_asked(ids: np.ndarray) -> Joint:
+    raise StaleBeliefError("expected a back end at work, found its results on disk: read the joint covariance there")
+
+
+def _of_kind(features: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
+    return [feature for feature in features if feature["properties"]["kind"] == kind]
+
+
+def _chains(features: Sequence[Mapping[str, Any]]) -> tuple[Chain, ...]:
+    """Return the chains in the order that they had; a file holds the closed ones first."""
+    found: dict[int, Chain] = {}
+    for feature in _of_kind(features, "chain"):
+        says, way = feature["properties"], feature["geometry"]["coordinates"]
+        members = tuple(says["walls"])
+        if says["closed"]:
+            found[says["chain"]] = Chain(members, np.array(way[0][:-1]), ())
+        else:
+            ends = (OpenEnd(members[0], TAIL, np.array(way[0])), OpenEnd(members[-1], HEAD, np.array(way[-1])))
+            found[says["chain"]] = Chain(members, np.array(way[1:-1]).reshape(-1, 2), ends)
+    return tuple(chain for _, chain in sorted(found.items()))
