@@ -142,9 +142,10 @@ def replay(
         watch(step)
 
     def mission(scenario: Scenario) -> Iterator[Step]:
+        rules = scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper)
         mapper = Mapper(
             scenario.backend,
-            scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper),
+            replace(rules, bends=None) if options.perfect_extraction else rules,
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(match if oracle is None else oracle),
         )

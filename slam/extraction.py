@@ -16,6 +16,8 @@ from .splitting import (
     Pieces,
     Returns,
     SplitConfig,
+    cut_at,
+    position_of,
     returns_of,
     rolled,
     settled,
@@ -45,12 +47,14 @@ class ExtractionConfig:
 
 
 DEFAULT = ExtractionConfig()
+NO_BENDS = np.zeros(0)
 
 
-def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
+def extract(scan: Scan, config: ExtractionConfig = DEFAULT, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
     """Return the straight segments of `scan` in the robot frame, counter-clockwise; none where nothing is straight.
 
-    An end is OPEN also where the wall stops in front of something farther.
+    An end is OPEN also where the wall stops in front of something farther. At the bearings `bends_rad` the wall is
+    known to bend.
     """
     with np.errstate(all="ignore"):
         returns = returns_of(scan, config.split)
@@ -65,6 +69,8 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT) -> Segments:
         pieces = split(gains, sums, returns.breaks, config.split)
         if len(pieces.start) == 0:
             return _none()
+        if len(bends_rad):
+            pieces = cut_at(pieces, position_of(bends_rad, scan, returns))
         pieces = settled(pieces, sums, returns.breaks)
         fit, pieces, is_corner, in_doubt = _sharpen(pieces, sums, returns, config)
         return _fitted(fit, pieces, is_corner, in_doubt, returns, config)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Backend, Joint, Observations
+from .bends import BendsConfig, bends_within
 from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import extract
@@ -26,6 +27,8 @@ class MapperConfig:
     """The rules of the seven steps."""
 
     matching: MatchingConfig = field(default_factory=MatchingConfig)
+    bends: BendsConfig | None = field(default_factory=BendsConfig)
+    """None where the extractor knows best where walls bend."""
     chains: ChainConfig = field(default_factory=ChainConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
     faint: FaintConfig = field(default_factory=FaintConfig)
@@ -80,7 +83,7 @@ class Mapper:
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
-        segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
+        segments = self._segments(scan)
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan)
         joint = self.backend.belief.joint(near.ids)
@@ -101,6 +104,16 @@ class Mapper:
         self._gaps.see(walls, scan)
         chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
         return MapUpdate(segments, matches, owners, walls, chains, merged)
+
+    def _segments(self, scan: Scan) -> Segments:
+        """Return the straight pieces of the scan, cut where the map knows a bend."""
+        segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
+        if self.config.bends is None:
+            return segments
+        bends = bends_within(segments, self._walls.map(self.backend.belief), self.config.bends)
+        if not len(bends):
+            return segments
+        return sure_pieces(extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
 
     def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
         """Return matches safe enough to relocate the robot by.

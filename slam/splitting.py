@@ -231,6 +231,23 @@ def _least(costs: list[float], run_start: list[int], cuts: Int[np.ndarray, " c"]
     return Pieces(ends[:, 0], ends[:, 1])
 
 
+def position_of(bearings_rad: Float[np.ndarray, " b"], scan: Scan, returns: Returns) -> Int[np.ndarray, " b"]:
+    """Return the number of returns that come before each bearing."""
+    beam = np.mod(bearings_rad - scan.bearings_rad[0], 2.0 * np.pi) / returns.step_rad
+    if returns.period:
+        beam = np.mod(beam - returns.turn[0], returns.period) + returns.turn[0]
+    return returns.turn.searchsorted(beam)
+
+
+def cut_at(pieces: Pieces, at: Int[np.ndarray, " b"]) -> Pieces:
+    """Cut the pieces before the returns `at`; a part of fewer than `MIN_FIT` returns is left loose."""
+    ends = np.unique(np.concatenate((pieces.start, pieces.stop, at)))
+    start, stop = ends[:-1], ends[1:]
+    inside = pieces.start.searchsorted(start, side="right") - 1
+    kept = (inside >= 0) & (stop <= pieces.stop[inside]) & (stop - start >= MIN_FIT)
+    return Pieces(start[kept], stop[kept])
+
+
 def settled(pieces: Pieces, sums: Float[np.ndarray, "6 m1"], breaks: Int[np.ndarray, " b"], rounds: int = 4) -> Pieces:
     """Move each cut between two pieces that touch to where their two lines fit best, all cuts at once.
 

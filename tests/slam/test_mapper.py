@@ -195,3 +195,16 @@ def test_walls_that_were_entered_twice_are_merged(backend):
     assert len(last.map) == 4
     assert [chain.is_closed for chain in last.chains] == [True]
     assert set(last.walls_of_segments.tolist()) <= {-1, *last.map.ids.tolist()}
+
+
+def test_a_bend_that_the_map_knows_is_cut_where_the_scan_shows_one_line():
+    """A wall that turns by a degree, first from 0.4 m, then from 2.6 m, where one line moved the robot by 4 mm."""
+    slope = np.tan(np.deg2rad(1.0))
+    room = faces_of(shapely.Polygon([(0, 0), (4, 0), (8, -4 * slope), (8, 3), (0, 3)]))
+    near = [(x, 0.4 - max(x - 4, 0) * slope, 0.0) for x in np.arange(1.0, 6.0, 0.1)]
+    away = [(5.9, y, 0.0) for y in np.arange(0.4, 2.6, 0.1)]
+    far = [(x, 2.6, np.pi) for x in np.arange(5.9, 2.0, -0.1)]
+    places = np.array([*near, *away, *far])
+    for pose, update in zip(places, walk(room, places), strict=True):
+        np.testing.assert_allclose(update.map.belief.pose_world[:2], pose[:2], atol=1e-4)
+    assert len(update.map) == 5

@@ -1,0 +1,97 @@
+"""Bends that the map knows: which walls make one, and on which segments it lies."""
+
+import numpy as np
+import pytest
+
+from slam.backend import Belief, Joint
+from slam.bends import bends_within
+from slam.geometry.lines import directions, through
+from slam.geometry.poses import to_robot
+from slam.segments import Segments
+from slam.stochastic_map import StochasticMap
+
+POSE = np.array([1.0, 2.0, 0.7])
+
+
+def map_of(ends, sigma=1e-3):
+    """Return a map of walls with these ends, world frame, each anchored at its middle, and the robot at POSE.
+
+    All is known to `sigma`, m and rad.
+    """
+    ends = np.array(ends, dtype=float)
+    alpha, middle, n = through(ends)[:, 0], ends.mean(axis=1), len(ends)
+    means = np.stack([alpha, np.zeros(n)], axis=-1)
+
+    def query(ids):
+        return Joint(np.append(POSE, means[ids].ravel()), sigma**2 * np.eye(3 + 2 * len(ids)), middle[ids])
+
+    belief = Belief(POSE, np.eye(3), np.arange(n), middle, means, query)
+    extents = np.sum((ends - middle[:, None]) * directions(alpha)[:, None], axis=-1)
+    return StochasticMap(belief, extents, np.full(n, 9), np.zeros(n, dtype=bool))
+
+
+def segment_of(first, last):
+    ends = to_robot(np.array([[first, last]], dtype=float), POSE)
+    nothing = np.zeros((1, 2), dtype=np.int64)
+    return Segments(through(ends), np.eye(2)[None], ends, nothing, np.array([9]), nothing)
+
+
+def bent(gap=0.0, slope=0.03, aside=0.0):
+    """Return two walls along y = 0, free side above, the second of which goes down by `slope`."""
+    return [[[0.0, 0.0], [2.0 - gap / 2, 0.0]], [[2.0 + gap / 2, aside], [4.0, aside - slope * 2.0]]]
+
+
+@pytest.mark.parametrize(
+    ("walls", "is_bend"),
+    [
+        (bent(), True),
+        (bent(gap=0.08), True),
+        (bent(gap=0.2), False),
+        (bent(gap=-0.4), True),
+        (bent(gap=-1.2), True),
+        (bent(slope=0.3), False),
+        (bent(aside=-0.1), False),
+        (bent()[:1], False),
+        ([[[0.0, 0.0], [2.0, 0.0]], [[1.6, 0.0], [1.9, 0.0]]], False),
+    ],
+)
+def test_where_one_wall_ends_another_begins_that_turns_little(walls, is_bend):
+    """Not past a gap, nor where they turn much, lie apart, or one lies within the other; lines cross there."""
+    found = bends_within(segment_of([1.0, 0.01], [3.0, -0.02]), map_of(walls))
+    assert len(found) == is_bend
+    if is_bend:
+        np.testing.assert_allclose(found, np.arctan2(-2.0, walls[1][0][0] - 1.0) - POSE[2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "is_on"),
+    [
+        ([1.0, 0.0], [3.0, -0.03], True),
+        ([1.0, 0.0], [2.02, 0.0], False),
+        ([1.98, 0.0], [3.0, -0.03], False),
+        ([1.0, 0.1], [3.0, 0.1], False),
+        ([3.0, 0.0], [1.0, 0.0], False),
+        ([1.85, 0.03], [2.15, -0.06], False),
+    ],
+)
+def test_a_bend_lies_within_the_segments_that_pass_over_it(first, last, is_on):
+    """Not on one that ends there, lies aside, is the other side of the wall, or crosses it."""
+    assert len(bends_within(segment_of(first, last), map_of(bent()))) == is_on
+
+
+def test_a_wall_seen_once_makes_no_bend():
+    walls = map_of(bent())
+    walls.tentative[1] = True
+    assert not len(bends_within(segment_of([1.0, 0.0], [3.0, 0.0]), walls))
+
+
+def test_where_walls_overlap_the_bend_is_where_their_lines_cross():
+    """The first one was stretched by 1.2 m past the bend."""
+    walls = map_of([[[0.0, 0.0], [3.2, 0.0]], [[2.0, 0.0], [4.0, -0.06]]])
+    (bearing,) = bends_within(segment_of([1.0, 0.01], [3.5, -0.03]), walls)
+    np.testing.assert_allclose(bearing, np.arctan2(-2.0, 1.0) - POSE[2], atol=1e-9)
+
+
+@pytest.mark.parametrize(("sigma", "is_known"), [(0.004, True), (0.02, False)])
+def test_a_bend_that_may_be_a_straight_wall_is_not_known(sigma, is_known):
+    assert len(bends_within(segment_of([1.0, 0.0], [3.0, -0.03]), map_of(bent(), sigma))) == is_known
