@@ -1,5 +1,6 @@
 """Truth meets timeline: runs become recordings, and whatever happens to a recording, the run goes on."""
 
+import gc
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -82,6 +83,8 @@ class Recording:
         os.environ.setdefault("RUST_LOG", "off")
         from viz.timeline import Timeline  # imports rerun: only where a recording is asked for
 
+        # Its modules stay till the end: looked through at every collection, they would cost as much as the drawing.
+        gc.freeze()
         nees_of = None if errorless else nees_of_poses
         self._timeline = Timeline(title, backends, () if world is None else true_rings(world), nees_of, viewer_url)
 
