@@ -37,9 +37,9 @@ class DrivingConfig:
     narrow_spin_rad: float = float(np.deg2rad(4.0))
     """... turns on the spot first with more than this to turn, ..."""
     give_m: float = 0.003
-    """Where less than the margin is left already, a step may take this much of it, ..."""
+    """Where less than that is left between two sides already, a step may take this much of it, ..."""
     least_margin_m: float = 0.004
-    """... down to this."""
+    """... down to this. Beside a lone return there is room: that much is below a range's noise."""
     fits_m: float = 0.425
     """... and does not try where they leave less than this: returns tell the width to a centimetre or two."""
     beside_m: float = 0.1
@@ -97,15 +97,14 @@ class Pilot:
         if abs(error) > (self._config.narrow_spin_rad if narrow else self._config.spin_rad):
             return MotionCommand(0.0, turn)
         forward = min(self._config.step_m * (1.0 - 0.8 * abs(error) / self._config.spin_rad), distance)
-        margin = self._config.narrow_margin_m if narrow else self._config.margin_m
         forward = min(forward, self._config.careful_m) if narrow else forward
         for share in (1.0, 0.5, 0.25):
             command = MotionCommand(share * forward, turn)
-            if _is_safe(command, points, self._config, margin):
+            if _is_safe(command, points, self._config, narrow):
                 return self._careful(command, pose_world, free_space)
         back = MotionCommand(-self._config.careful_m, 0.0)
         if narrow:
-            return back if _is_safe(back, points, self._config, margin) else None
+            return back if _is_safe(back, points, self._config, narrow) else None
         return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
@@ -154,7 +153,7 @@ def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> Moti
     least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
     best = int(np.argmax(least))
     leads_out = least[best] > gaps.min() + 0.2 * config.careful_m and _is_safe(
-        commands[best], points_robot, config, config.margin_m
+        commands[best], points_robot, config, narrow=False
     )
     return commands[best] if leads_out else None
 
@@ -180,7 +179,7 @@ def _centred(
 
 
 def _is_safe(
-    command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, margin_m: float
+    command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, narrow: bool
 ) -> bool:
     """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
     if not len(points_robot):
@@ -192,6 +191,8 @@ def _is_safe(
     gap = near - places[:, None]
     least = float(np.hypot(gap[..., 0], gap[..., 1]).min())
     now = float(np.hypot(near[:, 0], near[:, 1]).min())
-    # Deep in a gap hardly wider than the body, a step along it may take some of what little is left.
-    little = max(min(margin_m, now - config.radius_m - config.give_m), config.least_margin_m)
-    return least >= config.radius_m + little or (least >= now and least > config.radius_m)
+    margin = config.margin_m
+    if narrow:  # deep in a gap hardly wider than the body, a step along it may take some of what little is left
+        left = now - config.radius_m - config.give_m
+        margin = max(min(config.narrow_margin_m, left), config.least_margin_m)
+    return least >= config.radius_m + margin or (least >= now and least > config.radius_m)
