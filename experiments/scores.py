@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from explore.homing import HOME_M
 from explore.outcome import Outcome
 from explore.step import Step
-from slam.backend import Joint
+from slam.backend import POSE, Joint, columns_of
 from slam.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
 from slam.geometry.poses import compose, to_world, wrap
 
@@ -194,7 +194,7 @@ def map_anees(
         return None
     lines = votes.truth.lines[np.maximum(votes.faces_of(ids), 0)]
     error, cov = joint_error(joint, true_pose_world, lines)
-    index = np.concatenate([np.arange(3 * with_pose), (3 + 2 * rows[:, None] + np.arange(2)).ravel()])
+    index = columns_of(rows)[0 if with_pose else POSE :]
     try:
         return float(nees(error[None, index], cov[None][:, index[:, None], index])[0]) / len(index)
     except np.linalg.LinAlgError:

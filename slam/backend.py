@@ -19,6 +19,19 @@ class StaleBeliefError(RuntimeError):
     """A belief was asked for its joint covariance after its back end had moved on."""
 
 
+POSE = 3
+"""Size of a pose (x m, y m, heading rad), which stands before the lines in every joint state."""
+
+
+def columns_of(rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
+    """Return where the pose and the lines of these rows stand in (x, y, heading, alpha_1, d_1, alpha_2, d_2, ...)."""
+    columns = np.empty(POSE + 2 * len(rows), dtype=np.int64)
+    columns[:POSE] = 0, 1, 2
+    columns[POSE::2] = POSE + 2 * rows
+    columns[POSE + 1 :: 2] = columns[POSE::2] + 1
+    return columns
+
+
 @dataclass(frozen=True)
 class Joint:
     """A Gaussian of the pose and some lines together: (x, y, heading, alpha_1, d_1, alpha_2, d_2, ...)."""
@@ -27,6 +40,11 @@ class Joint:
     cov: Float[np.ndarray, "s s"]
     anchors: Float[np.ndarray, "m 2"]
     """Anchor of each of the lines, world frame, m; s = 3 + 2 m."""
+
+    def take(self, rows: Int[np.ndarray, " k"]) -> "Joint":
+        """Return the Gaussian of the pose and some of the lines."""
+        columns = columns_of(rows)
+        return Joint(self.mean[columns], self.cov[columns[:, None], columns], self.anchors[rows])
 
 
 @dataclass(frozen=True)

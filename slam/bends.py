@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from .duplicates import of_two, same_line
+from .duplicates import same_line
 from .geometry.lines import directions, distance_to_segments, normals
 from .geometry.poses import to_robot, wrap
 from .segments import Segments
@@ -59,7 +59,7 @@ def _are_known(walls: StochasticMap, pairs: Int[np.ndarray, "b 2"], config: Bend
         return np.zeros(0, dtype=bool)
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
-    return np.array([not same_line(of_two(joint, rows), config.known) for rows in np.searchsorted(ids, pairs)])
+    return np.array([not same_line(joint.take(rows), config.known) for rows in np.searchsorted(ids, pairs)])
 
 
 def _bends(

@@ -46,7 +46,7 @@ def duplicate_of(
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
     for pair, rows in zip(pairs.tolist(), np.searchsorted(ids, pairs), strict=True):
-        two = of_two(joint, rows)
+        two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
         if turn <= config.turn_sigma_rad**2 and same_line(two, config.gate):
             return pair[0], pair[1]
@@ -77,12 +77,6 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
 
 def _dot(points: Float[np.ndarray, "p 2 2"], vectors: Float[np.ndarray, "p 2"]) -> Float[np.ndarray, "p 2"]:
     return np.einsum("pei,pi->pe", points, vectors)
-
-
-def of_two(joint: Joint, rows: Int[np.ndarray, "2"]) -> Joint:
-    """Return the pose and two of the lines."""
-    index = np.concatenate([np.arange(3), (3 + 2 * rows[:, None] + np.arange(2)).ravel()])
-    return Joint(joint.mean[index], joint.cov[np.ix_(index, index)], joint.anchors[rows])
 
 
 def same_line(joint: Joint, gate: float) -> bool:

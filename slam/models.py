@@ -7,8 +7,9 @@ A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
+from .backend import POSE
 from .geometry.lines import directions, normals
 from .geometry.poses import J, compose, rotation, wrap
 
@@ -60,6 +61,10 @@ class Innovations:
     R: Float[np.ndarray, "m 2 2"]
     """Covariance of e that comes from the measurement."""
 
+    def take(self, rows: Int[np.ndarray, " k"] | Bool[np.ndarray, " m"]) -> "Innovations":
+        """Return the chosen rows (integer or boolean index)."""
+        return Innovations(self.e[rows], self.H_pose[rows], self.H_line[rows], self.R[rows])
+
 
 def innovations(
     pose_world: Float[np.ndarray, "3"],
@@ -104,6 +109,30 @@ def innovations(
     R[:, 0, 0] = cov[:, 0, 0]
     R[:, 1, 1] = (cov[:, 1, 1] - cov[:, 0, 1] * t0) * (cosine - t0 * sine / r) ** 2
     return Innovations(e, H_pose, H_line, R)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A linear measurement of the pose and a few lines: e = H dx + v, v of covariance R."""
+
+    rows: Int[np.ndarray, " u"]
+    """Rows of the map's lines that are measured, each once."""
+    H: Float[np.ndarray, "k s"]
+    """By the pose and those lines, s = 3 + 2 u."""
+    e: Float[np.ndarray, " k"]
+    R: Float[np.ndarray, "k k"]
+
+
+def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
+    """Join the innovations of m sightings (several may be of one line) into one measurement."""
+    m = len(rows)
+    each = np.arange(m)
+    lines, place = (rows, each) if len(set(rows.tolist())) == m else np.unique(rows, return_inverse=True)
+    H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
+    H_lines[each, :, place, :] = model.H_line
+    R[each, :, each, :] = model.R
+    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, 2 * len(lines))], axis=1)
+    return Linear(lines, H, model.e.ravel(), R.reshape(2 * m, 2 * m))
 
 
 @dataclass(frozen=True)

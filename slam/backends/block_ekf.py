@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..backend import Observations
+from ..models import stack
 from .block_map import BlockMap
 from .ekf import Ekf
-from .linear import stack
 
 
 class BlockEkf(Ekf[BlockMap]):

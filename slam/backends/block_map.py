@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import Joint
+from ..backend import POSE, Joint
 from ..geometry.poses import wrap
-from .linear import POSE, Linear
+from ..models import Linear
 
 
 class BlockMap:

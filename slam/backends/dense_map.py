@@ -5,16 +5,14 @@ has a slot, two rows of P; a slot that is free holds zeros, so removing a line m
 place.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg.blas import dsyr2k, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
-from ..backend import Joint
+from ..backend import POSE, Joint, columns_of
 from ..geometry.poses import wrap
-from .linear import POSE, Linear
+from ..models import Linear
 
 SPARE = 16
 """Slots are added by so many at least, and by an eighth of those there are."""
@@ -113,13 +111,9 @@ class DenseMap:
         self._P = dsyr2k(1.0, U, B, beta=1.0, c=self._P, lower=1, overwrite_c=1)
         self._mirror_pose()
 
-    def _columns(self, rows: Int[np.ndarray, " m"] | Sequence[int]) -> Int[np.ndarray, " s"]:
+    def _columns(self, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
         """Return where the pose and some lines stand in x and P."""
-        columns = np.empty(POSE + 2 * len(rows), dtype=np.int64)
-        columns[:POSE] = 0, 1, 2
-        columns[POSE::2] = POSE + 2 * self._slots[rows]
-        columns[POSE + 1 :: 2] = columns[POSE::2] + 1
-        return columns
+        return columns_of(self._slots[rows])
 
     def _correct(
         self, PHt: Float[np.ndarray, "t k"], root: Float[np.ndarray, "k k"], e: Float[np.ndarray, " k"]

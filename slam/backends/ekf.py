@@ -11,11 +11,11 @@ from typing import Generic, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import Belief, Joint, Observations, StaleBeliefError
-from ..models import Growth, Innovations, Motion, grow, innovations, move
+from ..backend import POSE, Belief, Joint, Observations, StaleBeliefError
+from ..models import Growth, Innovations, Linear, Motion, grow, innovations, move, stack
 from ..robot import Odometry
 from .frame import Frame
-from .linear import POSE, Linear, equality, stack
+from .linear import equality
 
 ONE_WALL = 1e-12 * np.eye(2)
 """Two lines known to be one leave S singular: a thousandth of a millimetre keeps it invertible."""

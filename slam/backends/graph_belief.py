@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import Belief, Joint, StaleBeliefError
+from ..backend import Belief, Joint, StaleBeliefError, columns_of
 from ..geometry.lines import directions, normals
 from ..geometry.poses import compose, rotation, wrap
 from ..models import move
@@ -43,9 +43,9 @@ def believe(
         known, cov = answers[0]
         order = np.argsort(known)
         at = order[np.searchsorted(known, rows, sorter=order)]
-        index = np.concatenate([np.arange(3), (3 + 2 * at[:, None] + np.arange(2)).ravel()])
+        columns = columns_of(at)
         mean = np.concatenate([belief.pose_world, belief.means[rows].ravel()])
-        return Joint(mean, cov[np.ix_(index, index)], anchors[rows])
+        return Joint(mean, cov[columns[:, None], columns], anchors[rows])
 
     belief = Belief(ahead.pose_world, ahead.pose_cov(solver.pose_cov()), solver.ids, anchors, means, query)
     return belief

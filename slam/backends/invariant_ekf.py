@@ -3,9 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from ..backend import POSE
+from ..models import Linear
 from .dense_map import DenseMap
 from .ekf import Ekf
-from .linear import POSE, Linear, carry
+from .linear import carry
 
 
 class InvariantEkf(Ekf[DenseMap]):

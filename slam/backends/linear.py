@@ -1,39 +1,12 @@
-"""What the filters share: sightings as one linear measurement, and what P must follow when the estimate moves."""
-
-from dataclasses import dataclass
+"""What the filters share: that two lines are one, as a measurement, and what P must follow when the estimate moves."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
+from ..backend import POSE
 from ..geometry.lines import normals
 from ..geometry.poses import J, wrap
-from ..models import Innovations, reanchor
-
-POSE = 3
-
-
-@dataclass(frozen=True)
-class Linear:
-    """A linear measurement of the pose and a few lines: e = H dx + v, v of covariance R."""
-
-    rows: Int[np.ndarray, " u"]
-    """Rows of the map's lines that are measured, each once."""
-    H: Float[np.ndarray, "k s"]
-    """By the pose and those lines, s = 3 + 2 u."""
-    e: Float[np.ndarray, " k"]
-    R: Float[np.ndarray, "k k"]
-
-
-def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
-    """Join the innovations of m sightings (several may be of one line) into one measurement."""
-    m = len(rows)
-    each = np.arange(m)
-    lines, place = (rows, each) if len(set(rows.tolist())) == m else np.unique(rows, return_inverse=True)
-    H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
-    H_lines[each, :, place, :] = model.H_line
-    R[each, :, each, :] = model.R
-    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, 2 * len(lines))], axis=1)
-    return Linear(lines, H, model.e.ravel(), R.reshape(2 * m, 2 * m))
+from ..models import reanchor
 
 
 def equality(

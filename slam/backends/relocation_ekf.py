@@ -3,12 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..backend import Observations
+from ..backend import POSE, Observations
 from ..geometry.poses import wrap
-from ..models import innovations
+from ..models import Linear, innovations, stack
 from .dense_map import DenseMap, cholesky
 from .ekf import Ekf
-from .linear import POSE, Linear, stack
 
 
 class RelocationEkf(Ekf["RelocationMap"]):

@@ -12,7 +12,7 @@ from slam.backends import BACKENDS
 from slam.backends.block_ekf import weighted_mean
 from slam.backends.dense_map import DenseMap
 from slam.backends.full_ekf import FullEkf
-from slam.backends.linear import Linear
+from slam.models import Linear
 from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
