@@ -6,6 +6,7 @@ errors of lines are taken after undoing that motion, so that they are the walls'
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
@@ -32,6 +33,12 @@ def chi2_band(dof: int, confidence: float = 0.95, runs: int = 1) -> tuple[float,
     """Return the two-sided band that the mean of `runs` independent chi-square variables lies in."""
     tail = 0.5 * (1.0 - confidence)
     return float(chi2.ppf(tail, dof * runs)) / runs, float(chi2.ppf(1.0 - tail, dof * runs)) / runs
+
+
+@lru_cache(maxsize=256)
+def gate_level(probability: float, dof: int) -> float:
+    """Return the squared Mahalanobis distance that stays below it with this probability."""
+    return float(chi2.ppf(probability, dof))
 
 
 def anees(values: Float[np.ndarray, " n"], dof: int) -> float:

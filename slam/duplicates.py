@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Joint
+from .consistency import gate_level
 from .geometry.lines import directions, normals
-from .matching import gate_level
 from .stochastic_map import StochasticMap
 
 

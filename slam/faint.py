@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from .consistency import gate_level
 from .geometry.lines import directions, lines_to_world, normals
 from .geometry.poses import to_world, wrap
-from .matching import gate_level
 from .segments import Segments
 
 

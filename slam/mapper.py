@@ -14,7 +14,8 @@ from .extraction import extract
 from .faint import FaintConfig, FaintLines
 from .gaps import Gaps, GapsConfig
 from .geometry.lines import distance_to_segments
-from .matching import KnownWalls, Matches, MatchingConfig, match, relocate
+from .joint_sightings import relocate
+from .matching import KnownWalls, Matches, MatchingConfig, match
 from .pieces import sure_pieces
 from .robot import Odometry, Scan
 from .segments import Segments

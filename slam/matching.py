@@ -5,15 +5,15 @@ beside a door stay two), and the side from which each was seen (so that two face
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import chi2
 
 from .backend import Joint, Observations
+from .consistency import gate_level
 from .geometry.lines import directions
 from .geometry.poses import to_world
+from .joint_sightings import compatible, taken_together
 from .models import Innovations, innovations
 from .segments import Segments
 
@@ -91,12 +91,6 @@ class _Candidates:
     """Distance along the line between segment and wall, m; negative where they overlap by that much."""
 
 
-@lru_cache(maxsize=256)
-def gate_level(probability: float, dof: int) -> float:
-    """Return the squared Mahalanobis distance that stays below it with this probability."""
-    return float(chi2.ppf(probability, dof))
-
-
 def match(
     segments: Segments,
     walls: KnownWalls,
@@ -122,8 +116,7 @@ def match(
     best[found.segment[order]] = order
     chosen = best[best >= 0]
     if clear_only:
-        chosen = _compatible(_clear(found, chosen, fits, config), found, joint, config)
-        chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
+        chosen = _agreeing(_clear(found, chosen, fits, config), found, segments, walls, joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     beside = _is_beside(found, segments, config)
@@ -139,20 +132,6 @@ def match(
     )
 
 
-def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
-    """Condition the joint Gaussian on observations of some of its lines (paper, step 3), as a pure function."""
-    if not len(observed.ids):
-        return joint
-    rows = np.searchsorted(ids, observed.ids)
-    model = innovations(
-        joint.mean[:3], joint.anchors[rows], joint.mean[3:].reshape(-1, 2)[rows], observed.lines, observed.cov
-    )
-    H, R = _stack(model, rows, len(joint.mean))
-    PHt = joint.cov @ H.T
-    gain = np.linalg.solve(H @ PHt + R, PHt.T).T
-    return Joint(joint.mean + gain @ model.e.ravel(), joint.cov - gain @ PHt.T, joint.anchors)
-
-
 def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: MatchingConfig) -> _Candidates:
     pose, means = joint.mean[:3], joint.mean[3:].reshape(-1, 2)
     alpha_world = segments.lines[:, 0] + pose[2]
@@ -161,7 +140,7 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     model = innovations(pose, joint.anchors[line], means[line], segments.lines[segment], segments.cov[segment])
     near = np.abs(model.e[:, 1]) < config.offset_m
     segment, line = segment[near], line[near]
-    model = Innovations(model.e[near], model.H_pose[near], model.H_line[near], model.R[near])
+    model = model.take(near)
     gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
     return _Candidates(segment, line, model, _distances(model, line, joint), gap)
 
@@ -217,36 +196,7 @@ def _clear(
     return np.array(keep, dtype=np.int64)
 
 
-def _compatible(
-    chosen: Int[np.ndarray, " m"], found: _Candidates, joint: Joint, config: MatchingConfig
-) -> Int[np.ndarray, " k"]:
-    """Drop pairs, the worst first, until each passes the gate given all others, and their joint innovation its own.
-
-    After a step in which the wheels may have slipped by a degree each wall alone allows for that error; the other
-    walls tell what it was.
-    """
-    model = Innovations(*(part[chosen] for part in vars(found.model).values()))
-    H, R = _stack(model, found.line[chosen], len(joint.mean))
-    S, e = H @ joint.cov @ H.T + R, model.e.ravel()
-    kept = np.arange(len(chosen))
-    while len(kept) > 1:
-        rows = (2 * kept[:, None] + np.arange(2)).ravel()
-        inverse = np.linalg.inv(S[np.ix_(rows, rows)])
-        weighted = inverse @ e[rows]
-        # What the sum of squares loses when one pair is left out is that pair's own, given all others.
-        each = np.arange(len(kept))
-        own = inverse.reshape(len(kept), 2, len(kept), 2)[each, :, each]
-        w = weighted.reshape(-1, 2, 1)
-        losses = (w.swapaxes(1, 2) @ np.linalg.solve(own, w))[:, 0, 0]
-        worst = int(np.argmax(losses))
-        in_sum = e[rows] @ weighted <= gate_level(config.gate, 2 * len(kept))
-        if in_sum and losses[worst] <= gate_level(config.gate, 2):
-            break
-        kept = np.delete(kept, worst)
-    return chosen[kept]
-
-
-def _still_overlapping(
+def _agreeing(
     chosen: Int[np.ndarray, " m"],
     found: _Candidates,
     segments: Segments,
@@ -254,35 +204,19 @@ def _still_overlapping(
     joint: Joint,
     config: MatchingConfig,
 ) -> Int[np.ndarray, " k"]:
-    """Drop pairs that no longer overlap at the pose that all of them lead to.
+    """Keep pairs that are jointly compatible, and that still overlap at the pose that all of these lead to.
 
     A slip of the wheels by 2 degrees shifts a piece of wall 3 m away by 0.1 m along its line, past the end of the wall
     between two rooms and onto the next room's.
     """
-    if not len(chosen):
-        return chosen
-    model = Innovations(*(part[chosen] for part in vars(found.model).values()))
-    H, R = _stack(model, found.line[chosen], len(joint.mean))
-    PHt = joint.cov @ H.T
-    pose = joint.mean[:3] + PHt[:3] @ np.linalg.solve(H @ PHt + R, model.e.ravel())
+    seen = taken_together(joint, found.line[chosen], found.model.take(chosen))
+    kept = compatible(seen, config.gate)
+    chosen, seen = chosen[kept], seen.take(kept)
+    pose = joint.mean[:3] + seen.gain()[:3] @ seen.e
     line = found.line[chosen]
     alpha = joint.mean[3 + 2 * line]
     gap = _gaps(segments.ends[found.segment[chosen]], walls.extents[line], joint.anchors[line], alpha, pose)
     return chosen[gap <= -config.overlap_m]
-
-
-def _stack(
-    model: Innovations, rows: Int[np.ndarray, " m"], size: int
-) -> tuple[Float[np.ndarray, "k s"], Float[np.ndarray, "k k"]]:
-    """Return the dense Jacobian and noise of a few innovations."""
-    m = len(rows)
-    H, R = np.zeros((m, 2, size)), np.zeros((m, 2, m, 2))
-    H[:, :, :3] = model.H_pose
-    each = np.arange(m)
-    for k in range(2):
-        H[each, :, 3 + 2 * rows + k] = model.H_line[:, :, k]
-    R[each, :, each, :] = model.R
-    return H.reshape(2 * m, size), R.reshape(2 * m, 2 * m)
 
 
 def _refusals(

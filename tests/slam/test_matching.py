@@ -1,17 +1,17 @@
-"""Which wall a segment belongs to: the gate's level, the sides of thin walls, doors, and conditioning."""
+"""Which wall a segment belongs to: the gate's level, the sides of thin walls, doors, and slips of the wheels."""
 
 import numpy as np
 import pytest
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
-from slam.backend import Joint, Observations
+from slam.backend import Joint
 from slam.backends import BACKENDS
 from slam.geometry.lines import through
 from slam.geometry.poses import compose, inverse, wrap
+from slam.joint_sightings import relocate
 from slam.mapper import Mapper
-from slam.matching import KnownWalls, MatchingConfig, match, relocate
-from slam.models import innovations
+from slam.matching import KnownWalls, MatchingConfig, match
 from slam.robot import Odometry, Scan
 from slam.segments import Segments
 
@@ -87,48 +87,6 @@ def test_one_true_match_in_a_hundred_is_refused_by_the_gate():
             assert matches.unmatched.tolist() == [0]
             assert matches.refusals[0]
     assert abs(refused / trials - level) < 3 * np.sqrt(level * (1 - level) / trials) + 1e-3
-
-
-def test_relocation_is_conditioning_in_information_form():
-    rng = np.random.default_rng(42)
-    count = 6
-    ids = np.array([2, 3, 5, 8, 9, 11])
-    pose = np.array([3.0, -2.0, 0.7])
-    alpha = rng.uniform(-3, 3, count)
-    n = np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
-    anchors = pose[:2] + 2.0 * n + rng.uniform(-1, 1, (count, 2))
-    mean = np.concatenate([pose, np.column_stack([alpha, np.sum(n * (pose[:2] + 2.0 * n - anchors), axis=-1)]).ravel()])
-    root = 0.01 * rng.standard_normal((len(mean), len(mean)))
-    joint = Joint(mean, root @ root.T + 1e-6 * np.eye(len(mean)), anchors)
-    chosen = np.array([4, 1, 2])
-    lines = np.column_stack([wrap(alpha[chosen] - pose[2]), np.full(3, 2.0)]) + 0.01 * rng.standard_normal((3, 2))
-    cov = np.array([[[1e-4, 5e-5], [5e-5, 2e-4]]] * 3)
-
-    def e(state):
-        rows = state[3:].reshape(-1, 2)[chosen]
-        return innovations(state[:3], anchors[chosen], rows, lines, cov).e.ravel()
-
-    step = 1e-6
-    H = -np.stack([(e(mean + d) - e(mean - d)) / (2 * step) for d in step * np.eye(len(mean))], axis=-1)
-    R = innovations(pose, anchors[chosen], mean[3:].reshape(-1, 2)[chosen], lines, cov).R
-    information = np.linalg.inv(joint.cov)
-    innovation = e(mean)
-    shift = np.zeros(len(mean))
-    for k in range(3):
-        rows = slice(2 * k, 2 * k + 2)
-        information = information + H[rows].T @ np.linalg.inv(R[k]) @ H[rows]
-        shift += H[rows].T @ np.linalg.solve(R[k], innovation[rows])
-    found = relocate(joint, ids, Observations(ids[chosen], lines, cov))
-    expected = np.linalg.inv(information)
-    np.testing.assert_allclose(found.cov, expected, atol=1e-8)
-    np.testing.assert_allclose(found.mean, mean + expected @ shift, atol=1e-6)
-    np.testing.assert_array_equal(found.anchors, anchors)
-
-
-def test_relocation_by_nothing_is_no_relocation():
-    joint, _ = random_joint(np.random.default_rng(43))
-    nothing = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    assert relocate(joint, np.array([5]), nothing) is joint
 
 
 def test_without_walls_nothing_matches_and_nothing_is_doubtful():

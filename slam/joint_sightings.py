@@ -1,0 +1,75 @@
+"""Sightings of several lines taken together: where they put the pose and the lines, and which of them agree."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .backend import Joint, Observations, columns_of
+from .consistency import gate_level
+from .models import Innovations, innovations, stack
+
+
+@dataclass(frozen=True)
+class JointSightings:
+    """What m sightings of a joint Gaussian's lines say of its pose and lines."""
+
+    e: Float[np.ndarray, " k"]
+    """How they differ from what the mean predicts, k = 2 m."""
+    PHt: Float[np.ndarray, "s k"]
+    """Covariance of the state with e."""
+    S: Float[np.ndarray, "k k"]
+    """Covariance of e."""
+
+    def take(self, rows: Int[np.ndarray, " r"]) -> "JointSightings":
+        """Return some of the sightings."""
+        at = (2 * rows[:, None] + np.arange(2)).ravel()
+        return JointSightings(self.e[at], self.PHt[:, at], self.S[at[:, None], at])
+
+    def gain(self) -> Float[np.ndarray, "s k"]:
+        """Return by how much each part of e moves the state."""
+        return np.linalg.solve(self.S, self.PHt.T).T
+
+
+def taken_together(joint: Joint, rows: Int[np.ndarray, " m"], model: Innovations) -> JointSightings:
+    """Join the innovations of m sightings of the joint's lines in these rows; several may be of one line."""
+    linear = stack(rows, model)
+    columns = columns_of(linear.rows)
+    PHt = joint.cov[:, columns] @ linear.H.T
+    return JointSightings(linear.e, PHt, linear.H @ PHt[columns] + linear.R)
+
+
+def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
+    """Condition the joint Gaussian on observations of some of its lines (paper, step 3), as a pure function."""
+    if not len(observed.ids):
+        return joint
+    rows = np.searchsorted(ids, observed.ids)
+    means = joint.mean[3:].reshape(-1, 2)[rows]
+    model = innovations(joint.mean[:3], joint.anchors[rows], means, observed.lines, observed.cov)
+    seen = taken_together(joint, rows, model)
+    gain = seen.gain()
+    return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
+
+
+def compatible(seen: JointSightings, gate: float) -> Int[np.ndarray, " k"]:
+    """Drop sightings, the worst first, until each passes the gate given all others, and all together their own.
+
+    After a step in which the wheels may have slipped by a degree each wall alone allows for that error; the other
+    walls tell what it was. Returns the rows of those that are left.
+    """
+    kept = np.arange(len(seen.e) // 2)
+    while len(kept) > 1:
+        left = seen.take(kept)
+        inverse = np.linalg.inv(left.S)
+        weighted = inverse @ left.e
+        # What the sum of squares loses when one sighting is left out is its own, given all others.
+        each = np.arange(len(kept))
+        own = inverse.reshape(len(kept), 2, len(kept), 2)[each, :, each]
+        w = weighted.reshape(-1, 2, 1)
+        losses = (w.swapaxes(1, 2) @ np.linalg.solve(own, w))[:, 0, 0]
+        worst = int(np.argmax(losses))
+        in_sum = left.e @ weighted <= gate_level(gate, 2 * len(kept))
+        if in_sum and losses[worst] <= gate_level(gate, 2):
+            break
+        kept = np.delete(kept, worst)
+    return kept
