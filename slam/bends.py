@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .duplicates import same_line
-from .geometry.lines import directions, distance_to_segments, normals
+from .geometry.lines import directions, normals
 from .geometry.poses import to_robot, wrap
 from .segments import Segments
 from .stochastic_map import StochasticMap
@@ -69,10 +69,8 @@ def _bends(
 
     Walls that begin beyond `range_m` have none that a scan of that range shows.
     """
-    pose, ends = walls.belief.pose_world, walls.ends_world
-    near = distance_to_segments(pose[None, :2], ends)[0] < range_m
-    rows = np.flatnonzero(near & ~walls.tentative)
-    alpha, ends = wrap(walls.belief.means[rows, 0] - pose[2]), to_robot(ends[rows], pose)
+    pose, rows = walls.belief.pose_world, np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
+    alpha, ends = wrap(walls.belief.means[rows, 0] - pose[2]), to_robot(walls.ends_world[rows], pose)
     turn = wrap(alpha - alpha[:, None])
     # Every other wall's ends as seen from the head of each: along it, and across.
     offset = ends[None] - ends[:, None, 1:]

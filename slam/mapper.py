@@ -13,7 +13,6 @@ from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import extract
 from .faint import FaintConfig, FaintLines
 from .gaps import Gaps, GapsConfig
-from .geometry.lines import distance_to_segments
 from .joint_sightings import relocate
 from .matching import KnownWalls, Matches, MatchingConfig, match
 from .pieces import sure_pieces
@@ -84,9 +83,10 @@ class Mapper:
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
-        segments = self._segments(scan)
+        walls = self._walls.map(self.backend.belief)
+        segments = self._segments(scan, walls)
         # 2. Match observed features to the best fitting equivalents in the map.
-        near = self._nearby(scan)
+        near = self._nearby(scan, walls)
         joint = self.backend.belief.joint(near.ids)
         clear = self._clear(segments, near, joint)
         first = self._firm(clear, segments)
@@ -99,19 +99,18 @@ class Mapper:
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, self._firm(matches, segments))
         owners = self._store(scan, segments, matches)
-        merged = self._merge(owners)
+        walls, merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
-        walls = self._walls.map(self.backend.belief)
         self._gaps.see(walls, scan)
         chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
         return MapUpdate(segments, matches, owners, walls, chains, merged)
 
-    def _segments(self, scan: Scan) -> Segments:
+    def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
         segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
         if self.config.bends is None:
             return segments
-        bends = bends_within(segments, self._walls.map(self.backend.belief), self.config.bends)
+        bends = bends_within(segments, walls, self.config.bends)
         if not len(bends):
             return segments
         return sure_pieces(extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
@@ -137,11 +136,10 @@ class Mapper:
         firm &= observed.cov[:, 0, 0] < self.config.firm_heading_rad**2
         return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
 
-    def _nearby(self, scan: Scan) -> KnownWalls:
+    def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:
         """Return the walls that this scan can show."""
-        walls = self._walls.map(self.backend.belief)
-        distance = distance_to_segments(walls.belief.pose_world[None, :2], walls.ends_world)[0]
-        return self._walls.known(walls.ids[distance < scan.range_max_m + self.config.matching.offset_m])
+        near = walls.distances_m < scan.range_max_m + self.config.matching.offset_m
+        return KnownWalls(walls.ids[near], walls.extents[near])
 
     def _store(self, scan: Scan, segments: Segments, matches: Matches) -> Int[np.ndarray, " s"]:
         """Grow the map by the segments that belong to no wall, and note how far each wall was seen."""
@@ -160,22 +158,24 @@ class Mapper:
             self.backend.remove(forgotten.tolist())
         return owners
 
-    def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[tuple[int, int], ...]:
+    def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
         """Make one of two walls that lie along each other, if the joint covariance agrees.
 
-        `owners` is brought up to date. Returns the ids (kept, dropped).
+        `owners` is brought up to date. Returns the map, and the ids (kept, dropped).
         """
+        walls = self._walls.map(self.backend.belief)
         if self.config.duplicates is None:
-            return ()
+            return walls, ()
         merged: list[tuple[int, int]] = []
         touched = set(owners[owners >= 0].tolist())
-        while twice := duplicate_of(self._walls.map(self.backend.belief), touched, self.config.duplicates):
+        while twice := duplicate_of(walls, touched, self.config.duplicates):
             keep, drop = twice
             self._walls.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)
             owners[owners == drop] = keep
             merged.append(twice)
-        return tuple(merged)
+            walls = self._walls.map(self.backend.belief)
+        return walls, tuple(merged)
 
 
 def _both(clear: Matches, again: Matches) -> Matches:

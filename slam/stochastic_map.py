@@ -1,12 +1,13 @@
 """The map: a belief about lines, and how far along each line its wall has been seen."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .backend import Belief
-from .geometry.lines import directions, normals
+from .geometry.lines import directions, distance_to_segments, normals
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,16 @@ class StochasticMap:
         """Ids of the walls, ascending."""
         return self.belief.ids
 
-    @property
+    @cached_property
     def ends_world(self) -> Float[np.ndarray, "n 2 2"]:
-        """First and last point of each wall, world frame, m: walking on, the free side is on the left."""
+        """First and last point of each wall, world frame, m: walking on, the free side is on the left. Read-only."""
         alpha, d = self.belief.means[:, 0], self.belief.means[:, 1]
         feet = self.belief.anchors + d[:, None] * normals(alpha)
-        return feet[:, None, :] + self.extents[..., None] * directions(alpha)[:, None, :]
+        ends = feet[:, None, :] + self.extents[..., None] * directions(alpha)[:, None, :]
+        ends.flags.writeable = False
+        return ends
+
+    @cached_property
+    def distances_m(self) -> Float[np.ndarray, " n"]:
+        """How far each wall is from where the belief puts the robot."""
+        return distance_to_segments(self.belief.pose_world[None, :2], self.ends_world)[0]

@@ -6,9 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Belief
-from .geometry.lines import directions, distance_to_segments
+from .geometry.lines import directions
 from .geometry.poses import to_world
-from .matching import KnownWalls
 from .pieces import PiecesConfig, beam_spacing, owners_of_beams
 from .robot import Scan
 from .segments import EndKind, Segments
@@ -55,11 +54,6 @@ class Walls:
         self._claimed = np.zeros(0, dtype=np.int64)
         self._scans = 0
 
-    def known(self, ids: Int[np.ndarray, " m"]) -> KnownWalls:
-        """Return what matching needs of some walls."""
-        rows = np.searchsorted(self._ids, ids)
-        return KnownWalls(ids, self._extents[rows])
-
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with the extents."""
         tentative = self._sightings < self._config.trusted_sightings
@@ -97,8 +91,7 @@ class Walls:
 
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
         """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
-        ends = self.map(belief).ends_world
-        near = np.flatnonzero(distance_to_segments(belief.pose_world[None, :2], ends)[0] < scan.range_max_m)
+        near = np.flatnonzero(self.map(belief).distances_m < scan.range_max_m)
         anchors, means = belief.anchors[near], belief.means[near]
         lines = sightlines(scan, belief.pose_world, anchors, means, self._config.pass_margin_m)
         self._note_claims(near, lines, owners_of_beams(segments, owners, len(scan.bearings_rad)))
