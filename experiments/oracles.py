@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from sim.chance import Channel, standard_normals
 from slam.backend import Joint
-from slam.extraction import extract
+from slam.extraction import NO_BENDS, extract
 from slam.geometry.poses import compose, inverse
 from slam.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
 from slam.robot import Scan
@@ -109,8 +109,8 @@ class PerfectExtraction:
     def __init__(self, witness: Witness, seed: int) -> None:
         self._witness, self._seed = witness, seed
 
-    def __call__(self, scan: Scan) -> Segments:
-        """Extract the segments of one scan; those of several walls are left out."""
+    def __call__(self, scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+        """Extract the segments of one scan; those of several walls are left out, so that the map need not say where."""
         segments = extract(scan)
         faces = self._witness.faces(segments)
         segments, faces = segments.take(faces >= 0), faces[faces >= 0]

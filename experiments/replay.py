@@ -15,10 +15,9 @@ from sim.robot import TrueRecord
 from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.extraction import extract
-from slam.mapper import Mapper, MapperConfig, Matcher
+from slam.mapper import Extractor, Mapper, MapperConfig, Matcher
 from slam.matching import match
 from slam.robot import MotionCommand, Odometry, Scan
-from slam.segments import Segments
 from slam.walls import WallsConfig
 
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
@@ -114,7 +113,7 @@ def replay(
     watch: Callable[[Step], None] = lambda step: None,
     world: World | None = None,
     around: Callable[[Matcher], Matcher] = lambda matcher: matcher,
-    extractor: Callable[[Scan], Segments] = extract,
+    extractor: Extractor = extract,
 ) -> TrialResult:
     """Map a recording with one back end; raises UsageError before anything is computed.
 
@@ -145,7 +144,7 @@ def replay(
         rules = scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper)
         mapper = Mapper(
             scenario.backend,
-            replace(rules, bends=None) if options.perfect_extraction else rules,
+            rules,
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(match if oracle is None else oracle),
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,7 +11,7 @@ from .backend import Backend, Joint, Observations
 from .bends import BendsConfig, bends_within
 from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
-from .extraction import extract
+from .extraction import NO_BENDS, extract
 from .faint import FaintConfig, FaintLines
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
@@ -27,8 +28,7 @@ class MapperConfig:
     """The rules of the seven steps."""
 
     matching: MatchingConfig = field(default_factory=MatchingConfig)
-    bends: BendsConfig | None = field(default_factory=BendsConfig)
-    """None where the extractor knows best where walls bend."""
+    bends: BendsConfig = field(default_factory=BendsConfig)
     chains: ChainConfig = field(default_factory=ChainConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
     faint: FaintConfig = field(default_factory=FaintConfig)
@@ -58,6 +58,15 @@ class MapUpdate:
 Matcher = Callable[..., Matches]
 
 
+@runtime_checkable
+class Extractor(Protocol):
+    """Finds the straight segments of a scan."""
+
+    def __call__(self, scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+        """Return the segments; at the bearings `bends_rad` the map knows a bend, which an oracle may know better."""
+        ...
+
+
 class Mapper:
     """Drives one back end through the seven steps; extractor and matcher may be replaced by oracles."""
 
@@ -65,7 +74,7 @@ class Mapper:
         self,
         backend: Backend,
         config: MapperConfig = MapperConfig(),
-        extractor: Callable[[Scan], Segments] = extract,
+        extractor: Extractor = extract,
         matcher: Matcher = match,
     ) -> None:
         self.backend = backend
@@ -108,12 +117,10 @@ class Mapper:
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
         segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
-        if self.config.bends is None:
-            return segments
         bends = bends_within(segments, walls, self.config.bends)
         if not len(bends):
             return segments
-        return sure_pieces(extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
+        return sure_pieces(self._extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
 
     def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
         """Return matches safe enough to relocate the robot by.

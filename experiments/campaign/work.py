@@ -2,7 +2,6 @@
 
 import json
 import traceback
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
@@ -10,9 +9,11 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from sim.worlds import World
-from slam.extraction import extract
+from slam.extraction import NO_BENDS, extract
+from slam.mapper import Extractor
 from slam.robot import Scan
 from slam.segments import Segments
 
@@ -124,11 +125,16 @@ def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
 
 
 @lru_cache(maxsize=2)
-def remembered(log: bytes) -> Callable[[Scan], Segments]:
-    """Return an extraction that works out each scan of a recording once: whoever replays it sees the same segments."""
+def remembered(log: bytes) -> Extractor:
+    """Return an extraction that works out each scan of a recording once: whoever replays it sees the same segments.
+
+    Cut where a map knows a bend, a scan is that map's own and worked out anew.
+    """
     known: dict[float, Segments] = {}
 
-    def extracted(scan: Scan) -> Segments:
+    def extracted(scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+        if len(bends_rad):
+            return extract(scan, bends_rad=bends_rad)
         if scan.time_s not in known:
             known[scan.time_s] = extract(scan)
             for values in vars(known[scan.time_s]).values():

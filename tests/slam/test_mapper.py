@@ -114,14 +114,21 @@ def test_doubtful_segments_are_neither_fused_nor_entered():
         assert np.all(update.walls_of_segments == -1)
 
 
-def test_an_extractor_given_in_its_place_is_believed():
-    def half(scan):
-        segments = extract(scan)
-        return segments.take(np.flatnonzero(np.cos(segments.lines[:, 0]) > 0))
+def test_an_extractor_given_in_its_place_is_believed_also_at_bends():
+    """A wall that bends by 1 degree, each part seen from near by, then both from afar: there the map says where."""
+    drop, asked = 3.0 * np.tan(np.deg2rad(1.0)), []
+    room = faces_of(shapely.Polygon([(0, 0), (3, 0), (6, -drop), (6, 3), (0, 3)]))
+    places = [[x, 0.5, 0.0] for x in (1.0, 1.2, 1.4, 4.6, 4.8, 5.0)] + [[x, 2.7, 0.0] for x in (4.5, 4.0, 3.5)]
 
-    for update in walk(SQUARE, PLACES, extractor=half):
-        assert np.all(np.cos(update.segments.lines[:, 0]) > 0)
-        assert len(update.segments) < 4
+    def not_behind(scan, **bends):
+        asked.append(bends)
+        segments = extract(scan, **bends)
+        return segments.take(np.flatnonzero(np.cos(segments.lines[:, 0]) > -0.5))
+
+    for update in walk(room, places, extractor=not_behind):
+        assert len(update.segments) >= 2
+        assert np.all(np.cos(update.segments.lines[:, 0]) > -0.5)
+    assert any(asked)
 
 
 def test_a_wall_that_was_there_and_is_gone_is_cut_back():
