@@ -9,21 +9,13 @@ import pytest
 
 from experiments.campaign.contrast import contrast
 from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.runner import on_cores, run_campaign
 from experiments.campaign.store import opened
-from experiments.campaign.tables import write_tables
 from experiments.campaign.work import Done, pack
 from experiments.cli import main
 from experiments.scenario import UsageError
+from tests.experiments.campaign.running import run
 
 CAMPAIGN = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 3, arms=("closed",), max_steps=6)
-
-
-def run(folder, campaign):
-    with opened(folder, campaign) as store:
-        run_campaign(store, on_cores(1))
-        write_tables(folder, campaign, trials(campaign), store.record)
-    return folder
 
 
 @pytest.fixture(scope="module")

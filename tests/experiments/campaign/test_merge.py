@@ -6,22 +6,14 @@ import numpy as np
 import pytest
 
 from experiments.campaign.merge import merge
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import opened, read_campaigns
-from experiments.campaign.tables import write_tables
+from experiments.campaign.plan import Campaign
+from experiments.campaign.store import read_campaigns
 from experiments.cli import main
 from experiments.scenario import UsageError
+from tests.experiments.campaign.running import run
 
 WHOLE = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, arms=("closed",), max_steps=6)
 LATER = replace(WHOLE, trials=1, first_seed=2)
-
-
-def run(folder, campaign):
-    with opened(folder, campaign) as store:
-        run_campaign(store, on_cores(1))
-        write_tables(folder, campaign, trials(campaign), store.record)
-    return folder
 
 
 @pytest.fixture(scope="module")

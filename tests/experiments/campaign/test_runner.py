@@ -21,6 +21,7 @@ from experiments.campaign.work import Job, perform
 from experiments.cli import main
 from slam.extraction import extract
 from slam.robot import Scan
+from tests.experiments.campaign.running import run
 
 ROOT = Path(__file__).parents[3]
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 2, max_steps=12)
@@ -29,13 +30,6 @@ WORDS = [
     "--strategies", "nearest-robot", "--trials", "2", "--max-steps", "12",
 ]  # fmt: skip
 TABLES = ("trials", "marks", "steps")
-
-
-def run(folder, campaign=CAMPAIGN, jobs=1):
-    with opened(folder, campaign) as store:
-        run_campaign(store, on_cores(jobs))
-        write_tables(store.folder, store.campaign, trials(store.campaign), store.record)
-    return folder
 
 
 def tables(folder):
@@ -64,7 +58,7 @@ def wait_for(folder, files):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("undisturbed") / "campaign")
+    return run(tmp_path_factory.mktemp("undisturbed") / "campaign", CAMPAIGN)
 
 
 def test_killed_and_resumed_it_leaves_the_same_table_and_redoes_only_what_is_missing(undisturbed, tmp_path):
@@ -89,7 +83,7 @@ def test_interrupted_it_says_so_and_keeps_what_is_done(undisturbed, tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait() == 130
     assert list(folder.rglob("trials/**/*.npz"))
-    assert tables(run(folder)) == tables(undisturbed)
+    assert tables(run(folder, CAMPAIGN)) == tables(undisturbed)
 
 
 def test_a_trial_that_fails_is_recorded_with_its_reason_and_the_rest_goes_on(tmp_path, monkeypatch):

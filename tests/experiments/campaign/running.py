@@ -1,0 +1,14 @@
+"""A campaign as the command line runs it, for the tests of what reads its folder."""
+
+from experiments.campaign.plan import trials
+from experiments.campaign.runner import on_cores, run_campaign
+from experiments.campaign.store import opened
+from experiments.campaign.tables import write_tables
+
+
+def run(folder, campaign, jobs=1):
+    """Run or resume a campaign in a folder, write its tables, and return the folder."""
+    with opened(folder, campaign) as store:
+        run_campaign(store, on_cores(jobs))
+        write_tables(store.folder, store.campaign, trials(store.campaign), store.record)
+    return folder
