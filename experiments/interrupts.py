@@ -11,7 +11,8 @@ from types import FrameType
 def first_interrupt_waits() -> Iterator[Callable[[], None]]:
     """Keep the first Ctrl-C until the yielded function is called, which raises it as KeyboardInterrupt.
 
-    A second one is raised at once, wherever the program is. Outside the main thread nothing is changed.
+    A second one is raised at once, wherever the program is. Outside the main thread nothing is changed, nor where
+    Ctrl-C is ignored: a shell script starts so what is to run in the background, whatever is stopped in front of it.
     """
     asked = False
 
@@ -24,7 +25,8 @@ def first_interrupt_waits() -> Iterator[Callable[[], None]]:
         if asked:
             raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
+    ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    if ignored or threading.current_thread() is not threading.main_thread():
         yield check
         return
     before = signal.signal(signal.SIGINT, note)

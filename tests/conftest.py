@@ -1,7 +1,16 @@
 """What all tests share."""
 
+import signal
+
 import jaxtyping
 import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _interruptible():
+    """Let Ctrl-C interrupt tests and what they start, though a shell script began them in the background (`&`)."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
