@@ -115,3 +115,13 @@ def make_map():
 @pytest.fixture
 def make_chains():
     return chains_of
+
+
+@pytest.fixture(scope="module")
+def _strict_rerun():
+    """Let rerun raise where it would only warn."""
+    import rerun as rr
+
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)

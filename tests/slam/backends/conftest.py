@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 
-import jaxtyping
 import numpy as np
 import pytest
 
 from slam.backend import Observations
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
+
+pytest.register_assert_rewrite("tests.slam.backends.rooms")
 
 
 def normal(alpha):
@@ -70,11 +71,3 @@ def make_walls():
         return Walls(np.stack([alpha, r], axis=-1), points, np.asarray(sigmas))
 
     return make
-
-
-@pytest.fixture
-def _unchecked():
-    """Without the shape checks that pytest adds: they cost more than the filters do."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
