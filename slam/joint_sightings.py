@@ -51,8 +51,10 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
     return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
 
 
-def compatible(seen: JointSightings, gate: float) -> Int[np.ndarray, " k"]:
-    """Drop sightings, the worst first, until each passes the gate given all others, and all together their own.
+def compatible(seen: JointSightings, gate: float, together: float) -> Int[np.ndarray, " k"]:
+    """Drop sightings, the worst first, until each passes the gate given all others, and all `together` their own.
+
+    Both are levels of probability; a bad slip alone takes all together far out.
 
     After a step in which the wheels may have slipped by a degree each wall alone allows for that error; the other
     walls tell what it was. Returns the rows of those that are left.
@@ -68,7 +70,7 @@ def compatible(seen: JointSightings, gate: float) -> Int[np.ndarray, " k"]:
         w = weighted.reshape(-1, 2, 1)
         losses = (w.swapaxes(1, 2) @ np.linalg.solve(own, w))[:, 0, 0]
         worst = int(np.argmax(losses))
-        in_sum = left.e @ weighted <= gate_level(gate, 2 * len(kept))
+        in_sum = left.e @ weighted <= gate_level(together, 2 * len(kept))
         if in_sum and losses[worst] <= gate_level(gate, 2):
             break
         kept = np.delete(kept, worst)

@@ -1,13 +1,13 @@
 """The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from .backend import Backend, Joint, Observations
+from .backend import Backend, Observations
 from .bends import BendsConfig, bends_within
 from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
@@ -97,7 +97,7 @@ class Mapper:
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan, walls)
         joint = self.backend.belief.joint(near.ids)
-        clear = self._clear(segments, near, joint)
+        clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
         first = self._firm(clear, segments)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         relocated = relocate(joint, near.ids, first)
@@ -121,20 +121,6 @@ class Mapper:
         if not len(bends):
             return segments
         return sure_pieces(self._extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
-
-    def _clear(self, segments: Segments, near: KnownWalls, joint: Joint) -> Matches:
-        """Return matches safe enough to relocate the robot by.
-
-        One bad slip of the wheels takes all walls out of their gates at once: where more segments lie just beyond
-        the gate than within, the clear ones among them are believed together, if one error of the pose explains all.
-        """
-        clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
-        beyond = np.count_nonzero(~segments.is_tentative[clear.doubtful])
-        if beyond <= np.count_nonzero(~segments.is_tentative[clear.pairs[:, 0]]):
-            return clear
-        wide = replace(self.config.matching, gate=self.config.matching.doubt)
-        wider = self._match(segments, near, joint, wide, clear_only=True)
-        return wider if len(wider.pairs) > len(clear.pairs) else clear
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate: those of enough beams and of a clear direction."""

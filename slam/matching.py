@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Joint, Observations
+from .consensus import agree, nearest_alone
 from .consistency import gate_level
 from .geometry.lines import directions
 from .geometry.poses import to_world
@@ -39,8 +40,8 @@ class MatchingConfig:
     """Distance from a wall, across it, within which a short segment of which it covers half is not a new wall."""
     beside_rad: float = 0.35
     """Largest difference in direction, beyond three sigmas of the short segment's, for the same."""
-    clear_ratio: float = 9.0
-    """A first match is clear when the second-best wall is this many times farther (squared Mahalanobis distance)."""
+    clear: float = 9.0
+    """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
 
 
 @dataclass(frozen=True)
@@ -110,13 +111,12 @@ def match(
         return replace(NO_MATCHES, unmatched=np.arange(count))
     found = _candidates(segments, walls, joint, config)
     level = gate_level(config.gate, 2)
-    fits = (found.d2 <= level) & (found.gap <= -config.overlap_m)
-    best = np.full(count, -1)
-    order = np.flatnonzero(fits)[np.argsort(-found.d2[fits], kind="stable")]
-    best[found.segment[order]] = order
-    chosen = best[best >= 0]
+    covers = found.gap <= -config.overlap_m
     if clear_only:
-        chosen = _agreeing(_clear(found, chosen, fits, config), found, segments, walls, joint, config)
+        chosen = _agreed(found, np.flatnonzero(covers), segments, joint, config)
+        chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
+    else:
+        chosen = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     beside = _is_beside(found, segments, config)
@@ -183,20 +183,27 @@ def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) ->
     return (S[:, 1, 1] * e0**2 - 2 * S[:, 0, 1] * e0 * e1 + S[:, 0, 0] * e1**2) / det
 
 
-def _clear(
-    found: _Candidates, chosen: Int[np.ndarray, " m"], fits: np.ndarray, config: MatchingConfig
+def _agreed(
+    found: _Candidates, rows: Int[np.ndarray, " r"], segments: Segments, joint: Joint, config: MatchingConfig
 ) -> Int[np.ndarray, " k"]:
-    """Keep the pairs whose segment has no other wall nearly as close."""
-    keep = []
-    for pair in chosen:
-        rivals = fits & (found.segment == found.segment[pair])
-        rivals[pair] = False
-        if not np.any(found.d2[rivals] < config.clear_ratio * max(found.d2[pair], 1.0)):
-            keep.append(pair)
-    return np.array(keep, dtype=np.int64)
+    """Return the candidates among `rows` that agree on where the robot is, where no other choice is nearly as good."""
+    seen = taken_together(joint, found.line[rows], found.model.take(rows))
+    sure = ~segments.is_tentative[found.segment[rows]]
+    agreed = agree(found.segment[rows], found.line[rows], seen, sure, config.gate, config.doubt)
+    clear = agreed.pairs[agreed.margin >= config.clear]
+    return rows[clear[compatible(seen.take(clear), config.gate, config.doubt)]]
 
 
-def _agreeing(
+def _nearest(
+    found: _Candidates, rows: Int[np.ndarray, " r"], joint: Joint, config: MatchingConfig
+) -> Int[np.ndarray, " k"]:
+    """Return for each segment its nearest candidate among `rows`, unless another wall is nearly as near."""
+    model = found.model.take(rows)
+    seen = taken_together(joint, found.line[rows], model)
+    return rows[nearest_alone(found.segment[rows], found.d2[rows], seen, model.R, config.gate, config.clear)]
+
+
+def _still_overlapping(
     chosen: Int[np.ndarray, " m"],
     found: _Candidates,
     segments: Segments,
@@ -204,14 +211,12 @@ def _agreeing(
     joint: Joint,
     config: MatchingConfig,
 ) -> Int[np.ndarray, " k"]:
-    """Keep pairs that are jointly compatible, and that still overlap at the pose that all of these lead to.
+    """Drop pairs that no longer overlap at the pose that all of them lead to.
 
     A slip of the wheels by 2 degrees shifts a piece of wall 3 m away by 0.1 m along its line, past the end of the wall
     between two rooms and onto the next room's.
     """
     seen = taken_together(joint, found.line[chosen], found.model.take(chosen))
-    kept = compatible(seen, config.gate)
-    chosen, seen = chosen[kept], seen.take(kept)
     pose = joint.mean[:3] + seen.gain()[:3] @ seen.e
     line = found.line[chosen]
     alpha = joint.mean[3 + 2 * line]

@@ -60,5 +60,5 @@ def test_the_sighting_that_the_others_contradict_is_dropped_though_alone_it_woul
     seen = JointSightings(e, np.zeros((3, 8)), S)
     alone = [part.e @ np.linalg.solve(part.S, part.e) for part in (seen.take(np.array([k])) for k in range(4))]
     assert max(alone) < 9.2
-    assert compatible(seen, 0.99).tolist() == [0, 1, 3]
-    assert compatible(seen.take(np.array([0, 1, 3])), 0.99).tolist() == [0, 1, 2]
+    assert compatible(seen, 0.99, 0.99).tolist() == [0, 1, 3]
+    assert compatible(seen.take(np.array([0, 1, 3])), 0.99, 0.99).tolist() == [0, 1, 2]

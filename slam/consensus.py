@@ -1,0 +1,116 @@
+"""Which pairs of segment and wall agree on where the robot is: each pair in turn is believed, and the others judged.
+
+The wheels may have slipped by a degree or two in the last step, which is as much as many walls bend: each segment by
+itself then fits its neighbour's wall best. All of them together fit only after one and the same slip (joint
+compatibility, Neira and Tardos 2001; with one pair as the seed of each hypothesis nothing branches).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from .consistency import gate_level
+from .joint_sightings import JointSightings
+
+_UNMATCHED = -1
+
+
+@dataclass(frozen=True)
+class Consensus:
+    """What the best of the hypotheses says, and how sure that is."""
+
+    pairs: Int[np.ndarray, " m"]
+    """The candidates that agree, at most one for each segment."""
+    margin: Float[np.ndarray, " m"]
+    """By how much the best hypothesis that gives the segment to another wall costs more (in squared Mahalanobis
+    distances); infinite where there is none."""
+
+
+def agree(
+    segment: Int[np.ndarray, " c"],
+    line: Int[np.ndarray, " c"],
+    seen: JointSightings,
+    may_seed: Bool[np.ndarray, " c"],
+    gate: float,
+    doubt: float,
+) -> Consensus:
+    """Return the candidates (pairs of `segment` and `line`, seen together) that the best hypothesis keeps.
+
+    Each candidate within the level of doubt is the seed of a hypothesis, which costs its squared distance, and for each
+    segment that of its best candidate given the seed, or the level of doubt where that is beyond the gate: what lies
+    along a wall is hardly ever another. The cheapest wins; a seed beyond the gate only if another segment agrees.
+    """
+    level, unmatched = gate_level(gate, 2), gate_level(doubt, 2)
+    segments, column = np.unique(segment, return_inverse=True)
+    own = _own_distances(seen)
+    seeds = np.flatnonzero(may_seed & (own <= unmatched))
+    given = _distances(seen, seeds)
+    given[segment[None, :] == segment[seeds][:, None]] = np.inf  # a segment is one sighting
+    given[np.arange(len(seeds)), seeds] = 0.0
+    best = np.full((len(seeds), len(segments)), unmatched)
+    choice = np.full((len(seeds), len(segments)), _UNMATCHED)
+    for c, k in enumerate(column):
+        nearer = (given[:, c] <= level) & (given[:, c] < best[:, k])
+        best[nearer, k] = given[nearer, c]
+        choice[nearer, k] = c
+    believed = (own[seeds] <= level) | (np.count_nonzero(choice != _UNMATCHED, axis=1) > 1)
+    costs = np.where(believed, own[seeds] + best.sum(axis=1), np.inf)
+    if not believed.any():
+        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+    winner = int(np.argmin(costs))
+    walls = np.where(choice == _UNMATCHED, _UNMATCHED, line[choice])
+    other = (walls != walls[winner]) & (walls != _UNMATCHED)
+    margins = np.where(other, costs[:, None], np.inf).min(axis=0) - costs[winner]
+    matched = choice[winner] != _UNMATCHED
+    return Consensus(choice[winner, matched], margins[matched])
+
+
+def nearest_alone(
+    segment: Int[np.ndarray, " c"],
+    d2: Float[np.ndarray, " c"],
+    seen: JointSightings,
+    R: Float[np.ndarray, "c 2 2"],
+    gate: float,
+    clear: float,
+) -> Int[np.ndarray, " k"]:
+    """Return for each segment its nearest candidate, unless another wall costs hardly more (by less than `clear`).
+
+    Two entries of one wall are not another: by the gate their covariance does not tell them apart. `R` is the noise of
+    each candidate's segment, which is the same for all candidates of one.
+    """
+    order = np.lexsort((d2, segment))
+    first = order[np.unique(segment[order], return_index=True)[1]]
+    best = first[np.searchsorted(segment[first], segment)]
+    each = np.arange(len(segment))
+    e, S = seen.e.reshape(-1, 2), seen.S.reshape(len(each), 2, len(each), 2)
+    apart = e - e[best]
+    cov = S[best, :, best, :] + S[each, :, each, :] - S[best, :, each, :] - S[each, :, best, :] - 2.0 * R
+    differ = np.einsum("ci,cij,cj->c", apart, np.linalg.pinv(cov, hermitian=True), apart) > gate_level(gate, 2)
+    rivals = (best != each) & differ & (d2 < d2[best] + clear)
+    return np.setdiff1d(first, best[rivals])
+
+
+def _own_distances(seen: JointSightings) -> Float[np.ndarray, " c"]:
+    count = len(seen.e) // 2
+    each = np.arange(count)
+    e, S = seen.e.reshape(count, 2), seen.S.reshape(count, 2, count, 2)[each, :, each, :]
+    return _squares(e, S)
+
+
+def _distances(seen: JointSightings, seeds: Int[np.ndarray, " h"]) -> Float[np.ndarray, "h c"]:
+    """Return the squared Mahalanobis distance of each sighting, given that the seed is right."""
+    count = len(seen.e) // 2
+    each = np.arange(count)
+    e, S = seen.e.reshape(count, 2), seen.S.reshape(count, 2, count, 2)
+    cross = S[:, :, seeds, :].transpose(2, 0, 1, 3)
+    gain = cross @ np.linalg.inv(S[seeds, :, seeds, :])[:, None]
+    left = S[each, :, each, :] - gain @ cross.swapaxes(2, 3)
+    left[np.arange(len(seeds)), seeds] = np.eye(2)  # nothing is left of the seed itself
+    return _squares(e - (gain @ e[seeds][:, None, :, None])[..., 0], left)
+
+
+def _squares(e: Float[np.ndarray, "*n 2"], S: Float[np.ndarray, "*n 2 2"]) -> Float[np.ndarray, "*n"]:
+    det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] * S[..., 1, 0]
+    a, b = e[..., 0], e[..., 1]
+    return np.asarray((S[..., 1, 1] * a**2 - 2.0 * S[..., 0, 1] * a * b + S[..., 0, 0] * b**2) / det)

@@ -1,0 +1,99 @@
+"""Which pairs agree: against brute force, and where the wheels slip by as much as a wall bends."""
+
+import numpy as np
+import pytest
+import shapely
+
+from slam.consensus import agree, nearest_alone
+from slam.consistency import gate_level
+from slam.joint_sightings import JointSightings
+from slam.robot import Odometry
+from tests.slam.test_matching import Walker, faces_of
+
+
+def sightings(rng, segment, noise=0.3):
+    """Return random candidates, correlated through a pose of 3 and 2 numbers of each line, as joint sightings."""
+    count = len(segment)
+    H = rng.standard_normal((2 * count, 3))
+    S = H @ np.diag([1.0, 0.5, 0.2]) @ H.T + noise * np.eye(2 * count)
+    e = np.linalg.cholesky(S) @ rng.standard_normal(2 * count) + rng.choice([0.0, 3.0], 2 * count)
+    return JointSightings(e, np.zeros((3, 2 * count)), S)
+
+
+def conditioned(seen, c, seed):
+    """Return the squared distance of one sighting given another, from the joint Gaussian of both."""
+    both = seen.take(np.array([seed, c]))
+    joint = both.e @ np.linalg.solve(both.S, both.e)
+    alone = seen.take(np.array([seed]))
+    return joint - alone.e @ np.linalg.solve(alone.S, alone.e)
+
+
+def hypotheses(segment, seen, seeds, gate, doubt):
+    """Return cost and choice (candidate by segment) of each hypothesis that may win, one candidate at a time."""
+    found = []
+    for seed in seeds:
+        one = seen.take(np.array([seed]))
+        own, choice = one.e @ np.linalg.solve(one.S, one.e), {segment[seed]: seed}
+        cost = own
+        for s in set(segment.tolist()) - {segment[seed]}:
+            costs = {c: conditioned(seen, c, seed) for c in np.flatnonzero(segment == s)}
+            best = min(costs, key=costs.get)
+            cost += costs[best] if costs[best] <= gate else doubt
+            if costs[best] <= gate:
+                choice[s] = best
+        if own <= gate or (own <= doubt and len(choice) > 1):
+            found.append((cost, choice))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_cheapest_hypothesis_of_all_is_found_and_its_margin(seed):
+    rng = np.random.default_rng(seed)
+    segment = np.sort(rng.integers(0, 5, rng.integers(1, 12)))
+    line = np.concatenate([rng.permutation(12)[: np.count_nonzero(segment == s)] for s in np.unique(segment)])
+    seen, may_seed = sightings(rng, segment), rng.uniform(size=len(segment)) < 0.8
+    agreed = agree(segment, line, seen, may_seed, 0.99, 0.999999)
+    found = hypotheses(segment, seen, np.flatnonzero(may_seed), gate_level(0.99, 2), gate_level(0.999999, 2))
+    if not found:
+        assert not len(agreed.pairs)
+        return
+    least, choice = min(found, key=lambda one: one[0])
+    assert agreed.pairs.tolist() == [choice[s] for s in sorted(choice)]
+    for pair, margin in zip(agreed.pairs, agreed.margin, strict=True):
+        s = segment[pair]
+        others = [cost for cost, other in found if s in other and line[other[s]] != line[pair]]
+        np.testing.assert_allclose(margin, min(others, default=np.inf) - least, atol=1e-9)
+
+
+def test_a_slip_by_what_a_wall_bends_gives_no_segment_to_its_neighbour():
+    """Each of the two pieces alone then fits the other wall; turned back by one slip, both fit their own."""
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        drop = 10.0 * np.tan(np.deg2rad(rng.uniform(2.2, 3.2)))
+        hall = shapely.Polygon([(-10, 0), (0, 0), (10, -drop), (10, 12), (-10, 12)])
+        start = [rng.uniform(-1.5, 1.5), rng.uniform(0.5, 1.2), -np.pi / 2 + rng.uniform(-0.3, 0.3)]
+        walker = Walker(faces_of(hall), start, rng)
+        for _ in range(6):
+            before = walker.scan().map.belief.pose_world[2]
+        slip, sigma = np.deg2rad(rng.choice([-1, 1]) * rng.uniform(2.0, 2.8)), np.deg2rad(0.8)
+        walker.mapper.predict(Odometry(np.array([0.0, 0.0, slip]), np.diag([1e-6, 1e-6, sigma]) ** 2))
+        belief = walker.scan().map.belief
+        # Where nothing can be told apart nothing is fused, and the stated sigma says so.
+        assert abs(belief.pose_world[2] - before) < 4.0 * np.sqrt(belief.pose_cov[2, 2])
+
+
+def alone(d2, between, cov_between):
+    """Return what is matched of one segment with two candidates, by their distances and what the map says of both."""
+    e = np.array([0.0, 0.0, between, 0.0])
+    S = np.kron(np.array([[1.0, 1.0], [1.0, 1.0]]), np.eye(2)) + 0.1 * np.eye(4)
+    S[2:, 2:] += cov_between * np.eye(2)
+    R = np.broadcast_to(0.05 * np.eye(2), (2, 2, 2))
+    seen = JointSightings(e, np.zeros((3, 4)), S)
+    return nearest_alone(np.zeros(2, dtype=np.int64), np.array(d2), seen, R, 0.99, 9.0).tolist()
+
+
+def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_of_two_entries_of_one():
+    assert alone([1.0, 2.0], between=1.0, cov_between=1e-4) == []
+    assert alone([1.0, 2.0], between=0.01, cov_between=1e-2) == [0]
+    assert alone([2.0, 1.0], between=0.01, cov_between=1e-2) == [1]
+    assert alone([1.0, 12.0], between=1.0, cov_between=1e-4) == [0]
