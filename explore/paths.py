@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import label
+from scipy.ndimage import distance_transform_edt, label
 from skimage.graph import MCP_Geometric
 
 from .blocks import BLOCK, blocks_with_any, cells_of
@@ -36,6 +36,10 @@ class PathConfig:
     """Distance from walls that costs nothing; it yields in narrow passages, the margin does not."""
     narrow_cost: float = 4.0
     """A metre at the least clearance costs this much more than one at the stand-off."""
+    coast_m: float = 3.0
+    """Farther than this from any wall the scanner shows too little to tell where the robot is, ..."""
+    blind_cost: float = 4.0
+    """... and a metre costs so much more: a way along the walls is worth a detour."""
     escape_m: float = 0.3
     """Around the robot itself free cells count as passable however near a wall is: it may have to get away."""
 
@@ -68,6 +72,7 @@ class Planner:
         reach = max(free_space.shape) if window_m is None else int(np.ceil(window_m / free_space.config.cell_m))
         self._corner = np.maximum(start - reach, 0)
         box = (slice(self._corner[0], start[0] + reach + 1), slice(self._corner[1], start[1] + reach + 1))
+        self._box = box
         self._passable, self._roomy = passable(free_space, box, config)
         self._clearance = free_space.clearance()[box].copy()
         self._start = start - self._corner
@@ -106,6 +111,7 @@ class Planner:
         """Return the blocks around the shortest way to the nearest of some cells; None if no way leads to any."""
         squeezed = np.where(self._passable_blocks, 1.0 + self._config.squeeze_cost, -1.0)
         costs = np.where(self._roomy_blocks, 1.0, squeezed)
+        costs[self._blind_blocks & (costs > 0.0)] += self._config.blind_cost
         ends = np.unique(goals // BLOCK, axis=0)
         search = MCP_Geometric(costs)
         lengths, _ = search.find_costs([tuple(self._start // BLOCK)], [tuple(end) for end in ends], find_all_ends=False)
@@ -148,6 +154,8 @@ class Planner:
     def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
         """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
         metre = np.where(self._passable[box], metre_costs(self._clearance[box], self._roomy[box], self._config), -1.0)
+        blind = cells_of(self._blind_blocks, self._passable.shape)[box]
+        metre[blind & (metre > 0.0)] += self._config.blind_cost
         metre[self._escape[box]] = ESCAPE_COST
         return metre
 
@@ -160,6 +168,11 @@ class Planner:
     @cached_property
     def _roomy_blocks(self) -> Bool[np.ndarray, "p q"]:
         return blocks_with_any(self._roomy)
+
+    @cached_property
+    def _blind_blocks(self) -> Bool[np.ndarray, "p q"]:
+        """Which blocks lie too far from any wall to see it well."""
+        return blind_blocks(self._free_space, self._box, self._config.coast_m)
 
     @cached_property
     def _passable_blocks(self) -> Bool[np.ndarray, "p q"]:
@@ -206,6 +219,22 @@ def passable(
     roomy_cells = roomy(is_free, clearance, config)
     fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
     return fits | roomy_cells, roomy_cells
+
+
+def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], coast_m: float) -> Bool[np.ndarray, "p q"]:
+    """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
+    side_m = BLOCK * free_space.config.cell_m
+    beside = int(np.ceil(coast_m / side_m))
+    (r0, r1, _), (c0, c1, _) = (part.indices(size) for part, size in zip(box, free_space.shape, strict=True))
+    above, left = min(beside, r0 // BLOCK), min(beside, c0 // BLOCK)
+    rows = slice(r0 - BLOCK * above, r1 + BLOCK * beside)
+    columns = slice(c0 - BLOCK * left, c1 + BLOCK * beside)
+    hit = blocks_with_any(free_space.evidence[rows, columns] > 0)
+    shape = -(-(r1 - r0) // BLOCK), -(-(c1 - c0) // BLOCK)
+    if not hit.any():
+        return np.ones(shape, dtype=bool)
+    distance = distance_transform_edt(~hit, sampling=side_m)
+    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > coast_m)
 
 
 def roomy(

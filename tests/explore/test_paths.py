@@ -1,5 +1,7 @@
 """Paths over a drawn grid, against a dense Dijkstra and against shapely."""
 
+from dataclasses import replace
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -237,3 +239,52 @@ def test_what_only_blocks_connect_costs_no_search_of_the_whole_floor(seed, monke
     assert len(searched) == 2
     others = np.argwhere(planner._is_connected)
     assert planner.to(grid.points(others[[-1, 0]] + planner._corner)) is not None
+
+
+def hall():
+    """Return a hall of 16 x 12 m, seen from all over it, and the grid."""
+    rings = [shapely.get_coordinates(shapely.orient_polygons(shapely.box(0, 0, 16, 12)).exterior)]
+    faces = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    finder, grid = RangeFinder(faces, LidarConfig()), FreeSpace()
+    for x in np.arange(1.0, 16.0):
+        for y in np.arange(1.0, 12.0):
+            pose = np.array([x, y, 0.0])
+            grid.integrate(pose, Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0))
+    return grid
+
+
+def from_walls(path):
+    x, y = path.points_world.T
+    return np.min([x, y, 16.0 - x, 12.0 - y], axis=0)
+
+
+@pytest.mark.parametrize("window_m", [None, 30.0])
+def test_a_path_keeps_walls_in_sight_where_the_detour_is_worth_it(window_m):
+    """Across the hall no wall is in sight, and the wheels lose 4 degrees of heading per root metre."""
+    grid, start, goal = hall(), np.array([2.0, 6.0]), np.array([8.0, 10.0])
+    path = Planner(grid, start, CONFIG, window_m).to(goal[None])
+    assert from_walls(path).max() < CONFIG.coast_m + 0.3
+    straight = Planner(grid, start, replace(CONFIG, blind_cost=0.0), window_m).to(goal[None])
+    assert from_walls(straight).max() > CONFIG.coast_m + 0.3
+    assert path.cost < straight.cost + CONFIG.blind_cost * 7.3
+
+
+@pytest.mark.parametrize("place", [(8.0, 6.0), (9.1, 5.3)])
+def test_the_middle_of_a_hall_is_reached_by_the_shortest_stretch_without_walls(place):
+    grid, start = hall(), np.array([1.0, 1.0])
+    path = Planner(grid, start, CONFIG).to(np.array([place]))
+    blind = from_walls(path) > CONFIG.coast_m + 0.2
+    step = np.hypot(*np.diff(path.points_world, axis=0).T)
+    least = from_walls(path)[-1] - CONFIG.coast_m
+    assert np.sum(step[blind[1:]]) < 1.15 * least + 0.2
+
+
+def test_where_no_wall_was_seen_all_floor_costs_the_same():
+    grid = FreeSpace()
+    for x in (0.0, 2.0, 4.0):
+        grid.integrate(
+            np.array([x, 0.0, 0.0]), Scan(np.linspace(-np.pi, np.pi, 181)[:-1], np.full(180, np.nan), 0.01, 4.0, 0.0)
+        )
+    start, goal = np.array([-1.0, 0.0]), np.array([5.0, 0.0])
+    path = Planner(grid, start, CONFIG).to(goal[None])
+    assert np.abs(path.points_world[:, 1]).max() < 0.06
