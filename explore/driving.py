@@ -10,6 +10,9 @@ from slam.robot import MotionCommand, Scan
 
 from .free_space import FreeSpace
 from .paths import Path, Planner
+from .recent import returns
+
+_NOTHING = np.zeros((0, 2))
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class DrivingConfig:
     """How far ahead on its path the robot aims."""
     radius_m: float = 0.2
     """The robot's disc."""
-    margin_m: float = 0.015
+    margin_m: float = 0.02
     """Least distance kept between disc and returns, unless the step leads away from them."""
     careful_m: float = 0.05
     """Longest step onto floor that was not seen yet."""
@@ -88,8 +91,18 @@ class Pilot:
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
         return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.obstructed_m
 
-    def command(self, pose_world: Float[np.ndarray, "3"], scan: Scan, free_space: FreeSpace) -> MotionCommand | None:
-        """Return the next step along the path, or None where no safe one leads on."""
+    def command(
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        scan: Scan,
+        free_space: FreeSpace,
+        recent_robot: Float[np.ndarray, "r 2"] = _NOTHING,
+    ) -> MotionCommand | None:
+        """Return the next step along the path, or None where no safe one leads on.
+
+        `recent_robot` are returns of the last scans, in the robot's frame of now: they count where there is room. In
+        a narrow place the noise of so many would leave none.
+        """
         points = returns(scan)
         aim, narrow = _centred(to_robot(self._aim(pose_world[:2])[None], pose_world)[0], points, self._config)
         error, distance = float(np.arctan2(aim[1], aim[0])), float(np.hypot(aim[0], aim[1]))
@@ -97,7 +110,10 @@ class Pilot:
         if abs(error) > (self._config.narrow_spin_rad if narrow else self._config.spin_rad):
             return MotionCommand(0.0, turn)
         forward = min(self._config.step_m * (1.0 - 0.8 * abs(error) / self._config.spin_rad), distance)
-        forward = min(forward, self._config.careful_m) if narrow else forward
+        if narrow:
+            forward = min(forward, self._config.careful_m)
+        else:
+            points = np.concatenate([points, recent_robot])
         for share in (1.0, 0.5, 0.25):
             command = MotionCommand(share * forward, turn)
             if _is_safe(command, points, self._config, narrow):
@@ -131,13 +147,6 @@ class Pilot:
 
 
 _RIM = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=-1)
-
-
-def returns(scan: Scan) -> Float[np.ndarray, "m 2"]:
-    """Return the points that the scan hit, robot frame, m."""
-    hit = np.isfinite(scan.ranges_m)
-    bearing, distance = scan.bearings_rad[hit], scan.ranges_m[hit]
-    return np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
 
 
 def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> MotionCommand | None:

@@ -22,6 +22,7 @@ from .homing import Homing
 from .limits import Limits, limited
 from .outcome import Outcome
 from .passenger import Passenger
+from .recent import RecentReturns
 from .step import Step
 from .strategies import Strategy
 from .visibility import VisibilityGraph, followed_wall
@@ -125,7 +126,7 @@ def ride_mission(
 
 
 def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConfig) -> Iterator[Step]:
-    free_space, graph = FreeSpace(config.free_space), VisibilityGraph()
+    free_space, graph, recent = FreeSpace(config.free_space), VisibilityGraph(), RecentReturns()
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     path_length, index = 0.0, 0
     while True:
@@ -137,7 +138,8 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
         decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
-        command = decider.command(Surroundings(update.map, free_space, scan), update.chains, graph.graph)
+        around = Surroundings(update.map, free_space, scan, recent.points_robot)
+        command = decider.command(around, update.chains, graph.graph)
         outcome, reason = None, decider.doing
         if command is None:
             outcome, reason = decider.outcome, decider.closing_words
@@ -154,5 +156,7 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
             return
         odometry = robot.drive(command)
         mapper.predict(odometry)
+        recent.see(scan)
+        recent.move(odometry)
         path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))
         index += 1

@@ -46,6 +46,8 @@ class Surroundings:
     walls: StochasticMap
     free_space: FreeSpace
     scan: Scan
+    recent_robot: Float[np.ndarray, "r 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """What the scans before this one hit nearby, m, in the robot's frame of now."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, "3"]:
@@ -79,7 +81,7 @@ class Errand(ABC):
                 return None
             assert self._pilot is not None
             if not self._pilot.is_obstructed(around.pose_world, around.scan):
-                command = self._pilot.command(around.pose_world, around.scan, around.free_space)
+                command = self._pilot.command(around.pose_world, around.scan, around.free_space, around.recent_robot)
                 if command is not None and not self._is_stalled(self._pilot.remaining_m):
                     return command
             self._blocked(around)

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.driving import DrivingConfig, Pilot, returns
+from explore.driving import DrivingConfig, Pilot
 from explore.free_space import FreeSpace
 from explore.paths import Path, PathConfig, Planner
-from slam.geometry.poses import arc, compose
-from slam.robot import MotionCommand, Scan
+from explore.recent import NEAR_M, SCANS, RecentReturns, returns
+from slam.geometry.poses import arc, compose, to_world
+from slam.robot import MotionCommand, Odometry, Scan
 
 few = settings(max_examples=80, deadline=None, derandomize=True)
 CONFIG = DrivingConfig()
@@ -75,6 +76,46 @@ def test_no_step_leads_nearer_to_a_lone_corner_that_is_within_the_margin(ahead, 
     places = np.stack([arc(s * command.forward_m, s * command.turn_rad)[:2] for s in np.linspace(0, 1, 50)])
     gap = np.hypot(*(returns(scan)[0] - places).T)
     assert gap.min() >= gap[0] - 5e-4  # between the samples of its own check
+
+
+def test_a_corner_that_this_scan_shows_too_far_is_kept_clear_of_where_the_scans_before_showed_it():
+    """A wall's end 0.225 m away showed 0.239 m in one beam, and 24 mm of that were taken: the robot touched it."""
+    pose, grid = np.zeros(3), open_floor(np.zeros(3))
+    way = np.array([np.cos(-0.97), np.sin(-0.97)])
+    ranges = np.full(180, np.nan)
+    ranges[np.argmin(np.abs(BEARINGS + 0.97))] = 0.239
+    recent = RecentReturns()
+    recent.see(scan_of(np.where(np.isfinite(ranges), 0.226, np.nan)))
+    pilot = pilot_to(np.array([1.0, 0.2]), pose, grid)
+    bold, careful = (
+        pilot.command(pose, scan_of(ranges), grid, seen) for seen in (np.zeros((0, 2)), recent.points_robot)
+    )
+    nearest = [
+        min(np.hypot(*(0.225 * way - arc(s * c.forward_m, s * c.turn_rad)[:2])) for s in np.linspace(0, 1, 50))
+        for c in (bold, careful)
+    ]
+    assert nearest[0] < CONFIG.radius_m + CONFIG.margin_m - 5e-3
+    assert nearest[1] > CONFIG.radius_m + CONFIG.margin_m - 2e-3
+
+
+@given(st.integers(0, 2**32))
+def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
+    rng = np.random.default_rng(seed)
+    recent = RecentReturns()
+    ranges = np.full(180, np.nan)
+    at = rng.choice(180, 5, replace=False)
+    ranges[at] = rng.uniform(0.2, 0.8, 5)
+    scan = scan_of(ranges)
+    seen = returns(scan)[np.hypot(*returns(scan).T) < NEAR_M]
+    recent.see(scan)
+    pose = np.zeros(3)
+    for motion in rng.uniform(-0.2, 0.2, (3, 3)):
+        recent.move(Odometry(motion, np.zeros((3, 3))))
+        pose = compose(pose, motion)
+    np.testing.assert_allclose(to_world(recent.points_robot, pose), seen, atol=1e-12)
+    for _ in range(SCANS):
+        recent.see(scan_of(np.full(180, np.nan)))
+    assert not len(recent.points_robot)
 
 
 @few
