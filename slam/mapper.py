@@ -131,7 +131,8 @@ class Mapper:
 
     def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:
         """Return the walls that this scan can show."""
-        near = walls.distances_m < scan.range_max_m + self.config.matching.offset_m
+        lost_m = 3.0 * float(np.sqrt(np.trace(walls.belief.pose_cov[:2, :2])))
+        near = walls.distances_m < scan.range_max_m + max(self.config.matching.offset_m, lost_m)
         return KnownWalls(walls.ids[near], walls.extents[near])
 
     def _store(self, scan: Scan, segments: Segments, matches: Matches) -> Int[np.ndarray, " s"]:

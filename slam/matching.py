@@ -30,7 +30,7 @@ class MatchingConfig:
     angle_rad: float = 1.05
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
     offset_m: float = 0.5
-    """Nor are lines that stand further apart than this at the seen piece."""
+    """Nor are lines that stand further apart than this at the seen piece, unless the robot is as lost as that."""
     overlap_m: float = 0.02
     """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
     apart than a wall is thick."""
@@ -138,11 +138,11 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     turned = alpha_world[:, None] - means[:, 0]
     segment, line = np.nonzero(np.cos(turned) > np.cos(config.angle_rad))
     model = innovations(pose, joint.anchors[line], means[line], segments.lines[segment], segments.cov[segment])
-    near = np.abs(model.e[:, 1]) < config.offset_m
+    d2 = _distances(model, line, joint)
+    near = (np.abs(model.e[:, 1]) < config.offset_m) | (d2 <= gate_level(config.doubt, 2))
     segment, line = segment[near], line[near]
-    model = model.take(near)
     gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
-    return _Candidates(segment, line, model, _distances(model, line, joint), gap)
+    return _Candidates(segment, line, model.take(near), d2[near], gap)
 
 
 def _gaps(

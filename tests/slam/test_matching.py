@@ -198,3 +198,20 @@ def test_a_slip_of_the_wheels_excuses_no_wall_that_the_others_contradict(slip_ra
     assert clear.pairs.tolist() == [[1, 1], [2, 2]]
     rest = match(segments.take(clear.unmatched), walls, relocate(joint, walls.ids, clear.observations(segments)))
     assert rest.doubtful.tolist() == [0]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_robot_that_knows_how_lost_it_is_finds_its_walls_again(seed):
+    """After some metres without a wall in sight it is off by more than any two walls of a room stand apart."""
+    rng = np.random.default_rng(seed)
+    walker = Walker(faces_of(shapely.box(0, 0, 6, 5)), [3.0, 2.5, 0.3], rng)
+    for _ in range(5):
+        before = walker.scan().map
+    sigma = np.array([0.5, 0.5, np.deg2rad(4.0)])
+    error = np.array([*(0.9 * np.array([np.cos(seed), np.sin(seed)])), np.deg2rad(rng.uniform(-6, 6))])
+    walker.mapper.predict(Odometry(error, np.diag(sigma) ** 2))
+    for _ in range(3):
+        after = walker.scan()
+    assert after.map.ids.tolist() == before.ids.tolist()
+    assert len(after.matches.pairs) >= 3  # one in a hundred is refused
+    assert np.abs(after.map.belief.pose_world - before.belief.pose_world)[:2].max() < 0.02
