@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from .backend import Joint
 from .geometry.lines import normals
@@ -29,16 +29,17 @@ def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"])
     return nees(innovations, covs)
 
 
+@lru_cache(maxsize=256)
+def gate_level(probability: float, dof: int) -> float:
+    """Return the squared Mahalanobis distance that stays below it with this probability: a chi-square quantile."""
+    # As scipy.stats has it, which takes longer to import than all else that this package needs.
+    return 2.0 * float(gammaincinv(0.5 * dof, probability))
+
+
 def chi2_band(dof: int, confidence: float = 0.95, runs: int = 1) -> tuple[float, float]:
     """Return the two-sided band that the mean of `runs` independent chi-square variables lies in."""
     tail = 0.5 * (1.0 - confidence)
-    return float(chi2.ppf(tail, dof * runs)) / runs, float(chi2.ppf(1.0 - tail, dof * runs)) / runs
-
-
-@lru_cache(maxsize=256)
-def gate_level(probability: float, dof: int) -> float:
-    """Return the squared Mahalanobis distance that stays below it with this probability."""
-    return float(chi2.ppf(probability, dof))
+    return gate_level(tail, dof * runs) / runs, gate_level(1.0 - tail, dof * runs) / runs
 
 
 def anees(values: Float[np.ndarray, " n"], dof: int) -> float:
