@@ -116,16 +116,12 @@ class FreeSpace:
         cell = self.config.cell_m
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
-        half = int(np.ceil(scan.range_max_m / cell)) + 1
-        here = self.cells(pose_world[None, :2])[0]
-        r, c = int(here[0]), int(here[1])
-        rows, columns = slice(r - half, r + half + 1), slice(c - half, c + half + 1)
-        free = self._seen_free(pose_world, scan, here, half)
-        window = self._evidence[rows, columns]
-        returned = np.isfinite(scan.ranges_m)
-        directions = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)[returned]
-        hits = self.cells(to_world(directions * scan.ranges_m[returned, None], pose_world)) - here + half
-        hits = hits[np.all((hits >= 0) & (hits < window.shape), axis=-1)]
+        reach = self._reach(scan)
+        beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
+        tips = self.cells(to_world(beams * reach[:, None], pose_world))
+        box = self._box(self.cells(pose_world[None, :2])[0], tips, scan)
+        window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
+        free = self._seen_free(pose_world, scan, reach, box)
         free[tuple(hits.T)] = False
         change = -free.astype(np.int8)
         change[tuple(hits.T)] = self.config.hit
@@ -134,25 +130,36 @@ class FreeSpace:
         changed = np.nonzero((window > 0) != before)
         if len(changed[0]):
             (r0, r1), (c0, c1) = ((int(axis.min()), int(axis.max()) + 1) for axis in changed)
-            self._mark(rows.start + r0, rows.start + r1, columns.start + c0, columns.start + c1)
+            self._mark(box[0] + r0, box[0] + r1, box[2] + c0, box[2] + c1)
+
+    def _box(self, here: Int[np.ndarray, "2"], tips: Int[np.ndarray, "k 2"], scan: Scan) -> _Box:
+        """Return the part of the grid that a scan says something of, given the robot's cell and its beams' tips."""
+        step = float(scan.bearings_rad[1] - scan.bearings_rad[0])
+        # Two beams and the arc between them: it stands out beyond the line from tip to tip.
+        beyond = scan.range_max_m * (1.0 - np.cos(step))
+        spare = int(np.ceil(max(beyond, self.config.body_m) / self.config.cell_m)) + 1
+        r0, c0 = (np.minimum(tips.min(axis=0), here) - spare).tolist()
+        r1, c1 = (np.maximum(tips.max(axis=0), here) + spare + 1).tolist()
+        return r0, r1, c0, c1
 
     def _seen_free(
-        self, pose_world: Float[np.ndarray, "3"], scan: Scan, here: Int[np.ndarray, "2"], half: int
-    ) -> Bool[np.ndarray, "w w"]:
-        """Cells of the window around `here` that lie before the nearer of the two beams beside them."""
-        offset = self.points(here[None])[0] - pose_world[:2]
-        axis = np.arange(-half, half + 1) * self.config.cell_m
-        x, y = (axis + offset[0]).astype(np.float32), (axis + offset[1]).astype(np.float32)
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, reach: Float[np.ndarray, " k"], box: _Box
+    ) -> Bool[np.ndarray, "h w"]:
+        """Cells of a part of the grid that lie before the nearer of the two beams beside them."""
+        here = self.cells(pose_world[None, :2])
+        offset, (r, c) = self.points(here)[0] - pose_world[:2], here[0].tolist()
+        x = (np.arange(box[2] - c, box[3] - c) * self.config.cell_m + offset[0]).astype(np.float32)
+        y = (np.arange(box[0] - r, box[1] - r) * self.config.cell_m + offset[1]).astype(np.float32)
         distance = np.hypot(x[None, :], y[:, None])
         k = len(scan.bearings_rad)
         step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (k - 1)
         bearing = np.arctan2(y[:, None], x[None, :]) - np.float32(pose_world[2] + scan.bearings_rad[0])
         beam = np.floor(np.mod(bearing, np.float32(2 * np.pi)) / np.float32(step)).astype(np.int64)
-        reach = self._reach(scan) - 0.71 * self.config.cell_m
+        shown = reach - 0.71 * self.config.cell_m
         between = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1.0, dtype=np.float32)
-        between[: k - 1] = np.minimum(reach[:-1], reach[1:])
+        between[: k - 1] = np.minimum(shown[:-1], shown[1:])
         if scan.is_full_turn:
-            between[k - 1 :] = min(reach[-1], reach[0])
+            between[k - 1 :] = min(shown[-1], shown[0])
         return (distance < between[beam]) | (distance < self.config.body_m)
 
     @staticmethod
