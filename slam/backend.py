@@ -65,7 +65,7 @@ class Belief:
     @property
     def lines_world(self) -> Float[np.ndarray, "n 2"]:
         """The lines in the paper's Hessian form (alpha, r), world frame."""
-        r = self.means[:, 1] + np.sum(normals(self.means[:, 0]) * self.anchors, axis=-1)
+        r = self.means[:, 1] + np.vecdot(normals(self.means[:, 0]), self.anchors)
         return np.stack([self.means[:, 0], r], axis=-1)
 
     def rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:

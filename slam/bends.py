@@ -43,8 +43,8 @@ def bends_within(
         return np.zeros(0)
     points, alpha, pairs = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config)
     offset = points[:, None] - segments.ends[None, :, 0]
-    along = np.sum(offset * directions(segments.lines[:, 0]), axis=-1)
-    across = np.sum(offset * normals(segments.lines[:, 0]), axis=-1)
+    along = np.vecdot(offset, directions(segments.lines[:, 0]))
+    across = np.vecdot(offset, normals(segments.lines[:, 0]))
     length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=-1)
     on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
     on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
@@ -74,8 +74,8 @@ def _bends(
     turn = wrap(alpha - alpha[:, None])
     # Every other wall's ends as seen from the head of each: along it, and across.
     offset = ends[None] - ends[:, None, 1:]
-    along = np.sum(offset * directions(alpha)[:, None, None], axis=-1)
-    across = np.sum(offset * normals(alpha)[:, None, None], axis=-1)[..., 0]
+    along = np.vecdot(offset, directions(alpha)[:, None, None])
+    across = np.vecdot(offset, normals(alpha)[:, None, None])[..., 0]
     gap, runs_on = along[..., 0], along[..., 1] > 0.0
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
     is_bend = (gap < config.reach_m) & (gap > -length[:, None]) & runs_on

@@ -105,7 +105,7 @@ def _links(
         both_aside[k] = (ids[head[k]], ids[tail[k]]) not in passed
     allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
     straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
-    across = np.abs(np.sum(normals(lines[head, 0]) * (ends[tail, TAIL] - ends[head, HEAD]), axis=-1))
+    across = np.abs(np.vecdot(normals(lines[head, 0]), ends[tail, TAIL] - ends[head, HEAD]))
     allowed &= ~straight | (gap <= config.straight_reach_m) | (across > 0.5 * gap)
     order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
     successor = np.full(len(ids), -1)

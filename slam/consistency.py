@@ -135,7 +135,7 @@ def joint_error(
     shift = pose[:2] - rotation(float(turn)) @ true_pose_world[:2]
     anchors = to_robot(joint.anchors, np.array([shift[0], shift[1], turn]))
     alpha = wrap(lines[:, 0] - turn - true_lines_world[:, 0])
-    true_d = true_lines_world[:, 1] - np.sum(normals(true_lines_world[:, 0]) * anchors, axis=-1)
+    true_d = true_lines_world[:, 1] - np.vecdot(normals(true_lines_world[:, 0]), anchors)
     xi = pose_errors(pose[None], true_pose_world[None])[0]
     error = np.concatenate([xi, np.stack([alpha, lines[:, 1] - true_d], axis=-1).ravel()])
     to_error = _to_invariant(pose, lines[:, 0], joint.anchors)
@@ -151,5 +151,5 @@ def _to_invariant(
     n = normals(alpha)
     to_error[3::2, 2] = -1.0
     to_error[4::2, :2] = -n
-    to_error[4::2, 2] = np.sum(n * ((pose_world[:2] - anchors) @ J.T), axis=-1)
+    to_error[4::2, 2] = np.vecdot(n, (pose_world[:2] - anchors) @ J.T)
     return to_error

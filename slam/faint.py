@@ -99,8 +99,8 @@ class FaintLines:
         known = self._lines
         turn = wrap(seen.alpha[:, None] - known.alpha)
         shift = seen.centre_world[:, None] - known.centre_world
-        off = np.sum(shift * normals(known.alpha), axis=-1)
-        along = np.sum(shift * directions(known.alpha), axis=-1)
+        off = np.vecdot(shift, normals(known.alpha))
+        along = np.vecdot(shift, directions(known.alpha))
         s00 = seen.var_alpha[:, None] + known.var_alpha
         s01 = along * known.var_alpha
         s11 = seen.var_across[:, None] + known.var_across + along * s01 + self._config.slack_m**2

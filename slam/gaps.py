@@ -69,6 +69,6 @@ def passing(
     crossing = np.abs(denominator) > 1e-9
     safe = np.where(crossing, denominator, 1.0)
     u = -(start @ (beam @ J.T).T) / safe
-    s = -np.sum(start * (gap @ J.T), axis=-1)[:, None] / safe
+    s = -np.vecdot(start, gap @ J.T)[:, None] / safe
     margin = (margin_m / np.maximum(width, 1e-9))[:, None]
     return crossing & (u > margin) & (u < 1.0 - margin) & (s > 0) & (ranges > s + beyond_m)

@@ -154,7 +154,7 @@ def _gaps(
 ) -> Float[np.ndarray, " c"]:
     """Return the distance along the line from each segment to its wall, m; negative where they overlap by that much."""
     offsets = to_world(ends_robot, pose_world) - anchors[:, None]
-    along = np.sum(offsets * directions(alpha)[:, None], axis=-1)
+    along = np.vecdot(offsets, directions(alpha)[:, None])
     return np.maximum(along[:, 0] - extents[:, 1], extents[:, 0] - along[:, 1])
 
 

@@ -44,7 +44,7 @@ def lines_robot(
 ) -> Float[np.ndarray, "m 2"]:
     """Predict map lines as (alpha, r) in the robot frame."""
     alpha = means[:, 0]
-    r = means[:, 1] + np.sum(normals(alpha) * (anchors - pose_world[:2]), axis=-1)
+    r = means[:, 1] + np.vecdot(normals(alpha), anchors - pose_world[:2])
     return np.stack([wrap(alpha - pose_world[2]), r], axis=-1)
 
 
@@ -87,7 +87,7 @@ def innovations(
     m = len(lines)
     n = normals(means[:, 0])
     to_anchor = anchors - pose_world[:2]
-    r_predicted = means[:, 1] + np.einsum("mi,mi->m", n, to_anchor)
+    r_predicted = means[:, 1] + np.vecdot(n, to_anchor)
     epsilon = wrap(lines[:, 0] - (means[:, 0] - pose_world[2]))
     t0 = cov[:, 0, 1] / cov[:, 0, 0]
     cosine, sine = np.cos(epsilon), np.sin(epsilon)
@@ -161,8 +161,8 @@ def grow(
     n, t = normals(alpha), directions(alpha)
     anchors = centres @ rotation(pose_world[2]).T + pose_world[:2] if at_wall else np.zeros_like(centres)
     to_robot = pose_world[:2] - anchors
-    means = np.stack([alpha, lines[:, 1] + np.sum(n * to_robot, axis=-1)], axis=-1)
-    lever = np.sum(t * (to_robot if position is None else position - anchors), axis=-1)
+    means = np.stack([alpha, lines[:, 1] + np.vecdot(n, to_robot)], axis=-1)
+    lever = np.vecdot(t, to_robot if position is None else position - anchors)
     m = len(lines)
     G_pose, G_line = np.zeros((m, 2, 3)), np.zeros((m, 2, 2))
     G_pose[:, 0, 2] = 1.0

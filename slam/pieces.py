@@ -42,7 +42,7 @@ def sure_pieces(segments: Segments, scan: Scan, config: PiecesConfig) -> Segment
     r = segments.lines[:, 1]
     farthest = np.sqrt(np.maximum(r * config.sure_gap_m / beam_step(scan) - r**2, 0.0))
     t, n = directions(segments.lines[:, 0]), normals(segments.lines[:, 0])
-    along = np.sum(segments.ends * t[:, None], axis=-1)
+    along = np.vecdot(segments.ends, t[:, None])
     inner = np.where(np.sign(along[:, :1]) == np.sign(along[:, 1:]), np.abs(along).min(axis=1, keepdims=True), 0.0)
     farthest = np.maximum(farthest[:, None], inner)
     clipped = np.clip(along, -farthest, farthest)

@@ -31,13 +31,13 @@ def sightlines(
     """Compare a scan with lines (alpha, d) about anchors, world frame; `margin_m` is across the line."""
     n = normals(means[:, 0])
     to_anchor = anchors - pose_world[:2]
-    r = means[:, 1] + np.sum(n * to_anchor, axis=-1)
+    r = means[:, 1] + np.vecdot(n, to_anchor)
     off_normal = scan.bearings_rad + pose_world[2] - means[:, :1]
     cosine = np.cos(off_normal)
     ahead = (cosine > 0.05) & (r[:, None] > 0.02)
     safe = np.where(ahead, cosine, 1.0)
     distance = r[:, None] / safe
-    foot = np.sum(directions(means[:, 0]) * -to_anchor, axis=-1)
+    foot = np.vecdot(directions(means[:, 0]), -to_anchor)
     along = np.where(ahead, foot[:, None] + distance * np.sin(off_normal), np.nan)
     ranges = np.where(np.isfinite(scan.ranges_m), scan.ranges_m, scan.range_max_m)
     across = (ranges - distance) * safe

@@ -167,7 +167,7 @@ class Walls:
         """Move the ends outwards to what was seen, and inwards where a corner was seen more sharply than before."""
         ends_world = to_world(segments.ends[used], belief.pose_world)
         t = directions(belief.means[rows, 0])
-        along = np.sum((ends_world - belief.anchors[rows][:, None]) * t[:, None], axis=-1)
+        along = np.vecdot(ends_world - belief.anchors[rows][:, None], t[:, None])
         spacing = beam_spacing(scan, segments)[used]
         corner = segments.end_kinds[used] == EndKind.CORNER
         for side, outward in enumerate((-1.0, 1.0)):
@@ -196,7 +196,7 @@ class Walls:
         margin = self._config.end_margin_m
         for side, outward in enumerate((-1, 1)):
             after = (used + outward) % len(segments)
-            corner, far = (np.sum((ends_world[k, side] - anchors) * t, axis=-1) for k in (used, after))
+            corner, far = (np.vecdot(ends_world[k, side] - anchors, t) for k in (used, after))
             end = self._extents[rows, side]
             runs_on = is_corner[used, side] & is_corner[after, 1 - side] & (outward * (far - end) > -margin)
             others = (owners[after] >= 0) & (owners[after] != owners[used])

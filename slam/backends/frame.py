@@ -44,7 +44,7 @@ class Frame:
         by_frame[:2, :2], by_frame[:2, 2], by_frame[2, 2] = np.eye(2), J @ (pose[:2] - origin), 1.0
         by_frame[3::2, 2] = 1.0
         by_frame[4::2, :2] = normals(means[:, 0])
-        by_frame[4::2, 2] = -np.sum(directions(means[:, 0]) * (anchors - origin), axis=-1)
+        by_frame[4::2, 2] = -np.vecdot(directions(means[:, 0]), anchors - origin)
         cov = self._turned(joint.cov)
         # Column by column, so that each entry is the same whatever else is asked for.
         for column in np.linalg.cholesky(self.cov).T:

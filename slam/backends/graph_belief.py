@@ -28,7 +28,7 @@ def believe(
     for index in range(solver.last, len(record.motions)):
         ahead.move(record.motions[index], record.motion_covs[index])
     means = solver.lines.copy()
-    means[:, 1] -= np.sum(normals(means[:, 0]) * inner_anchors, axis=-1)
+    means[:, 1] -= np.vecdot(normals(means[:, 0]), inner_anchors)
     means[:, 0] = wrap(means[:, 0] + record.pose_world[2])
     answers: list[tuple[Int[np.ndarray, " m"], Float[np.ndarray, "s s"]]] = []
 
@@ -57,7 +57,7 @@ def _joint_cov(
     """Return the covariance of the last pose (body frame) and these lines (alpha, d)."""
     cov = solver.joint_cov(rows)
     # d = r - n(alpha)·c, so dd = dr - (t·c) dalpha.
-    lever = np.sum(directions(solver.lines[rows, 0]) * anchors[rows], axis=-1)
+    lever = np.vecdot(directions(solver.lines[rows, 0]), anchors[rows])
     cov[4::2] -= lever[:, None] * cov[3::2]
     cov[:, 4::2] -= lever * cov[:, 3::2]
     return np.asarray(0.5 * (cov + cov.T))

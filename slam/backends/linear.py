@@ -37,5 +37,5 @@ def carry(
     by_pose[:2, 2] = J @ (moved - position)
     dn = normals(turned) - normals(alpha)
     by_line[:, 1, :2] = dn
-    by_line[:, 1, 2] = -np.sum(dn * ((position - anchors) @ J.T), axis=-1)
+    by_line[:, 1, 2] = -np.vecdot(dn, (position - anchors) @ J.T)
     return by_pose, by_line

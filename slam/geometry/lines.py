@@ -12,19 +12,27 @@ from .poses import wrap
 
 def normals(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray, "*n 2"]:
     """Return the unit normals n(alpha), pointing into the wall."""
-    return np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
+    return _vectors(np.cos(alpha), np.sin(alpha))
 
 
 def directions(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray, "*n 2"]:
     """Return the unit vectors t = J n(alpha) along the lines, free side on the left."""
-    return np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
+    return _vectors(-np.sin(alpha), np.cos(alpha))
+
+
+def _vectors(
+    x: Float[np.ndarray, "*n"] | np.floating, y: Float[np.ndarray, "*n"] | np.floating
+) -> Float[np.ndarray, "*n 2"]:
+    vectors = np.empty((*np.shape(x), 2))  # a fifth of what np.stack takes, dozens of times in a step
+    vectors[..., 0], vectors[..., 1] = x, y
+    return vectors
 
 
 def through(segments: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "n 2"]:
     """Return the lines (alpha, r) through segments that are ordered with the free side on the left."""
     along = segments[:, 1] - segments[:, 0]
     alpha = np.arctan2(-along[:, 0], along[:, 1])
-    return np.stack([alpha, np.sum(normals(alpha) * segments[:, 0], axis=-1)], axis=-1)
+    return np.stack([alpha, np.vecdot(normals(alpha), segments[:, 0])], axis=-1)
 
 
 def lines_to_world(
@@ -38,7 +46,7 @@ def lines_to_world(
 def project(points: Float[np.ndarray, "*n 2"], lines: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
     """Return the feet of the perpendiculars from points to their lines."""
     n = normals(lines[..., 0])
-    off = np.sum(n * points, axis=-1) - lines[..., 1]
+    off = np.vecdot(n, points) - lines[..., 1]
     return points - off[..., None] * n
 
 
@@ -59,8 +67,8 @@ def distance_to_segments(
 ) -> Float[np.ndarray, "m n"]:
     """Return the distance from each point to each segment."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.maximum(np.sum(along**2, axis=-1), 1e-18)
+    squared = np.maximum(np.vecdot(along, along), 1e-18)
     offset = points[:, None, :] - start
-    share = np.clip(np.sum(offset * along, axis=-1) / squared, 0.0, 1.0)
+    share = np.clip(np.vecdot(offset, along) / squared, 0.0, 1.0)
     gap = offset - share[..., None] * along
     return np.hypot(gap[..., 0], gap[..., 1])
