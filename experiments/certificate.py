@@ -24,6 +24,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         else [{**unseen_record(border), "position_m": border.cells_world.mean(axis=0).tolist()} for border in unseen],
         "floor_m2": certificate.floor_m2,
         "unseen_m2": certificate.unseen_m2,
+        "reachable_way": certificate.reachable_way,
     }
 
 

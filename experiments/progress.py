@@ -64,6 +64,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("coverage", f"{100 * summary['coverage']:.2f} %"),
         ("floor swept", f"{100 * summary['swept']:.2f} %"),
         ("open ends left, set aside", f"{summary['open_ends']}, {len(summary['set_aside'])}"),
+        *_way_back(summary["certificate"]["reachable_way"]),
         ("collisions", str(summary["collisions"])),
         ("lines (tentative, duplicate)", _counts(summary)),
         ("false matches", str(summary["false_matches"])),
@@ -80,6 +81,11 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         for pair, d in list(summary["distances"].items())[:6]
     ]
     return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
+
+
+def _way_back(share: float | None) -> list[tuple[str, str]]:
+    """Return a row where the robot has locked itself in, or its map contradicts the way that it took."""
+    return [] if share is None or share > 0.9 else [("of its way it can drive again", f"{100 * share:.0f} %")]
 
 
 def _counts(summary: dict[str, Any]) -> str:

@@ -73,7 +73,8 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
         summary = _bare_summary(scenario, ending)
         return TrialResult(scenario, ending, None, recorder.votes, None, None, None, summary)
     log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
-    certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep)
+    way_world = log.estimated_world[:, :2]
+    certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, way_world)
     summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending)
     summary |= {"certificate": certificate_record(certificate)}
     smoothed = smooth(scenario.backend, last.map, len(log))

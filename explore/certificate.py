@@ -75,12 +75,18 @@ class Certificate:
     """Area inside the closed rooms, without their islands; 0 where no room is closed."""
     unseen_m2: float | None
     """What of it no scan has seen, the fringe of the walls left out; None where no room is closed, or as `unseen`."""
+    reachable_way: float | None
+    """Share of the places where the robot believes to have been that it could drive to again; None as `unseen`. Well
+    below 1 it has locked itself in, or its map has come to contradict the way that it took."""
 
 
-def certify(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> Certificate:
+def certify(
+    step: Step, outcome: Outcome, paths: PathConfig, sweep: bool, way_world: Float[np.ndarray, "s 2"]
+) -> Certificate:
     """Return what the last step of a mission can vouch for; `sweep` says whether unseen floor was to be visited.
 
-    It reads the free space as it is now, so ask before the mission goes on.
+    `way_world` is where the robot believed to be at each step, m. It reads the free space as it is now, so ask before
+    the mission goes on.
     """
     found = contours(step.map, step.chains)
     floor = floor_of(found)
@@ -92,6 +98,7 @@ def certify(step: Step, outcome: Outcome, paths: PathConfig, sweep: bool) -> Cer
         left_unseen(step, paths, sweep) if kept else None,
         float(floor.area),
         unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
+        reachable_way(step, paths, way_world) if kept else None,
     )
 
 
@@ -158,6 +165,12 @@ def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen,
         )
         for border in borders
     )
+
+
+def reachable_way(step: Step, paths: PathConfig, way_world: Float[np.ndarray, "s 2"]) -> float:
+    """Return the share of some places to which a way is known over the floor seen free."""
+    metres = DrivingField(step.free_space, step.pose_world[:2], paths).metres(way_world)
+    return float(np.isfinite(metres).mean())
 
 
 def _why_unseen(border: Float[np.ndarray, "n 2"], places: tuple[LeftPlace, ...]) -> str:

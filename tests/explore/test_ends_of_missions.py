@@ -31,6 +31,7 @@ from slam.stochastic_map import StochasticMap
 
 ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))
 START = np.array([0.7, 0.7, 0.3])
+WAY = START[None, :2]
 
 
 def begun():
@@ -84,7 +85,7 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
     assert last.outcome is Outcome.ALL_CLOSED
     assert "back at the start" in last.reason
     assert np.hypot(*(robot.true_pose - START)[:2]) <= 0.2
-    certificate = certify(last, last.outcome, PathConfig(), sweep=True)
+    certificate = certify(last, last.outcome, PathConfig(), True, WAY)
     assert sorted(contour.is_island for contour in certificate.contours) == [False, True]
     assert all(contour.polygon.is_valid for contour in certificate.contours)
     assert certificate.floor_m2 == pytest.approx(ROOM.area, abs=0.05)
@@ -94,10 +95,29 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
 
 
 @pytest.mark.usefixtures("_unchecked")
+def test_a_robot_that_cannot_drive_again_where_it_has_been_is_told_so():
+    mission, _ = steps()
+    way = []
+    for step in mission:
+        way.append(step.pose_world[:2])
+        last = step
+    way = np.array(way)
+    assert certify(last, last.outcome, PathConfig(), True, way).reachable_way == 1.0
+    # A wall all along y = 2 from wall to wall, as a map that has turned would draw it.
+    cells = last.free_space.cells(np.stack([np.arange(0.0, 4.0, 0.02), np.full(200, 2.0)], axis=-1))
+    last.free_space.evidence[tuple(cells.T)] = 6
+    last.free_space._mark(*np.array([cells.min(axis=0), cells.max(axis=0) + 1]).T.ravel().tolist())
+    here = way[:, 1] > 2.0 if last.pose_world[1] > 2.0 else way[:, 1] < 2.0
+    share = certify(last, last.outcome, PathConfig(), True, way).reachable_way
+    assert share == pytest.approx(here.mean(), abs=0.1)
+    assert share < 0.9
+
+
+@pytest.mark.usefixtures("_unchecked")
 def test_what_a_stopped_mission_has_not_seen_yet_is_told():
     mission, _ = steps(max_steps=2)
     *_, last = mission
-    certificate = certify(last, last.outcome, PathConfig(), sweep=True)
+    certificate = certify(last, last.outcome, PathConfig(), True, WAY)
     assert {end.why for end in certificate.open_ends} == {"not explored yet"}
     assert len(certificate.open_ends) == sum(len(chain.open_ends) for chain in last.chains) > 0
     assert certificate.unseen
@@ -109,7 +129,7 @@ def test_what_a_stopped_mission_has_not_seen_yet_is_told():
 def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
     mission, _ = steps(max_steps=2)
     *_, last = mission
-    borders = certify(last, last.outcome, PathConfig(), sweep=True).unseen
+    borders = certify(last, last.outcome, PathConfig(), True, WAY).unseen
     assert borders
     near, far = borders[0].cells_world.mean(axis=0), borders[0].cells_world.mean(axis=0) + 5.0
     for troubles, words in (
@@ -118,9 +138,9 @@ def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
         ([(far, "the way was blocked")], "not visited yet"),
     ):
         left = tuple(LeftPlace(place, trouble) for place, trouble in troubles)
-        certificate = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep=True)
+        certificate = certify(replace(last, left_places=left), last.outcome, PathConfig(), True, WAY)
         assert words in certificate.unseen[0].why
-    without = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep=False)
+    without = certify(replace(last, left_places=left), last.outcome, PathConfig(), False, WAY)
     assert {border.why for border in without.unseen} == {"unseen floor was not to be visited"}
 
 
