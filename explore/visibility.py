@@ -18,28 +18,25 @@ class VisibilityGraph:
 
     def __init__(self) -> None:
         self.graph: nx.DiGraph[int] = nx.DiGraph()
-        self._neighbours: set[tuple[int, int]] = set()
+        self._neighbours: frozenset[tuple[int, int]] = frozenset()
 
     def observe(self, walls: StochasticMap, chains: Iterable[Chain], followed: int | None, seen: Iterable[int]) -> None:
         """Bring nodes and neighbours up to the map, and note which walls were seen while one was followed."""
         present = set(walls.ids[~walls.tentative].tolist())
         self.graph.remove_nodes_from([node for node in self.graph if node not in present])
         self.graph.add_nodes_from(present)
-        self._connect({pair for chain in chains for pair in neighbours(chain)})
+        self._connect(pair for chain in chains for pair in neighbours(chain))
         if followed is not None and followed in present:
             for wall in seen:
                 if wall in present and wall != followed and not self.graph.has_edge(followed, wall):
                     self.graph.add_edge(followed, wall, kind=SIGHT)
 
-    def _connect(self, pairs: set[tuple[int, int]]) -> None:
-        for a, b in self._neighbours - pairs:
-            for edge in ((a, b), (b, a)):
-                if self.graph.has_edge(*edge) and self.graph.edges[edge]["kind"] == NEIGHBOUR:
-                    self.graph.remove_edge(*edge)
-        for a, b in pairs:
-            self.graph.add_edge(a, b, kind=NEIGHBOUR)
-            self.graph.add_edge(b, a, kind=NEIGHBOUR)
-        self._neighbours = pairs
+    def _connect(self, pairs: Iterable[tuple[int, int]]) -> None:
+        """Make edges both ways between the pairs, and take away those of pairs that no longer meet."""
+        edges = frozenset(edge for a, b in pairs for edge in ((a, b), (b, a)))
+        self.graph.remove_edges_from(self._neighbours - edges)
+        self.graph.add_edges_from(sorted(edges - self._neighbours), kind=NEIGHBOUR)
+        self._neighbours = edges
 
 
 def neighbours(chain: Chain) -> list[tuple[int, int]]:
@@ -53,14 +50,9 @@ def followed_wall(walls: StochasticMap, reach_m: float = 1.0) -> int | None:
     rows = np.flatnonzero(~walls.tentative)
     if not len(rows):
         return None
-    position = walls.belief.pose_world[:2]
     ends = walls.ends_world[rows]
-    along = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)
-    offset = position - ends[:, 0]
-    left = (along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]) / length
-    share = np.clip(np.sum(along * offset, axis=1) / length**2, 0.0, 1.0)
-    distance = np.hypot(*(offset - share[:, None] * along).T)
-    distance[left < 0] = np.inf
+    along, offset = ends[:, 1] - ends[:, 0], walls.belief.pose_world[:2] - ends[:, 0]
+    is_behind = along[:, 0] * offset[:, 1] < along[:, 1] * offset[:, 0]
+    distance = np.where(is_behind, np.inf, walls.distances_m[rows])
     best = int(np.argmin(distance))
     return int(walls.ids[rows[best]]) if distance[best] <= reach_m else None
