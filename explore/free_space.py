@@ -165,11 +165,11 @@ class FreeSpace:
     @staticmethod
     def _reach(scan: Scan) -> Float[np.ndarray, " k"]:
         """How far each beam shows free floor; a lone missing return may be a fault, so its neighbours speak for it."""
-        ranges = np.where(np.isfinite(scan.ranges_m), scan.ranges_m, scan.range_max_m)
-        missing = ~np.isfinite(scan.ranges_m)
-        alone = missing & ~np.roll(missing, 1) & ~np.roll(missing, -1)
-        neighbours = np.minimum(np.roll(ranges, 1), np.roll(ranges, -1))
-        return np.where(alone, neighbours, ranges)
+        around = np.concatenate([scan.ranges_m[-1:], scan.ranges_m, scan.ranges_m[:1]])
+        before, here, after = around[:-2], around[1:-1], around[2:]
+        # A minimum with NaN is NaN: a missing return is alone where both neighbours returned.
+        reach = np.where(np.isfinite(here), here, np.minimum(before, after))
+        return np.where(np.isfinite(reach), reach, scan.range_max_m)
 
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from .backend import Joint
 from .consistency import gate_level
@@ -62,21 +62,18 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
     # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
     between = middle[ours, None] - middle[firm]
     reach = 0.5 * (length[ours, None] + length[firm]) + config.across_m
-    meets = between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2
-    near = np.argwhere(meets & (np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad)))
-    pairs = np.stack([ours[near[:, 0]], firm[near[:, 1]]], axis=-1)
-    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
-    order = np.argsort(length[pairs], axis=1)
-    shorter, longer = np.take_along_axis(pairs, order, axis=1).T
+    near = (between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2) & (ours[:, None] != firm)
+    near &= np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad)
+    row, column = np.nonzero(near)
+    one, other = ours[row], firm[column]
+    older, younger = np.divmod(np.unique(np.minimum(one, other) * len(walls) + np.maximum(one, other)), len(walls))
+    is_shorter = length[older] <= length[younger]
+    shorter, longer = np.where(is_shorter, older, younger), np.where(is_shorter, younger, older)
     off = ends[shorter] - ends[longer, :1]
-    across = np.abs(_dot(off, normals(alpha[longer]))).max(axis=1)
-    along = _dot(off, directions(alpha[longer]))
+    across = np.abs(np.vecdot(off, normals(alpha[longer])[:, None])).max(axis=1)
+    along = np.vecdot(off, directions(alpha[longer])[:, None])
     apart = np.maximum(along[:, 0] - length[longer], -along[:, 1])
-    return walls.ids[pairs[(across <= config.across_m) & (apart <= -config.overlap_m)]]
-
-
-def _dot(points: Float[np.ndarray, "p 2 2"], vectors: Float[np.ndarray, "p 2"]) -> Float[np.ndarray, "p 2"]:
-    return np.einsum("pei,pi->pe", points, vectors)
+    return walls.ids[np.stack([older, younger], axis=-1)[(across <= config.across_m) & (apart <= -config.overlap_m)]]
 
 
 def same_line(joint: Joint, gate: float) -> bool:

@@ -140,7 +140,7 @@ class Mapper:
         owners = np.full(len(segments), -1, dtype=np.int64)
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
-        fresh = np.setdiff1d(matches.unmatched, matches.doubtful)
+        fresh = np.setdiff1d(matches.unmatched, matches.doubtful, assume_unique=True)
         faint, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
         believed = faint[self._faint.see(self.backend.belief.pose_world, segments.take(faint))]
         fresh = np.sort(np.concatenate([fresh, believed]))

@@ -72,7 +72,8 @@ class Walls:
         `believed` are new walls that were seen often before they became walls.
         """
         self._scans += 1
-        self._append(belief.ids[len(self._ids) :])
+        if len(belief.ids) > len(self._ids):
+            self._append(belief.ids[len(self._ids) :])
         used = np.flatnonzero(owners >= 0)
         rows = np.searchsorted(self._ids, owners[used])
         self._stretch(belief, scan, segments, used, rows)
@@ -85,8 +86,9 @@ class Walls:
         shaky = stale & (self._sightings < self._config.trusted_sightings)
         shaky |= (self._claimed >= self._config.claims) & (self._sightings < self._config.established_sightings)
         forgotten = self._ids[shaky | (self._extents[:, 1] - self._extents[:, 0] < self._config.least_m)]
-        self._drop(forgotten)
-        owners[np.isin(owners, forgotten)] = -1
+        if len(forgotten):
+            self._drop(forgotten)
+            owners[np.isin(owners, forgotten)] = -1
         return forgotten
 
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
