@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import cKDTree
 
 from .geometry.poses import J
 from .robot import Scan
@@ -36,15 +35,15 @@ class Gaps:
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Hold one scan, taken at the map's pose, against the gaps of all firm walls within its range."""
-        config, rows = self._config, np.flatnonzero(~walls.tentative)
-        if not len(rows):
-            return
+        config, pose = self._config, walls.belief.pose_world
+        rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + config.widest_m))
         tails, heads = walls.ends_world[rows].transpose(1, 0, 2)
-        near = cKDTree(heads).sparse_distance_matrix(cKDTree(tails), config.widest_m, output_type="ndarray")
-        near = near[(near["v"] > config.least_m) & (near["i"] != near["j"])]
-        pose = walls.belief.pose_world
-        within = np.hypot(*(heads[near["i"]] - pose[:2]).T) < scan.range_max_m
-        pairs = np.stack([near["i"], near["j"]], axis=-1)[within]
+        width = np.hypot(*np.moveaxis(heads[:, None] - tails, -1, 0))
+        is_gap = (width > config.least_m) & (width <= config.widest_m) & ~np.eye(len(rows), dtype=bool)
+        is_gap &= np.hypot(*(heads - pose[:2]).T)[:, None] < scan.range_max_m
+        pairs = np.argwhere(is_gap)
+        if not len(pairs):
+            return
         beams = passing(heads[pairs[:, 0]], tails[pairs[:, 1]], pose, scan, config.beyond_m, config.margin_m)
         through = pairs[np.count_nonzero(beams, axis=1) >= config.beams]
         self.passed.update((int(head), int(tail)) for head, tail in walls.ids[rows][through].tolist())
