@@ -16,7 +16,7 @@ from viz.figures import Picture, draw_map, png
 
 from .corners import corners
 from .coverage import alignment
-from .scenario import TrialConfig
+from .scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from .trial import TrialResult
 
 
@@ -55,18 +55,20 @@ def over_truth(
     """Return what the picture of a map shows."""
     to_estimate = inverse(alignment(start_estimate, true_world[0]))
     rings = (world.free.exterior, *world.free.interiors)
+    off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
         f"coverage {100 * summary['coverage']:.1f} %",
-        f"pose error {100 * summary['pose_rmse_m']:.1f} cm rms (wheels alone: {summary['odometry_max_m']:.2f} m)",
+        f"pose error rms {off_cm:.1f} cm (wheels alone {wheels_cm:.0f} cm)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"
+    how = "replayed" if config.strategy == STRATEGY_OF_REPLAYS else config.strategy
     return Picture(
         map=walls,
         chains=chains,
         path_world=estimated_world,
-        title=f"{world.name}   {config.backend}, {config.strategy}, {noise}",
+        title=f"{world.name}   {config.backend}, {how}, {noise}",
         subtitle="grid 1 m;  " + ";  ".join(words),
         set_aside=set_aside,
         true_path_world=np.array([compose(to_estimate, pose) for pose in true_world]),

@@ -30,6 +30,8 @@ MARGIN_M = 0.6
 ROBOT_M = 0.2
 ENLARGED = 10.0
 """How much ellipses are enlarged that could not be seen else."""
+GRID_ORDER = 1.2
+"""Between the true floor and what is drawn on it."""
 LETTER_INCH = 0.072
 """Mean width of a letter of the subtitle."""
 
@@ -114,8 +116,10 @@ def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MultipleLocator(step))
         axis.set_major_formatter(lambda value, _: f"{value:.0f}" if round(value / step) % 2 == 0 else "")
-    axes.grid(color=palette.GRID, linewidth=0.6, zorder=1.2)
-    axes.set_axisbelow(False)
+    axes.grid(color=palette.GRID, linewidth=0.6)
+    for axis in (axes.xaxis, axes.yaxis):
+        # Above the floor, below all else; `axisbelow` knows only below the floor and above the paths.
+        axis.set_zorder(GRID_ORDER)
     axes.tick_params(length=0, labelsize=7, labelcolor="#8A8A8A")
     for spine in axes.spines.values():
         spine.set_visible(False)

@@ -15,12 +15,14 @@ from scipy.spatial import cKDTree
 from slam.consistency import chi2_band
 
 from . import palette
-from .shapes import VAGUE_RAD, ellipses
+from .shapes import SIGMAS, VAGUE_RAD, ellipses
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
 AWAY_M = 1.5
 """... after at least so many metres elsewhere."""
+ENLARGED = 10.0
+"""How much ellipses of the model space are enlarged."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 """Driven once, twice, ..., five times or more, as in the paper's figures 5 and 6."""
 
@@ -72,14 +74,18 @@ def draw_model_space(
     covs: Float[np.ndarray, "n 2 2"],
     colours: Sequence[str],
     title: str,
-    times: float = 10.0,
 ) -> Figure:
-    """Return the walls as ellipses of three standard deviations in the plane of (alpha rad, r m), `times` enlarged.
+    """Return the walls as ellipses of three standard deviations in the plane of (alpha rad, r m).
 
-    Walls of a direction less certain than VAGUE_RAD, whose ellipses are huge, are pale.
+    They are ten times enlarged, unless most would then cross half the picture: so uncertain is a map that begins after
+    a blind drive. Walls of a direction less certain than VAGUE_RAD, and than most, whose ellipses are huge, are pale.
     """
-    figure, axes = _figure(f"{title}\n3σ ellipses of the walls, {times:g} times enlarged", (5.2, 4.6))
-    vague = np.sqrt(covs[:, 0, 0]) > VAGUE_RAD
+    sigma_rad = np.sqrt(covs[:, 0, 0])
+    typical = float(np.median(sigma_rad)) if len(sigma_rad) else 0.0
+    times = 1.0 if SIGMAS * ENLARGED * typical > 0.5 * np.pi else ENLARGED
+    enlarged = "" if times == 1.0 else f", {times:g} times enlarged"
+    figure, axes = _figure(f"{title}\n3σ ellipses of the walls{enlarged}", (5.2, 4.6))
+    vague = sigma_rad > max(VAGUE_RAD, 2.0 * typical)
     contours = ellipses(lines_world, covs, times, vertices=49)
     for chosen, alpha, width in ((vague, 0.25, 0.6), (~vague, 1.0, 1.0)):
         axes.add_collection(

@@ -6,6 +6,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.pictures import main as draw
+from experiments.pictures import read_pictured
+from experiments.saved_map import saved_map
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +38,15 @@ def test_a_folder_without_a_map_is_one_line(runs, tmp_path, monkeypatch, capsys)
     assert draw() == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert said.startswith(f"pictures: expected a run's results in {home}, found ")
+
+
+def test_the_title_says_replayed_and_holds_one_error_against_the_other_in_one_unit(tmp_path):
+    run, replay = tmp_path / "run", tmp_path / "replay"
+    assert main(["explore", "paper-fig4", "--max-steps", "6", "--out", str(run)]) == 0
+    assert main(["replay", str(run / "log.npz"), "--out", str(replay)]) == 0
+    for folder, how in ((run, "nearest-robot"), (replay, "replayed")):
+        read, summary = read_pictured(folder), json.loads((folder / "summary.json").read_text())
+        shown = saved_map(folder, read.trial, read.log, read.walls, read.estimated_world)
+        assert shown.title == f"paper-fig4   full-ekf, {how}, seed 1"
+        errors = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
+        assert "pose error rms {:.1f} cm (wheels alone {:.0f} cm)".format(*errors) in shown.subtitle

@@ -51,3 +51,9 @@ def test_ellipses_of_corners_that_could_not_be_seen_are_enlarged_and_the_legend_
     covs = np.tile(sigma_m**2 * np.eye(2), (len(corners), 1, 1))
     shown = labels(draw_map(replace(plain, corners_world=corners, corner_covs=covs)))
     assert f"3σ ellipse of a corner{words}" in shown
+
+
+def test_the_grid_lies_on_the_floor_and_below_the_paths():
+    (axes,) = draw_map(picture(closed=True)).axes
+    floor, paths = max(patch.zorder for patch in axes.patches[:2]), min(line.zorder for line in axes.lines)
+    assert floor < axes.xaxis.zorder == axes.yaxis.zorder < paths

@@ -46,3 +46,21 @@ def test_the_same_picture_is_the_same_bytes(kind):
         one, two = (saved(draw(), kind) for _ in range(2))
         assert one == two
         assert one.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])
+
+
+@pytest.mark.parametrize(("degrees", "words"), [(0.2, ", 10 times enlarged"), (5.0, "")])
+def test_ellipses_that_would_cross_the_picture_are_not_enlarged_and_the_title_says_so(degrees, words):
+    lines = np.array([[0.0, 1.0], [1.5, 2.0], [-1.5, 2.0]])
+    covs = np.tile(np.diag([np.deg2rad(degrees), 0.05]) ** 2, (3, 1, 1))
+    figure = draw_model_space(lines, covs, ["#000000"] * 3, "title")
+    assert figure.get_suptitle() == f"title\n3σ ellipses of the walls{words}"
+    across = np.concatenate([path.vertices[:, 0] for path in figure.axes[0].collections[1].get_paths()])
+    assert 3.0 < np.ptp(across) < 2.0 * np.pi
+
+
+def test_walls_that_are_vaguer_than_the_others_are_pale():
+    covs = np.tile(np.diag([np.deg2rad(5.0), 0.05]) ** 2, (3, 1, 1))
+    covs[0] *= 9.0
+    figure = draw_model_space(np.zeros((3, 2)), covs, ["#000000"] * 3, "title")
+    pale, firm = figure.axes[0].collections[:2]
+    assert (len(pale.get_paths()), len(firm.get_paths())) == (1, 2)
