@@ -1,5 +1,6 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,8 @@ from slam.robot import MotionCommand, Odometry, Scan
 from slam.walls import WallsConfig
 
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
-from .saved import read_trial
+from .results import REPLAY
+from .saved import from_record, read_trial
 from .scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, UsageError, check, load_world
 from .trial import TrialResult, run_scenario
 from .truth import truth_of
@@ -62,6 +64,18 @@ def read_run(log: Path) -> RecordedRun:
     except RecordingError as error:
         raise UsageError(str(error)) from error
     return run_of(arrays, lambda: read_trial(log.with_name("config.json")))
+
+
+def read_options(config: Path) -> ReplayOptions:
+    """Return the options of the replay that left a `config.json`, those by default for a run that drove."""
+    try:
+        options = from_record(ReplayOptions, json.loads(config.read_text()).get(REPLAY, {}))
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise UsageError(
+            f"expected the options of a replay in {config}, found none that fit: keep a run's files together"
+        ) from error
+    assert isinstance(options, ReplayOptions)
+    return options
 
 
 def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:

@@ -1,7 +1,7 @@
 """`chainslam replay`: one recording, one or several back ends."""
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -55,7 +55,7 @@ class Replay:
             with progress(f"replaying with {name}") as watch:
                 recorded = recording.watch(name, lambda step: run.true_poses_world[step.index], watch)
                 result = replay(run, name, options, recorded)
-            problems += write_results(result, folder)
+            problems += write_results(result, folder, asdict(options))
             summaries.append(result.summary)
             status = max(status, result.ending.exit_status)
         problems += recording.close()

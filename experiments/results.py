@@ -27,6 +27,8 @@ from .trial import TrialResult
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG = "log.npz"
 RECORDING = "run.rrd"
+REPLAY = "replay"
+"""In `config.json`: the options of a replay; none for a run that drove."""
 STEP_COLUMNS = (
     *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
@@ -35,13 +37,13 @@ STEP_COLUMNS = (
 )
 
 
-def write_results(result: TrialResult, folder: Path) -> list[str]:
+def write_results(result: TrialResult, folder: Path, replayed: dict[str, Any] | None = None) -> list[str]:
     """Write every file of a trial into `folder`, and return, in words, what could not be written.
 
-    One file that fails does not cost the others.
+    `replayed` holds the options of a replay, for `config.json`. One file that fails does not cost the others.
     """
     problems = []
-    for name, make in _files(result).items():
+    for name, make in _files(result, replayed or {}).items():
         try:
             write(folder / name, make())
         except Exception as error:  # nothing that was computed may be lost to one bad file
@@ -51,9 +53,10 @@ def write_results(result: TrialResult, folder: Path) -> list[str]:
     return problems
 
 
-def _files(result: TrialResult) -> dict[str, Callable[[], bytes]]:
+def _files(result: TrialResult, replayed: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
+    more = {REPLAY: replayed} if replayed else {}
     files: dict[str, Callable[[], bytes]] = {
-        "config.json": lambda: json_bytes(config_record(result.scenario.config)),
+        "config.json": lambda: json_bytes(config_record(result.scenario.config) | more),
         "summary.json": lambda: json_bytes(result.summary),
     }
     if result.ending.traceback:

@@ -13,6 +13,7 @@ from viz.report import Page, PagePicture, PageTable, Section
 from .campaign.words import NONE, number, percent
 from .mapped import read_corners
 from .pictures import draw_all, read_pictured
+from .replay import ReplayOptions, read_options
 from .saved import read_trial
 from .scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
 
@@ -34,6 +35,8 @@ FIGURES: dict[str, tuple[str, float]] = {
 }  # fmt: skip
 """What the table tells: the key of summary.json, words, and what it is multiplied by."""
 
+LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
+
 
 def is_run(folder: Path) -> bool:
     """Return whether a folder holds a run, or runs of several back ends."""
@@ -48,7 +51,12 @@ def run_page(folder: Path) -> Page:
     config: dict[str, Any] = json.loads((homes[0] / "config.json").read_text())
     names = [trial.backend for trial in trials]
     first = trials[0]
-    how = "A recorded drive" if first.strategy == STRATEGY_OF_REPLAYS else f"A robot drives by {first.strategy}"
+    options = read_options(homes[0] / "config.json")
+    how = (
+        f"A recorded drive{_by_truth(options)}"
+        if first.strategy == STRATEGY_OF_REPLAYS
+        else f"A robot drives by {first.strategy}"
+    )
     maps = [
         PagePicture((home / "map.png").read_bytes(), f"Map by {name}")
         for home, name in zip(homes, names, strict=True)
@@ -65,7 +73,7 @@ def run_page(folder: Path) -> Page:
         f"{how} in {Path(first.world).stem}, seed {first.seed}: what was mapped, how far is it off, and does the"
         " estimator know?",
         tuple(_answer(name, summary) for name, summary in zip(names, summaries, strict=True)),
-        _command(first, names),
+        _command(first, names, options),
         (*config["versions"].items(), ("commit", str(config["commit"])[:10])),
         (
             Section("The map", pictures=tuple(maps)),
@@ -149,10 +157,30 @@ def _open_ends(names: list[str], summaries: list[dict[str, Any]]) -> tuple[str, 
     return tuple(words)
 
 
-def _command(trial: TrialConfig, names: list[str]) -> str:
+def _by_truth(options: ReplayOptions) -> str:
+    """Return what the truth took the place of, in words."""
+    parts = {
+        "matches": options.association == "true",
+        "extracted lines": options.perfect_extraction,
+        "odometry": options.perfect_odometry,
+    }
+    told = [name for name, by_truth in parts.items() if by_truth]
+    return f" with true {' and '.join(told)}" if told else ""
+
+
+def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> str:
     """Return the command that makes the run again."""
     if trial.strategy == STRATEGY_OF_REPLAYS:
-        return shlex.join(["chainslam", "replay", "LOG", "--backend", *names, "--out", "DIR"])
+        truth = {"--perfect-extraction": options.perfect_extraction, "--perfect-odometry": options.perfect_odometry}
+        words = ["chainslam", "replay", "LOG", "--backend", *names, "--association", options.association]
+        return shlex.join([*words, *(name for name, given in truth.items() if given), "--out", "DIR"])
+    plain, mission = TrialConfig(trial.world), trial.mission
     words = ["chainslam", "explore", trial.world, "--backend", trial.backend, "--strategy", trial.strategy]
     words += ["--seed", str(trial.seed), "--p0", trial.p0, *(["--errorless"] if trial.errorless else [])]
+    words += [] if trial.start is None else ["--start", *map(str, trial.start)]
+    words += [] if mission.explorer.sweep else ["--no-sweep"]
+    words += ["--return-to-start"] if mission.return_to_start else []
+    for option, name in LIMITS.items():
+        value = getattr(trial, name)
+        words += [] if value == getattr(plain, name) else [option, str(value)]
     return shlex.join([*words, "--out", "DIR"])

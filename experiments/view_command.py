@@ -14,7 +14,7 @@ from viz.viewer import Viewer, ViewerError, available
 from .campaign.film import record_campaign
 from .campaign.store import read_campaigns
 from .explore_command import prepare
-from .replay import RecordedRun, read_run, replay
+from .replay import RecordedRun, ReplayOptions, read_options, read_run, replay
 from .results import LOG, RECORDING
 from .scenario import UsageError, load_world
 from .timelines import Recording
@@ -63,7 +63,8 @@ def recordings_at(path: Path) -> Callable[[], list[Path]]:
     runs = [read_run(each) for each in logs]
     if not all(_is_same(runs[0], run) for run in runs):
         raise UsageError(f"expected one run, found several in {path}: name the folder of one")
-    return lambda: [_made(log.parent if len(logs) == 1 else path, lambda target: _record(runs, target))]
+    options = read_options(logs[0].with_name("config.json"))
+    return lambda: [_made(log.parent if len(logs) == 1 else path, lambda target: _record(runs, options, target))]
 
 
 def _is_same(one: RecordedRun, other: RecordedRun) -> bool:
@@ -82,14 +83,15 @@ def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
     return target
 
 
-def _record(runs: list[RecordedRun], target: Path) -> list[str]:
-    """Replay each run's log through the back end that made it, all in one recording; return what went wrong."""
+def _record(runs: list[RecordedRun], options: ReplayOptions, target: Path) -> list[str]:
+    """Replay each run's log as it was made, all in one recording; return what went wrong."""
     run = runs[0]
     trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
     world = load_world(trial.world, trial.start, trial.scale)
-    title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, own association"
+    title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, {options.association} association"
     recording = Recording(title, backends, world, trial.errorless, target)
     for backend in backends:
         if recording.is_on:
-            replay(run, backend, watch=recording.watch(backend, lambda step: run.true_poses_world[step.index]))
+            watch = recording.watch(backend, lambda step: run.true_poses_world[step.index])
+            replay(run, backend, options, watch)
     return recording.close()

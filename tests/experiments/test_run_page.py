@@ -2,10 +2,16 @@
 
 import json
 import re
+import shlex
+from dataclasses import replace
 
 import pytest
 
-from experiments.cli import main
+from experiments.cli import _parse, main
+from experiments.files import json_bytes
+from experiments.results import config_record
+from experiments.run_page import run_page
+from experiments.saved import read_trial
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +53,32 @@ def test_a_run_without_a_step_and_a_lost_file_are_told_in_words(run, tmp_path, c
     (tmp_path / "summary.json").write_text("{")
     assert main(["report", str(tmp_path)]) == 2
     assert "summary.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        "--strategy adaptive --seed 7 --p0 large --start 1.5 2.25 -0.1 --return-to-start --max-path 7.5",
+        "--errorless --no-sweep --scale 0.05 --max-steps 9 --time-limit 60.5",
+    ],
+)
+def test_the_command_on_the_page_makes_the_very_run(tmp_path, more):
+    trial = _parse(["explore", "my hall.svg", *more.split()]).trial
+    (tmp_path / "config.json").write_bytes(json_bytes(config_record(trial)))
+    (tmp_path / "summary.json").write_text(json.dumps({"status": "failed", "reason": "", "steps": 0}))
+    assert _parse(shlex.split(run_page(tmp_path).command)[1:]).trial == trial
+
+
+def test_a_replay_says_what_the_truth_took_the_place_of(run, tmp_path):
+    log, out = str(run / "log.npz"), str(tmp_path)
+    words = ["replay", log, "--association", "true", "--perfect-odometry", "--backend", "full-ekf", "--out", out]
+    assert main(words) == 0
+    page = run_page(tmp_path)
+    assert page.question.startswith("A recorded drive with true matches and odometry in paper-fig4")
+    said, given = _parse(shlex.split(page.command)[1:]), _parse(words)
+    assert replace(said, log=given.log, out=given.out) == given
+    assert read_trial(tmp_path / "config.json").strategy == "none"
+    (tmp_path / "config.json").write_text(
+        json.dumps({**json.loads((tmp_path / "config.json").read_text()), "replay": 1})
+    )
+    assert main(["report", out]) == 2

@@ -127,3 +127,10 @@ def test_without_a_display_nothing_is_made(home, tmp_path, capsys, monkeypatch):
     assert main(["view", str(tmp_path / "run")]) == 1
     assert capsys.readouterr().err.splitlines() == ["chainslam: expected a display"]
     assert not (tmp_path / "run" / "run.rrd").exists()
+
+
+def test_a_replay_is_shown_with_the_association_that_made_it(home, opened, tmp_path):
+    words = ["replay", str(home / "run" / "log.npz"), "--association", "true", "--out", str(tmp_path)]
+    assert main(words) == 0
+    assert main(["view", str(tmp_path)]) == 0
+    assert "from the log, true association" in text(tmp_path / "run.rrd", "/legend")
