@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from viz.figures import png
-from viz.report import Page, PagePicture, PageTable, Section
+from viz.report import Page, PagePicture, PageTable, Section, filled
 
 from .campaign.words import NONE, number, percent
 from .mapped import read_corners
@@ -76,10 +76,12 @@ def run_page(folder: Path) -> Page:
         _command(first, names, options),
         (*config["versions"].items(), ("commit", str(config["commit"])[:10])),
         (
-            Section("The map", pictures=tuple(maps)),
-            Section("In numbers", tables=(table,)),
-            Section("Rooms and islands", _ROOM_WORDS, tuple(filter(None, map(_rooms, homes, names)))),
-            Section("Along the way", pictures=pictures),
+            *filled(
+                Section("The map", pictures=tuple(maps)),
+                Section("In numbers", tables=(table,)),
+                Section("Rooms and islands", _ROOM_WORDS, tuple(filter(None, map(_rooms, homes, names)))),
+                Section("Along the way", pictures=pictures),
+            ),
             Section("Open ends", _open_ends(names, summaries)),
         ),
     )

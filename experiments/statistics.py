@@ -13,6 +13,10 @@ LEVEL = 0.95
 FEW_BUILDINGS = 5
 """With fewer buildings than this, an interval over buildings is a guess and is not given."""
 
+FEW_RUNS = 10
+"""With fewer runs than this, an interval by run is too narrow: of normal values it misses the mean in 7 % of all cases
+with 10 runs, in 14 % with 5, in half with 2. It is given, but nothing is concluded from it."""
+
 
 @dataclass(frozen=True)
 class Estimate:

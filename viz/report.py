@@ -2,7 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
@@ -59,6 +59,12 @@ class Page:
     made_with: tuple[tuple[str, str], ...]
     """Names and versions."""
     sections: tuple[Section, ...]
+
+
+def filled(*sections: Section) -> tuple[Section, ...]:
+    """Return the sections that have a row or a picture to show, without tables that have no row."""
+    shown = [replace(section, tables=tuple(table for table in section.tables if table.rows)) for section in sections]
+    return tuple(section for section in shown if section.tables or section.pictures)
 
 
 def html(page: Page) -> bytes:

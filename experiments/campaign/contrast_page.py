@@ -7,9 +7,10 @@ from typing import Any
 
 from viz.report import Page, PageTable, Section
 
+from ..statistics import FEW_RUNS
 from .comparison import Row, arm_of
 from .contrast import TRIALS, read_contrast
-from .words import ARMS_SHORT, MEASURE_WORDS, NONE, interval, number
+from .words import ARMS_SHORT, MEASURE_WORDS, NONE, digits_apart, interval, number
 
 MOST_ROWS = 60
 """Trials that are told one by one, the most different ones; `contrast.csv` has them all."""
@@ -46,19 +47,39 @@ def verdict(said: dict[str, Any]) -> tuple[str, ...]:
     if not count["different"]:
         return (f"No: all {count['shared']} trials that both have came out the same, times apart.",)
     told = [row for row in said["differences"] if row["value"] is not None]
-    clear = [row for row in told if _is_clear(row)]
-    first = (
-        f"Yes: {count['different']} of {count['shared']} trials that both have came out differently. Of {len(told)}"
-        f" means, {len(clear)} changed by more than chance (95 % interval); by chance alone"
-        f" {number(0.05 * len(told), 2)} would."
-    )
+    firm = [row for row in told if row["runs"] >= FEW_RUNS]
+    clear = [row for row in firm if _is_clear(row)]
+    first = f"Yes: {count['different']} of {count['shared']} trials that both have came out differently."
+    if firm:
+        first += (
+            f" Of {len(firm)} means, {len(clear)} changed by more than chance (95 % interval); by chance alone"
+            f" {number(0.05 * len(firm), 2)} would."
+        )
+    if len(firm) < len(told):
+        first += f" {len(told) - len(firm)} means of fewer than {FEW_RUNS} runs cannot be told from chance."
     worst = sorted(clear, key=_size, reverse=True)[:3]
-    return (first, *(f"{_subject(row)}: {number(row['value'])} ({interval(row)}), {row['kind']}." for row in worst))
+    return (first, *map(_in_words, worst))
+
+
+def _in_words(row: Row) -> str:
+    value, between = _value(row)
+    return f"{_subject(row)}: {value} ({between}), {row['kind']}."
+
+
+def _value(row: Row) -> tuple[str, str]:
+    """Return a difference and its interval, with as many digits as tell them from none."""
+    digits = digits_apart([row["value"], row["low"], row["high"], _none(row)])
+    return number(row["value"], digits), interval(row, digits=digits)
+
+
+def _none(row: Row) -> float:
+    """Return what no difference is."""
+    return 1.0 if row["kind"] == "ratio" else 0.0
 
 
 def _is_clear(row: Row) -> bool:
-    still = 1.0 if row["kind"] == "ratio" else 0.0
-    return bool(row["low"] > still or row["high"] < still)
+    """Return whether a difference is more than chance; what fewer than FEW_RUNS runs show never is."""
+    return bool(row["runs"] >= FEW_RUNS and (row["low"] > _none(row) or row["high"] < _none(row)))
 
 
 def _size(row: Row) -> float:
@@ -83,8 +104,8 @@ def _differences(rows: Sequence[Row]) -> PageTable:
     header = ("back end", "arm", "measure", "kind", "value", "95 % interval", "effect size", "runs", "clear")
     told = tuple(
         (
-            row["backend"], ARMS_SHORT[arm_of(row)], MEASURE_WORDS[row["measure"]], row["kind"], number(row["value"]),
-            interval(row), number(row.get("effect_size"), 2), number(row["runs"]), "yes" if _is_clear(row) else "",
+            row["backend"], ARMS_SHORT[arm_of(row)], MEASURE_WORDS[row["measure"]], row["kind"], *_value(row),
+            number(row.get("effect_size"), 2), number(row["runs"]), "yes" if _is_clear(row) else "",
         )
         for row in rows
         if row["value"] is not None

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from ..statistics import FEW_RUNS
 from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY, Measure, Row, difference, select
 from .plan import CLOSED
 from .score import END
@@ -13,8 +14,6 @@ MATCHES_WITHIN = 1.1
 DECIDING = ("wall_rmse_m", "wall_shape_m")
 """Where the walls of the map lie, and its shape alone: the full EKF moves its map as a whole, which says nothing of
 how well the walls lie to each other (docs/results.md, "Bias and the precision of the scanner")."""
-LEAST_PAIRS = 10
-"""Fewer pairs of runs decide nothing: the bootstrap's interval of a handful is too narrow."""
 DECISIVE = "33"
 """Metres driven at which the verdict is taken: the length of the paper's first experiment."""
 MEASURES = (
@@ -48,7 +47,7 @@ def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
             **{m.name: difference(first, second, m) for m in MEASURES},
         }
     ratios = [found["marks"][DECISIVE][name] for name in DECIDING]
-    enough = min(ratio["runs"] for ratio in ratios) >= LEAST_PAIRS
+    enough = min(ratio["runs"] for ratio in ratios) >= FEW_RUNS
     found["verdict"] = verdict([(ratio["low"], ratio["high"]) for ratio in ratios]) if enough else "undecided"
     return found
 

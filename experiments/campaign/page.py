@@ -6,12 +6,13 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from viz.report import Page, PageTable, Section
+from viz.report import Page, PageTable, Section, filled
 
 from ..scenario import UsageError
+from ..statistics import FEW_RUNS
 from .finding_words import finding_table
 from .merge import union
-from .pictures import curve_pictures, map_pictures, ratio_pictures
+from .pictures import curve_pictures, map_arm, map_pictures, ratio_pictures
 from .plan import CLOSED, Campaign
 from .store import read_campaigns, read_config
 from .words import ARMS_SHORT, MEASURE_WORDS, NONE, command_of, interval, mean, number, percent, share, verdict
@@ -49,11 +50,11 @@ def page_of(folder: Path) -> Page:
         verdict(said["hypothesis"]),
         "; ".join(command_of(each) for each in campaigns),
         (*made["versions"].items(), ("commit", str(made["commit"])[:10])),
-        (
+        filled(
             Section("What it shows", _counts(said), (finding_table(campaign, said),)),
             *_estimators(campaign, said),
             Section("Consistency along the way", _BAND_WORDS, pictures=curve_pictures(folder, campaign)),
-            Section("Maps", _MAP_WORDS, pictures=map_pictures(folder, campaigns)),
+            Section("Maps", _map_words(campaign), pictures=map_pictures(folder, campaigns)),
             Section("Against the full EKF", _RATIO_WORDS, _differences(said["backends"]), ratio_pictures(said)),
             Section("Strategies", _STRATEGY_WORDS, (_strategies(said), _interaction(said))),
             Section("At equal metres driven", _MARK_WORDS, (_marks(said),)),
@@ -65,19 +66,22 @@ _BAND_WORDS = (
     "ANEES over the trials at each step: inside the band an estimator knows how wrong it is, above it, it is"
     " overconfident.",
 )
-_MAP_WORDS = (
-    "One seed, closed loop, by every back end. Blue: walls in closed chains; orange: in open ones; grey: seen once or"
-    " twice, or the true walls behind; dark line: the path as the robot believes it.",
-)
 _RATIO_WORDS = (
     "Paired by run: the same world, start and noise. A ratio above 1 is worse than the full EKF; the interval is that"
-    " of a bootstrap of whole runs.",
+    f" of a bootstrap of whole runs, and too narrow with fewer than {FEW_RUNS}.",
 )
 _STRATEGY_WORDS = (
     "Paired by run, against nearest-robot. The interaction tells how much more a back end gains by a strategy than"
     " the full EKF does: 1 is no interaction.",
 )
 _MARK_WORDS = ("Closed loop. A run drives on, has finished before (its last state counts) or has failed.",)
+
+
+def _map_words(campaign: Campaign) -> tuple[str, ...]:
+    return (
+        f"One seed, {ARMS_SHORT[map_arm(campaign)]}, by every back end. Blue: walls in closed chains; orange: in open"
+        " ones; grey: seen once or twice, or the true walls behind; dark line: the path as the robot believes it.",
+    )
 
 
 def _counts(said: dict[str, Any]) -> tuple[str, ...]:

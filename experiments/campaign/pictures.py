@@ -60,15 +60,21 @@ def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:
     return tuple(pictures)
 
 
+def map_arm(campaign: Campaign) -> str:
+    """Return the arm whose maps are shown."""
+    return CLOSED if CLOSED in campaign.arms else campaign.arms[0]
+
+
 def map_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[PagePicture, ...]:
     """Return the map of every back end on one seed, a row for each world, all of a row at one scale."""
     pictures = []
     for campaign in campaigns:
-        arm = CLOSED if CLOSED in campaign.arms else campaign.arms[0]
         strategy = BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
         store, known = Store(folder, campaign), set(trials(campaign))
         for world in campaign.worlds:
-            cell = [Trial(world, strategy, backend, arm, campaign.first_seed) for backend in campaign.backends]
+            cell = [
+                Trial(world, strategy, backend, map_arm(campaign), campaign.first_seed) for backend in campaign.backends
+            ]
             floor = _floor(world)
             maps = [found for t in cell if t in known and (found := _map(store, t, floor)) is not None]
             if maps:

@@ -1,7 +1,10 @@
 """A comparison in plain words: the answer to the paper's hypothesis, and numbers as a reader wants them."""
 
 import shlex
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from .plan import CLOSED, Campaign
 from .score import END
@@ -22,6 +25,8 @@ MEASURE_WORDS = {
     "matches_missed": "missed matches",
 }
 NONE = "–"
+ROUNDING = 1e-9
+"""What is nearer to 0 than this is 0 but for rounding."""
 SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps"), ("--first-seed", "first_seed"))
 
 
@@ -88,17 +93,29 @@ def number(value: float | int | None, digits: int = 3) -> str:
         return NONE
     if isinstance(value, int) or value == 0:
         return str(int(value)) if float(value).is_integer() else str(value)
+    if abs(value) < ROUNDING:
+        return "0"
     short = f"{value:.{digits}g}"
-    return f"{float(short):,.0f}" if "e+" in short or abs(value) >= 1000 else short
+    if "e+" in short or abs(value) >= 1000:
+        return f"{float(short):,.0f}"
+    return np.format_float_positional(float(short), trim="-") if "e-" in short else short
 
 
-def interval(found: dict[str, Any], scale: float = 1.0) -> str:
+def digits_apart(values: Sequence[float], most: int = 6) -> int:
+    """Return how many significant digits (3 to `most`) tell numbers that differ from one another."""
+    for digits in range(3, most):
+        if len({number(value, digits) for value in values}) == len(set(values)):
+            return digits
+    return most
+
+
+def interval(found: dict[str, Any], scale: float = 1.0, digits: int = 3) -> str:
     """Return the interval by run, and that by building where there is one."""
     if found["low"] is None:
         return NONE
-    words = f"{number(scale * found['low'])} to {number(scale * found['high'])}"
+    words = " to ".join(number(scale * found[end], digits) for end in ("low", "high"))
     if found.get("low_buildings") is not None:
-        wide = f"{number(scale * found['low_buildings'])} to {number(scale * found['high_buildings'])}"
+        wide = " to ".join(number(scale * found[end], digits) for end in ("low_buildings", "high_buildings"))
         words += f"; for other buildings {wide}"
     return words
 

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.campaign.comparison import Measure, cell_scores, difference
 from experiments.campaign.hypothesis import hypothesis, verdict
-from experiments.statistics import estimate, paired, share_better
+from experiments.statistics import FEW_RUNS, estimate, paired, share_better
 
 
 def runs(rng, buildings=2, seeds=20, mean=0.0, spread=0.0):
@@ -17,6 +17,13 @@ def test_the_interval_by_run_holds_the_mean_in_95_of_100_campaigns():
     rng = np.random.default_rng(3)
     held = [(e := estimate(runs(rng), seed=k)).low <= 0.0 <= e.high for k in range(300)]
     assert np.mean(held) == pytest.approx(0.95, abs=0.04)
+
+
+@pytest.mark.parametrize(("count", "least", "most"), [(2, 0.4, 0.6), (5, 0.1, 0.2), (FEW_RUNS, 0.03, 0.1)])
+def test_the_interval_of_a_few_runs_misses_the_mean_more_often(count, least, most):
+    rng = np.random.default_rng(5)
+    missed = [(e := estimate(runs(rng, 1, count), seed=k)).low > 0.0 or e.high < 0.0 for k in range(400)]
+    assert least < np.mean(missed) < most
 
 
 def test_where_buildings_differ_only_the_interval_by_building_is_wide_enough():

@@ -8,6 +8,7 @@ from shutil import copytree
 import pytest
 
 from experiments.campaign.contrast import contrast
+from experiments.campaign.contrast_page import verdict
 from experiments.campaign.plan import Campaign, trials
 from experiments.campaign.store import opened
 from experiments.campaign.work import Done, pack
@@ -69,6 +70,8 @@ def test_what_was_made_worse_is_found_with_its_size(first, tmp_path):
     assert main(["report", str(tmp_path / "out")]) == 0
     page = (tmp_path / "out" / "report.html").read_text()
     assert "Yes: 3 of 3 trials" in page
+    assert "means of fewer than 10 runs cannot be told from chance" in page
+    assert "changed by more than chance" not in page
     assert "1 went complete -&gt; failed" in page
 
 
@@ -87,3 +90,19 @@ def test_campaigns_that_share_nothing_get_one_line(first, tmp_path, capsys):
     words = ["compare", "--against", str(first), str(apart), "--merge", str(first), "--out", str(tmp_path / "out")]
     assert main(words) == 2
     assert "found both" in capsys.readouterr().err
+
+
+def said_of(*rows):
+    trials = {"shared": 12, "different": 12, "the_same": 0}
+    same = {"backend": "graph", "mode": "closed", "association": None, "measure": "ate_m", "kind": "ratio"}
+    return {"trials": trials, "differences": [same | row for row in rows]}
+
+
+def test_a_small_change_of_many_runs_is_told_with_digits_enough_and_one_of_few_is_none():
+    small = {"value": 1.00031, "low": 1.00012, "high": 1.00052, "runs": 12, "effect_size": 1.0}
+    few = {"value": 9.0, "low": 8.0, "high": 10.0, "runs": 2, "effect_size": 5.0}
+    words = verdict(said_of(small, few))
+    assert "Of 1 means, 1 changed by more than chance" in words[0]
+    assert "1 means of fewer than 10 runs" in words[0]
+    assert words[1:] == ("graph, closed loop, error of the path: 1.0003 (1.0001 to 1.0005), ratio.",)
+    assert len(verdict(said_of(few))) == 1

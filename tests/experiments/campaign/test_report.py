@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import opened
-from experiments.campaign.tables import write_tables
+from experiments.campaign.page import page_of
+from experiments.campaign.plan import Campaign
 from experiments.campaign.words import command_of, interval, number, verdict
 from experiments.cli import main
-from viz.report import LONG_ROWS, Page, PageTable, Section, html
+from tests.experiments.campaign.running import run
+from viz.report import LONG_ROWS, Page, PageTable, Section, filled, html
 
 CAMPAIGN = Campaign(
     ("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot", "nearest-start"), 2,
@@ -34,10 +33,7 @@ addEventListener("load", () => { document.title = JSON.stringify({ wrong,
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("report") / "campaign"
-    with opened(made, CAMPAIGN) as store:
-        run_campaign(store, on_cores(1))
-        write_tables(made, CAMPAIGN, trials(CAMPAIGN), store.record)
-    assert main(["report", str(made), "--latex"]) == 0
+    assert main(["report", str(run(made, CAMPAIGN)), "--latex"]) == 0
     return made
 
 
@@ -63,6 +59,22 @@ def test_a_long_table_is_folded_up():
     assert b"<details>" in html(page)
     short = replace(table, rows=table.rows[1:])
     assert b"<details>" not in html(replace(page, sections=(Section("s", tables=(short,)),)))
+
+
+def test_what_has_nothing_to_show_is_left_out():
+    empty, table = PageTable("t", ("a",), ()), PageTable("u", ("a",), (("1",),))
+    sections = Section("s", ("An introduction.",), (empty,)), Section("v", tables=(empty, table))
+    assert filled(*sections) == (Section("v", tables=(table,)),)
+
+
+def test_a_campaign_of_one_strategy_that_only_replays_has_no_empty_tables(tmp_path):
+    campaign = replace(CAMPAIGN, strategies=("nearest-robot",), trials=1, arms=("replay-own",))
+    page = page_of(run(tmp_path / "replays", campaign))
+    titles = [section.title for section in page.sections]
+    assert {"Strategies", "At equal metres driven"}.isdisjoint(titles)
+    assert {"What it shows", "Against the full EKF"} <= set(titles)
+    assert page.sections[titles.index("Maps")].words[0].startswith("One seed, replay, own gate, by every back end.")
+    assert all(table.rows for section in page.sections for table in section.tables)
 
 
 def test_the_same_results_give_the_same_page(folder):
@@ -126,6 +138,7 @@ def test_the_verdict_says_answer_interval_and_failures():
 
 
 def test_numbers_are_short_and_never_in_powers_of_ten():
+    assert [number(v) for v in (-5.2e-14, 0.0000123, -4.56e-7)] == ["0", "0.0000123", "-0.000000456"]
     assert [number(v) for v in (None, 3, 0.0, 0.012345, 123.4, 123456.0)] == ["–", "3", "0", "0.0123", "123", "123,000"]
     assert interval({"low": 0.5, "high": 2.0}, 100.0) == "50 to 200"
 
