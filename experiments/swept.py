@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
 from sim.worlds import World
+from slam.geometry.poses import wrap_positive
 
 CELL_M = 0.05
 LOOKOUT_M = 0.25
@@ -48,7 +49,7 @@ class Floor:
         row, column = row + rows.start, column + columns.start
         dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
         step = (bearings_rad[-1] - bearings_rad[0]) / (len(bearings_rad) - 1)
-        turn = np.mod(np.arctan2(dy, dx) - pose_world[2] - bearings_rad[0] + 0.5 * step, 2 * np.pi)
+        turn = wrap_positive(np.arctan2(dy, dx) - pose_world[2] - bearings_rad[0] + 0.5 * step)
         beam = np.floor(turn / step).astype(np.int64)
         reach = np.where(np.isnan(ranges_m), range_max_m, ranges_m)
         # Beyond the last beam of less than a full turn nothing is seen.

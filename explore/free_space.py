@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
-from slam.geometry.poses import to_world
+from slam.geometry.poses import to_world, wrap_positive
 from slam.robot import Scan
 
 _Box = tuple[int, int, int, int]
@@ -154,7 +154,7 @@ class FreeSpace:
         k = len(scan.bearings_rad)
         step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (k - 1)
         bearing = np.arctan2(y[:, None], x[None, :]) - np.float32(pose_world[2] + scan.bearings_rad[0])
-        beam = np.floor(np.mod(bearing, np.float32(2 * np.pi)) / np.float32(step)).astype(np.int64)
+        beam = np.floor(wrap_positive(bearing) / np.float32(step)).astype(np.int64)
         shown = reach - 0.71 * self.config.cell_m
         between = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1.0, dtype=np.float32)
         between[: k - 1] = np.minimum(shown[:-1], shown[1:])

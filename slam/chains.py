@@ -108,13 +108,11 @@ def _links(
     across = np.abs(np.vecdot(normals(lines[head, 0]), ends[tail, TAIL] - ends[head, HEAD]))
     allowed &= ~straight | (gap <= config.straight_reach_m) | (across > 0.5 * gap)
     order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
-    successor = np.full(len(ids), -1)
-    taken = np.zeros(len(ids), dtype=bool)
-    for k in order:
-        if successor[head[k]] < 0 and not taken[tail[k]]:
-            successor[head[k]] = tail[k]
-            taken[tail[k]] = True
-    return successor
+    successor, taken = [-1] * len(ids), [False] * len(ids)
+    for before, after in zip(head[order].tolist(), tail[order].tolist(), strict=True):
+        if successor[before] < 0 and not taken[after]:
+            successor[before], taken[after] = after, True
+    return np.array(successor)
 
 
 def _runs(successor: Int[np.ndarray, " n"]) -> list[tuple[list[int], bool]]:

@@ -194,7 +194,7 @@ def split(
     cuts = candidates(gains, breaks, config)
     while True:
         pieces = choose(sums, cuts, breaks, config)
-        more = np.setdiff1d(bends(_stretches(pieces, cuts), sums, config), cuts)
+        more = np.setdiff1d(bends(_stretches(pieces, cuts), sums, config), cuts, assume_unique=True)
         if not len(more):
             return pieces
         cuts = np.union1d(cuts, more)
@@ -256,7 +256,9 @@ def settled(pieces: Pieces, sums: Float[np.ndarray, "6 m1"], breaks: Int[np.ndar
     half of the beams that its neighbours can spare; most stay where they are at once.
     """
     start, stop = pieces.start.copy(), pieces.stop.copy()
-    k = np.flatnonzero((stop[:-1] == start[1:]) & ~np.isin(stop[:-1], breaks))
+    is_break = np.zeros(sums.shape[1], dtype=bool)
+    is_break[breaks] = True
+    k = np.flatnonzero((stop[:-1] == start[1:]) & ~is_break[stop[:-1]])
     if not len(k):
         return pieces
     for _ in range(rounds):

@@ -1,11 +1,12 @@
 """Poses against 3 x 3 matrices: the axioms of the group, and what it does to points."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from slam.geometry.poses import J, arc, compose, inverse, rotation, to_robot, to_world, wrap
+from slam.geometry.poses import J, arc, compose, inverse, rotation, to_robot, to_world, wrap, wrap_positive
 
 metres = st.floats(-50.0, 50.0)
 angles = st.floats(-20.0, 20.0)
@@ -53,6 +54,15 @@ def test_wrapped_angles_are_the_same_directions_within_half_a_turn(angle):
     assert -np.pi <= wrapped < np.pi
     np.testing.assert_allclose([np.cos(wrapped), np.sin(wrapped)], [np.cos(angle), np.sin(angle)], atol=1e-12)
     np.testing.assert_allclose(wrap(wrapped), wrapped, atol=1e-12)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_positive_angles_are_those_of_mod_to_the_last_bit(precision):
+    turns = np.array([0.0, -0.0, 2 * np.pi, -2 * np.pi, 4 * np.pi, 1e-30, -1e-30])
+    angles = np.concatenate([np.random.default_rng(0).uniform(-20.0, 20.0, 10_000), turns]).astype(precision)
+    found = wrap_positive(angles)
+    assert found.dtype == precision
+    np.testing.assert_array_equal(found, np.mod(angles, precision(2 * np.pi)))
 
 
 @few
