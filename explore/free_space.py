@@ -111,6 +111,11 @@ class FreeSpace:
             self._dirty = None
         return self._clearance
 
+    def clear(self) -> None:
+        """Forget every scan; where the body did not fit stays known."""
+        self._evidence[:] = 0
+        self._mark(0, self.shape[0], 0, self.shape[1])
+
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
         """Take in one scan at an estimated pose."""
         cell = self.config.cell_m

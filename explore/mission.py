@@ -16,6 +16,7 @@ from slam.mapper import Mapper, MapperConfig
 from slam.robot import MotionCommand, Odometry, Robot
 
 from .explorer import Explorer, ExplorerConfig
+from .floor_memory import FloorMemory, FloorMemoryConfig
 from .free_space import FreeSpace, FreeSpaceConfig
 from .goal import Goal, LeftPlace, SetAside
 from .homing import Homing
@@ -36,6 +37,7 @@ class MissionConfig:
     mapper: MapperConfig = field(default_factory=MapperConfig)
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
+    floor_memory: FloorMemoryConfig = field(default_factory=FloorMemoryConfig)
     max_steps: int = 100_000
     """A mission that takes longer ends as `stopped`."""
     return_to_start: bool = False
@@ -127,6 +129,7 @@ def ride_mission(
 
 def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConfig) -> Iterator[Step]:
     free_space, graph, recent = FreeSpace(config.free_space), VisibilityGraph(), RecentReturns()
+    floor = FloorMemory(free_space, config.floor_memory)
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     path_length, index = 0.0, 0
     while True:
@@ -134,7 +137,7 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
         scan = robot.sense()
         update = mapper.step(scan, decider.set_aside.keys())
         if decider.needs_floor:
-            free_space.integrate(update.map.belief.pose_world, scan)
+            floor.see(update.map, scan)
         decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
