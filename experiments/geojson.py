@@ -65,6 +65,7 @@ def _wall_features(walls: StochasticMap, chains: tuple[Chain, ...], joint: Joint
                 id=wall,
                 chain=chain_of.get(wall),
                 tentative=bool(walls.tentative[row]),
+                crooked=bool(walls.crooked[row]),
                 sightings=int(walls.sightings[row]),
                 alpha_rad=walls.belief.means[row, 0],
                 d_m=walls.belief.means[row, 1],

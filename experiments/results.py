@@ -151,6 +151,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
         "extents": walls.extents,
         "sightings": walls.sightings,
         "tentative": walls.tentative,
+        "crooked": walls.crooked,
         "cov": np.full((size, size), np.nan) if joint is None else joint.cov,
         "true_faces_of_lines": result.votes.faces_of(walls.ids),
     }

@@ -43,10 +43,11 @@ def saved_map(
     belief = Belief(
         walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
     )
+    marks = walls["sightings"], walls["tentative"], walls["crooked"]
     return over_truth(
         load_world(trial.world, trial.start, trial.scale), trial, summary,
-        StochasticMap(belief, walls["extents"], walls["sightings"], walls["tentative"]), _chains(features),
-        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
+        StochasticMap(belief, walls["extents"], *marks), _chains(features), tuple(aside), covs, estimated_world,
+        log["true_poses"], log["start_pose"],
     )  # fmt: skip
 
 

@@ -157,6 +157,7 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
     return {
         "lines": len(walls),
         "lines_tentative": int(np.count_nonzero(~firm)),
+        "lines_crooked": int(np.count_nonzero(walls.crooked)),
         "lines_unlabelled": int(np.count_nonzero(firm & (labels < 0))),
         "contours_closed": len(closed_contours(samples, walls, step.chains, votes, to_true, near)),
         "contours_reachable": truth.contour.contours,
@@ -167,6 +168,9 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
         "map_anees": None
         if errorless
         else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & (labels >= 0)),
+        "map_anees_straight": None
+        if errorless
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & ~walls.crooked & (labels >= 0)),
         "duplicate_lines": duplicate_lines(walls, labels, firm),
         "false_matches": votes.false_matches(),
         "merges": votes.merges,

@@ -13,6 +13,7 @@ from sim.chance import Channel, standard_normals
 from slam.backend import Backend, Joint, Observations
 from slam.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.extraction import extract
+from slam.firmness import are_clear
 from slam.mapper import seen_centres
 from slam.pieces import sure_pieces
 from slam.robot import Odometry, Scan
@@ -99,7 +100,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
     world = load_world(trial.world, trial.start, trial.scale)
     witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
-    pieces, firm_rad = trial.mission.mapper.walls.pieces, trial.mission.mapper.firm_heading_rad
+    rules = trial.mission.mapper.walls
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k, ranges in enumerate(recording.ranges_m):
@@ -107,11 +108,11 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
             recording.bearings_rad, ranges, recording.sigma_m, recording.range_max_m, float(recording.time_s[k])
         )
         witness.at = k
-        segments = sure_pieces(extractor(scan), scan, pieces)
+        segments = sure_pieces(extractor(scan), scan, rules.pieces)
         faces = witness.faces(segments)
         walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
         known = np.isin(walls, list(true_lines))
-        seen = known & ~segments.is_tentative & (segments.cov[:, 0, 0] < firm_rad**2)
+        seen = known & are_clear(segments, rules.firmness)
         rest = np.flatnonzero(~known)
         begun = rest[begins_a_line(walls[rest], segments.beam_counts[rest], set(true_lines))]
         begun = begun[~segments.is_tentative[begun]]

@@ -84,6 +84,7 @@ def _none() -> Segments:
         np.zeros((0, 2), int),
         np.zeros(0, int),
         np.zeros((0, 2), int),
+        np.zeros(0),
     )
 
 
@@ -172,18 +173,21 @@ def _fitted(
     is_in = np.square(predicted - beams.rho) <= gate * np.maximum(sigma2 - variance, 1e-6 * sigma2)
     fit = refit(fit, beams, line, offsets, is_in / sigma2)
     counts = np.add.reduceat(is_in, offsets, dtype=int)
+    off = 1.0 / (fit.a[line] * beams.cos + fit.b[line] * beams.sin) - beams.rho
+    chi2 = np.add.reduceat(is_in * np.square(off), offsets) / sigma2
     first = np.minimum.reduceat(np.where(is_in, place, place[-1] + 1), offsets)
     last = np.maximum.reduceat(np.where(is_in, place, place[0] - 1), offsets)
     good = (counts >= MIN_FIT) & np.isfinite(fit.a + fit.b)
     if not good.all():
-        fit, first, last, counts = _take(fit, good), first[good], last[good], counts[good]
-    return _described(fit, np.array((first, last)).T, counts, returns, config)
+        fit, first, last, counts, chi2 = _take(fit, good), first[good], last[good], counts[good], chi2[good]
+    return _described(fit, np.array((first, last)).T, counts, chi2, returns, config)
 
 
 def _described(
     fit: Fit,
     place: Int[np.ndarray, "n 2"],
     counts: Int[np.ndarray, " n"],
+    chi2: Float[np.ndarray, " n"],
     returns: Returns,
     config: ExtractionConfig,
 ) -> Segments:
@@ -204,7 +208,7 @@ def _described(
     ends[k, 1] = ends[after, 0] = points
     kinds[k, 1] = kinds[after, 0] = EndKind.CORNER
     lines, cov = polar(fit)
-    segments = Segments(lines, cov, ends, returns.beam[at], counts, kinds)
+    segments = Segments(lines, cov, ends, returns.beam[at], counts, kinds, chi2)
     good = (rho > 0.0).all(axis=1) & np.isfinite(cov.sum(axis=(1, 2)) + ends.sum(axis=(1, 2)))
     return segments if good.all() else segments.take(good)
 

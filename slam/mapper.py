@@ -13,6 +13,7 @@ from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
 from .faint import FaintConfig, FaintLines
+from .firmness import are_clear
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
 from .matching import KnownWalls, Matches, MatchingConfig, match
@@ -35,10 +36,6 @@ class MapperConfig:
     gaps: GapsConfig = field(default_factory=GapsConfig)
     duplicates: DuplicatesConfig | None = field(default_factory=DuplicatesConfig)
     """None where one wall may stand in the map twice."""
-    firm_heading_rad: float = float(np.deg2rad(6.0))
-    """A segment with a larger sigma of direction is matched and stored but moves no estimate: where a line's direction
-    keeps changing by many degrees, so does the direction in which it fixes the robot, and every change adds
-    information that was never measured (pose ANEES in `rooms` 3.5 with such segments, 1.1 without)."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +95,7 @@ class Mapper:
         near = self._nearby(scan, walls)
         joint = self.backend.belief.joint(near.ids)
         clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
-        first = self._firm(clear, segments)
+        first = self._firm(clear, segments, walls)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         relocated = relocate(joint, near.ids, first)
         # 4. Match the remaining features with their re-prediction from the new robot pose.
@@ -106,7 +103,7 @@ class Mapper:
         again = self._match(segments.take(rest), near, relocated, self.config.matching)
         matches = _both(clear, again)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(first, self._firm(matches, segments))
+        self.backend.update(first, self._firm(matches, segments, walls))
         owners = self._store(scan, segments, matches)
         walls, merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
@@ -122,11 +119,11 @@ class Mapper:
             return segments
         return sure_pieces(self._extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
 
-    def _firm(self, matches: Matches, segments: Segments) -> Observations:
-        """Return the matches that may move the estimate: those of enough beams and of a clear direction."""
+    def _firm(self, matches: Matches, segments: Segments, walls: StochasticMap) -> Observations:
+        """Return the matches that may move the estimate: of enough beams, of a clear direction, on a straight wall."""
         observed = matches.observations(segments)
-        firm = ~segments.is_tentative[matches.pairs[:, 0]]
-        firm &= observed.cov[:, 0, 0] < self.config.firm_heading_rad**2
+        firm = are_clear(segments, self.config.walls.firmness)[matches.pairs[:, 0]]
+        firm &= ~walls.crooked[walls.belief.rows(observed.ids)]
         return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
 
     def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:

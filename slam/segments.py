@@ -37,6 +37,8 @@ class Segments:
     """Number of beams that the fit used."""
     end_kinds: Int[np.ndarray, "n 2"]
     """An `EndKind` for each end."""
+    chi2: Float[np.ndarray, " n"]
+    """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -55,4 +57,5 @@ class Segments:
             self.beams[index],
             self.beam_counts[index],
             self.end_kinds[index],
+            self.chi2[index],
         )

@@ -21,6 +21,9 @@ class StochasticMap:
     """In how many scans each wall was seen with enough beams to be fused."""
     tentative: Bool[np.ndarray, " n"]
     """Walls that were not seen well enough yet to be followed or chained."""
+    crooked: Bool[np.ndarray, " n"]
+    """Walls whose beams, over many scans, do not lie on a line (`firmness`): matched and chained, but they move no
+    estimate, and what is stated of them is not to be believed."""
 
     def __len__(self) -> int:
         return len(self.extents)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Belief
+from .firmness import Firmness, FirmnessConfig
 from .geometry.lines import directions
 from .geometry.poses import to_world
 from .pieces import PiecesConfig, beam_spacing, owners_of_beams
@@ -25,6 +26,8 @@ class WallsConfig:
     """A tentative wall is forgotten after this many scans without a sighting."""
     pieces: PiecesConfig = field(default_factory=PiecesConfig)
     """How far the ends of what a scan shows can be believed."""
+    firmness: FirmnessConfig = field(default_factory=FirmnessConfig)
+    """Which sightings may move the estimate."""
     pass_margin_m: float = 0.1
     """A beam that goes on this far beyond a line has passed through it."""
     contradictions: int = 2
@@ -52,12 +55,14 @@ class Walls:
         self._against = np.zeros(0, dtype=np.int64)
         self._overlaid = np.zeros((0, 2), dtype=np.int64)
         self._claimed = np.zeros(0, dtype=np.int64)
+        self._firmness = Firmness(config.firmness)
         self._scans = 0
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with the extents."""
         tentative = self._sightings < self._config.trusted_sightings
-        return StochasticMap(belief, self._extents.copy(), self._sightings.copy(), tentative)
+        crooked = self._firmness.are_crooked(self._ids)
+        return StochasticMap(belief, self._extents.copy(), self._sightings.copy(), tentative, crooked)
 
     def see(
         self,
@@ -72,6 +77,7 @@ class Walls:
         `believed` are new walls that were seen often before they became walls.
         """
         self._scans += 1
+        self._firmness.see(segments, owners, float(belief.pose_world[2]))
         if len(belief.ids) > len(self._ids):
             self._append(belief.ids[len(self._ids) :])
         used = np.flatnonzero(owners >= 0)

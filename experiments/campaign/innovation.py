@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 
 from slam.backend import Joint
 from slam.consistency import nis
+from slam.firmness import FirmnessConfig, are_clear
 from slam.mapper import Matcher
 from slam.matching import KnownWalls, Matches, MatchingConfig
 from slam.models import innovations
@@ -17,8 +18,8 @@ from slam.segments import Segments
 class InnovationEar:
     """Listens to a matcher that knows the true pairs, and keeps what the filter thought of each scan beforehand."""
 
-    firm_heading_rad: float
-    """Segments of a larger sigma of direction move no estimate and are not listened to."""
+    firmness: FirmnessConfig
+    """Segments of an unclear direction move no estimate and are not listened to."""
     values: list[float] = field(default_factory=list)
     """NIS of each scan that showed a known wall."""
     dofs: list[int] = field(default_factory=list)
@@ -47,10 +48,7 @@ class InnovationEar:
         return float(np.sum(before * after) / norm) if norm > 0 else None
 
     def _hear(self, segments: Segments, ids: Int[np.ndarray, " n"], joint: Joint, matches: Matches) -> None:
-        pairs = matches.pairs
-        firm = ~segments.is_tentative[pairs[:, 0]]
-        firm &= segments.cov[pairs[:, 0], 0, 0] < self.firm_heading_rad**2
-        pairs = pairs[firm]
+        pairs = matches.pairs[are_clear(segments, self.firmness)[matches.pairs[:, 0]]]
         if not len(pairs):
             self._before = {}
             return

@@ -147,5 +147,6 @@ def _moment(step: Step, joint: Joint | None) -> Moment:
         belief, pose_world=belief.pose_world.copy(), pose_cov=belief.pose_cov.copy(), ids=belief.ids.copy(),
         anchors=belief.anchors.copy(), means=belief.means.copy(),
     )  # fmt: skip
-    copied = StochasticMap(kept, walls.extents.copy(), walls.sightings.copy(), walls.tentative.copy())
+    marks = (walls.sightings.copy(), walls.tentative.copy(), walls.crooked.copy())
+    copied = StochasticMap(kept, walls.extents.copy(), *marks)
     return Moment(step.index, step.path_length_m, copied, joint)

@@ -162,7 +162,7 @@ def _replay(job: Job) -> Record:
     association = job.trial.association
     assert association is not None, "expected the arm of a replay"
     observer = Observer(truth_of(world, job.config.robot).walls, lambda index: run.true_face_of_beam[index])
-    ear = InnovationEar(job.config.mission.mapper.firm_heading_rad) if association == "true" else None
+    ear = InnovationEar(job.config.mission.mapper.walls.firmness) if association == "true" else None
     result = replay(
         run, job.trial.backend, ReplayOptions(association), observer, world,
         ear.around if ear is not None else lambda matcher: matcher, remembered(job.log),

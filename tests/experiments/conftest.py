@@ -46,7 +46,9 @@ def map_of(faces, pose, cov_line=1e-4, tentative=None, ids=None):
 
     belief = Belief(np.asarray(pose), cov[:3, :3], ids, anchors, means, query)
     marks = np.zeros(len(faces), dtype=bool) if tentative is None else tentative
-    return StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(len(faces), 5), marks)
+    return StochasticMap(
+        belief, np.stack([-half, half], axis=-1), np.full(len(faces), 5), marks, np.zeros(len(faces), bool)
+    )
 
 
 def segments_of(scan, faces_of_beams, faces, pose):
@@ -59,7 +61,8 @@ def segments_of(scan, faces_of_beams, faces, pose):
     beams = np.array([[run[0], run[-1]] for run in runs], dtype=np.int64).reshape(-1, 2)
     count = beams[:, 1] - beams[:, 0] + 1
     cov = np.tile(1e-6 * np.eye(2), (len(runs), 1, 1))
-    return Segments(through(ends), cov, ends, beams, count, np.zeros((len(runs), 2), dtype=np.int64)), owners
+    kinds = np.zeros((len(runs), 2), dtype=np.int64)
+    return Segments(through(ends), cov, ends, beams, count, kinds, np.zeros(len(runs))), owners
 
 
 def chains_of(faces, rings, closed=True):

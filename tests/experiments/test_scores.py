@@ -24,7 +24,13 @@ def truth(world):
 def one_segment(first, last):
     none = np.zeros((1, 2))
     return Segments(
-        none, np.zeros((1, 2, 2)), np.zeros((1, 2, 2)), np.array([[first, last]]), np.array([5]), np.zeros((1, 2), int)
+        none,
+        np.zeros((1, 2, 2)),
+        np.zeros((1, 2, 2)),
+        np.array([[first, last]]),
+        np.array([5]),
+        np.zeros((1, 2), int),
+        np.zeros(1),
     )
 
 

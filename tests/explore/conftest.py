@@ -47,7 +47,8 @@ class Scene:
         belief = Belief(pose, cov[:3, :3], np.arange(len(self.faces)), anchors, means, query)
         count = len(self.faces)
         extents = np.stack([-half, half], axis=-1)
-        return StochasticMap(belief, extents, np.full(count, 5), np.zeros(count, dtype=bool))
+        no = np.zeros(count, dtype=bool)
+        return StochasticMap(belief, extents, np.full(count, 5), no, no)
 
     def situation(self, pose, chains, start=(0.0, 0.0), set_aside=(), cov=None, graph=None, step=0):
         """Return what a strategy would read; `chains` are tuples of walls, each open at both ends."""

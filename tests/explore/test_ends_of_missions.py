@@ -54,7 +54,8 @@ def closed_map(ring):
     belief = Belief(
         np.zeros(3), np.eye(3), np.arange(len(ring)), anchors, np.stack([lines[:, 0], d], axis=-1), lambda ids: None
     )
-    walls = StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(len(ring), 5), np.zeros(len(ring), bool))
+    no = np.zeros(len(ring), bool)
+    walls = StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(len(ring), 5), no, no)
     return walls, Chain(tuple(range(len(ring))), np.roll(ring, -1, axis=0), ())
 
 

@@ -25,7 +25,9 @@ def map_of(segments, pose=(0.0, 0.0, 0.0), ids=None, tentative=()):
     numbers = np.arange(count) if ids is None else np.asarray(ids)
     belief = Belief(np.array(pose), np.eye(3), numbers, anchors, np.stack([lines[:, 0], d], axis=-1), query)
     marks = np.isin(numbers, tentative)
-    return StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(count, 5), marks)
+    return StochasticMap(
+        belief, np.stack([-half, half], axis=-1), np.full(count, 5), marks, np.zeros(count, dtype=bool)
+    )
 
 
 def square(side=4.0):

@@ -27,13 +27,13 @@ def map_of(ends, sigma=1e-3):
 
     belief = Belief(POSE, np.eye(3), np.arange(n), middle, means, query)
     extents = np.sum((ends - middle[:, None]) * directions(alpha)[:, None], axis=-1)
-    return StochasticMap(belief, extents, np.full(n, 9), np.zeros(n, dtype=bool))
+    return StochasticMap(belief, extents, np.full(n, 9), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool))
 
 
 def segment_of(first, last):
     ends = to_robot(np.array([[first, last]], dtype=float), POSE)
     nothing = np.zeros((1, 2), dtype=np.int64)
-    return Segments(through(ends), np.eye(2)[None], ends, nothing, np.array([9]), nothing)
+    return Segments(through(ends), np.eye(2)[None], ends, nothing, np.array([9]), nothing, np.zeros(1))
 
 
 def bent(gap=0.0, slope=0.03, aside=0.0):

@@ -31,7 +31,9 @@ def map_of(segments, ids=None, tentative=None):
     numbers = np.arange(count) if ids is None else np.asarray(ids)
     belief = Belief(np.zeros(3), np.eye(3), numbers, anchors, means, query)
     marks = np.zeros(count, dtype=bool) if tentative is None else tentative
-    return StochasticMap(belief, np.stack([-half, half], axis=-1), np.full(count, 5), marks)
+    return StochasticMap(
+        belief, np.stack([-half, half], axis=-1), np.full(count, 5), marks, np.zeros(count, dtype=bool)
+    )
 
 
 def edges(corners):

@@ -33,7 +33,7 @@ def walls(lines, sigma=(0.004, 0.006), tentative=None, common=0.0):
 
     belief = Belief(np.zeros(3), cov[:3, :3], ids, anchors, means, query)
     marks = np.zeros(count, dtype=bool) if tentative is None else np.array(tentative)
-    return StochasticMap(belief, half, np.full(count, 9), marks)
+    return StochasticMap(belief, half, np.full(count, 9), marks, np.zeros(count, dtype=bool))
 
 
 def beside(alpha, at, along=0.0, across=0.0):

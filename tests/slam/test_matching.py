@@ -70,7 +70,7 @@ def segment_of(truth, anchor, rng):
     c, s = np.cos(line[0]), np.sin(line[0])
     ends = line[1] * np.array([c, s]) + np.array([[t0 - 0.5], [t0 + 0.5]]) * np.array([-s, c])
     one, two = np.array([9]), np.array([[0, 8]])
-    return Segments(line[None], cov[None], ends[None], two, one, np.zeros((1, 2), dtype=np.int64))
+    return Segments(line[None], cov[None], ends[None], two, one, np.zeros((1, 2), dtype=np.int64), np.zeros(1))
 
 
 def test_one_true_match_in_a_hundred_is_refused_by_the_gate():
@@ -164,7 +164,7 @@ def straight_pieces(ends):
     turn = np.array([[[1.0, 0.0], [t, 1.0]] for t in np.sum(ends.mean(axis=1) * along, axis=-1)])
     cov = turn @ np.diag([0.004, 0.003]) ** 2 @ turn.swapaxes(1, 2)
     beams = np.array([[10 * k, 10 * k + 8] for k in range(m)])
-    return Segments(lines, cov, ends, beams, np.full(m, 9), np.full((m, 2), 2))
+    return Segments(lines, cov, ends, beams, np.full(m, 9), np.full((m, 2), 2), np.zeros(m))
 
 
 @pytest.mark.parametrize("slip_rad", [-0.05, -0.04, 0.0, 0.05])

@@ -101,7 +101,15 @@ def segments_with(beams):
     count = len(beams)
     none = np.zeros((count, 2), dtype=np.int64)
     lines = np.tile([0.0, 1.0], (count, 1))
-    return Segments(lines, np.zeros((count, 2, 2)), np.zeros((count, 2, 2)), np.array(beams), np.full(count, 5), none)
+    return Segments(
+        lines,
+        np.zeros((count, 2, 2)),
+        np.zeros((count, 2, 2)),
+        np.array(beams),
+        np.full(count, 5),
+        none,
+        np.zeros(count),
+    )
 
 
 def test_beams_belong_to_the_walls_of_their_segments_also_across_the_seam():

@@ -18,7 +18,7 @@ def picture(closed, size=2.0):
         lambda ids: Joint(np.zeros(3), np.eye(3), np.zeros((0, 2))),
     )  # fmt: skip
     extents = np.tile([-0.5 * size, 0.5 * size], (4, 1))
-    walls = StochasticMap(belief, extents, np.full(4, 3), np.zeros(4, dtype=bool))
+    walls = StochasticMap(belief, extents, np.full(4, 3), np.zeros(4, dtype=bool), np.zeros(4, dtype=bool))
     corners = size * np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
     ends = () if closed else (OpenEnd(0, 0, corners[3]), OpenEnd(3, 1, corners[3]))
     chain = Chain((0, 1, 2, 3), corners if closed else corners[:3], ends)
