@@ -10,6 +10,7 @@ from .words import ARMS_SHORT, NONE, interval, number, percent
 
 Row = dict[str, Any]
 HOLDS = {True: "yes", False: "no"}
+UNDECIDED = "too few runs to say"
 
 
 def finding_table(campaign: Campaign, said: dict[str, Any]) -> PageTable:
@@ -27,7 +28,8 @@ def _cell(kind: str, told: Row | None) -> str:
     if told is None:
         return NONE
     words = SAYS[kind](told["found"])
-    return words if told["holds"] is None else f"{HOLDS[told['holds']]}: {words}"
+    verdict = HOLDS.get(told["holds"]) or (UNDECIDED if kind == "anees" and words != NONE else "")
+    return f"{verdict}: {words}" if verdict else words
 
 
 def _wrong(found: Row) -> str:

@@ -20,7 +20,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
     """Return a row for each claim and back end; `arms` gives for each arm what was `found`, and whether it `holds`.
 
     `pooled` has a row for each back end in each arm. Claims on matching leave out the arm whose matches are the
-    truth's; `holds` is None where nothing is aimed at.
+    truth's; `holds` is None where nothing is aimed at, or where too few runs decide it.
     """
     of = {(row["backend"], row["arm"]): row for row in pooled}
     arms = list(dict.fromkeys(row["arm"] for row in pooled))
@@ -109,7 +109,13 @@ def _doubles(row: Row) -> tuple[Row, bool | None]:
 
 
 def _inside(estimate: Row | None, aim: tuple[float, float]) -> bool | None:
-    return None if estimate is None else aim[0] <= estimate["low"] and estimate["high"] <= aim[1]
+    """Return whether an interval lies within the aim; None where partly: more runs would tell."""
+    if estimate is None:
+        return None
+    if aim[0] <= estimate["low"] and estimate["high"] <= aim[1]:
+        return True
+    apart = estimate["high"] < aim[0] or aim[1] < estimate["low"]
+    return False if apart else None
 
 
 def _mean_in(estimate: Row | None, aim: tuple[float, float]) -> bool | None:

@@ -59,7 +59,7 @@ def test_a_campaign_as_the_paper_would_have_it():
 @pytest.mark.parametrize(
     ("kind", "scores"),
     [
-        ("anees", {"pose_anees": told(1.05, 0.95, 1.15)}),
+        ("anees", {"pose_anees": told(1.25, 1.15, 1.35)}),
         ("held", {"distances_in_95": told(0.92)}),
         ("margin", {"bound_margin": -1e-3}),
         ("doubles", {"doubles_beyond_gate": told(0.1)}),
@@ -68,6 +68,15 @@ def test_a_campaign_as_the_paper_would_have_it():
 def test_a_claim_that_a_number_contradicts_does_not_hold(kind, scores):
     assert judged([row("graph")])[kind, "graph", "closed"] is True
     assert judged([row("graph", **scores)])[kind, "graph", "closed"] is False
+
+
+@pytest.mark.parametrize("ends", [(0.95, 1.15), (0.5, 1.0), (0.5, 2.0)])
+def test_an_interval_partly_within_the_aim_leaves_the_claim_undecided(ends):
+    pooled = [row("graph", pose_anees=told(1.0, *ends))]
+    assert judged(pooled)["anees", "graph", "closed"] is None
+    table = finding_table(Campaign(("w",), ("graph",), ("s",), 20, arms=ARMS), {"findings": findings(pooled, 0.99)})
+    (cell,) = [cells[2] for cells in table.rows if "pose ANEES" in cells[0]]
+    assert cell.startswith("too few runs to say: 1 (")
 
 
 def test_a_back_end_without_a_complete_run_is_judged_by_nothing():
