@@ -43,6 +43,7 @@ class Firmness:
         self._fits = np.zeros((0, 2))
         self._first = np.zeros(0)
         self._directions = np.zeros((0, 2, 2))
+        self._crooked = np.zeros(0, dtype=bool)
 
     def see(self, segments: Segments, owners: Int[np.ndarray, " s"], heading_rad: float) -> None:
         """Add one scan, taken at a heading in the world; `owners` holds the wall of each segment, -1 for none."""
@@ -56,13 +57,12 @@ class Firmness:
         off = wrap(alpha - self._first[ids])
         clear = are_clear(seen, self._config).astype(int)
         np.add.at(self._directions, (ids, clear), np.stack([information, information * off], axis=-1))
+        self._crooked[ids] = self._misfit(ids) | self._in_conflict(ids)
 
     def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return which walls are surely not straight: by their fits, or by what vague and clear sightings say."""
-        known = ids < len(self._first)
-        crooked = np.zeros(len(ids), dtype=bool)
-        crooked[known] = self._misfit(ids[known]) | self._in_conflict(ids[known])
-        return crooked
+        self._make_room(int(ids.max(initial=-1)) + 1)
+        return self._crooked[ids]
 
     def _misfit(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         chi2, dof = self._fits[ids].T
@@ -86,3 +86,4 @@ class Firmness:
         self._fits = np.concatenate([self._fits, np.zeros((missing, 2))])
         self._first = np.concatenate([self._first, np.full(missing, np.nan)])
         self._directions = np.concatenate([self._directions, np.zeros((missing, 2, 2))])
+        self._crooked = np.concatenate([self._crooked, np.zeros(missing, dtype=bool)])
