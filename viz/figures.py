@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from io import BytesIO
 from textwrap import wrap
-from typing import Literal
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -33,7 +33,12 @@ ENLARGED = 10.0
 GRID_ORDER = 1.2
 """Between the true floor and what is drawn on it."""
 LETTER_INCH = 0.072
-"""Mean width of a letter of the subtitle."""
+"""Mean width of a letter of the subtitle ..."""
+TITLE_LETTER_INCH = 0.115
+"""... and of the title."""
+LEAST_WIDTH_INCH = 5.0
+LEGEND_INCH = 2.3
+"""Width of a column of the legend."""
 
 
 @dataclass(frozen=True)
@@ -58,33 +63,36 @@ class Picture:
 def draw_map(picture: Picture) -> Figure:
     """Return the picture as a figure of one set of axes."""
     low, high = _extent(picture)
-    size = high - low
-    inch_per_m = float(np.clip(9.0 / size.max(), 0.05, 0.9))
-    width, height = max(size[0] * inch_per_m, 4.2), size[1] * inch_per_m
-    figure = Figure(figsize=(width + 0.8, height + 1.85), dpi=150, facecolor=palette.PAGE)
+    inch_per_m = float(np.clip(9.0 / (high - low).max(), 0.05, 0.9))
+    width, height = np.maximum((high - low) * inch_per_m, (LEAST_WIDTH_INCH, 0.0)).tolist()
+    low[0], high[0] = 0.5 * (low[0] + high[0]) + np.array([-0.5, 0.5]) * width / inch_per_m
+    figure = Figure(dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes(
-        (0.5 / (width + 0.8), 1.05 / (height + 1.85), width / (width + 0.8), height / (height + 1.85))
-    )
-    _prepare(axes, low, high, narrow=bool(size[0] * inch_per_m < width))
-    points_per_m = 72.0 * inch_per_m
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    _prepare(axes, low, high)
     handles = [
-        *_floor(axes, picture, points_per_m),
+        *_floor(axes, picture, 72.0 * inch_per_m),
         *_walls(axes, picture),
         *_paths(axes, picture),
         *_ends(axes, picture),
         *_corner_ellipses(axes, picture),
         *_robot(axes, picture),
     ]
-    top = 1.0 + 0.12 / height
-    words = wrap(picture.subtitle, int((width + 0.2) / LETTER_INCH))
-    above = top + (0.1 + 0.16 * len(words)) / height
-    axes.text(0.0, above, picture.title, transform=axes.transAxes, size=13, weight="bold", va="bottom")
-    axes.text(0.0, top, "\n".join(words), transform=axes.transAxes, size=9, color="#5A5A5A", va="bottom")
-    figure.legend(
-        handles=handles, loc="lower center", ncols=4 if width > 6 else 3, frameon=False, fontsize=8, handlelength=2.2
-    )
+    title = wrap(picture.title, int(width / TITLE_LETTER_INCH))
+    words = wrap(picture.subtitle, int(width / LETTER_INCH))
+    columns = int(width // LEGEND_INCH)
+    below, above = 0.45 + 0.17 * -(-len(handles) // columns), 0.4 + 0.16 * len(words) + 0.24 * len(title)
+    whole = np.array([width + 0.8, height + below + above])
+    figure.set_size_inches(*whole)
+    axes.set_position((0.5 / whole[0], below / whole[1], width / whole[0], height / whole[1]))
+    _write(axes, words, 0.12 / height, size=9, color="#5A5A5A")
+    _write(axes, title, (0.22 + 0.16 * len(words)) / height, size=13, weight="bold")
+    figure.legend(handles=handles, loc="lower center", ncols=columns, frameon=False, fontsize=8, handlelength=2.2)
     return figure
+
+
+def _write(axes: Axes, lines: list[str], above: float, **look: Any) -> None:
+    axes.text(0.0, 1.0 + above, "\n".join(lines), transform=axes.transAxes, va="bottom", **look)
 
 
 def png(figure: Figure) -> bytes:
@@ -107,10 +115,10 @@ def _extent(picture: Picture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray,
     return stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
 
 
-def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"], narrow: bool) -> None:
+def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal", adjustable="datalim" if narrow else "box")
+    axes.set_aspect("equal")
     axes.set_facecolor(palette.PAGE)
     step = 1.0 if (high - low).max() <= 45 else 5.0
     for axis in (axes.xaxis, axes.yaxis):
@@ -165,6 +173,10 @@ def _walls(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
         axes.plot(*ends[row].T, color=palette.TENTATIVE, linewidth=1.4, linestyle=(0, (1, 1)), zorder=3.5)
     if picture.map.tentative.any():
         handles.append(Line2D([], [], color=palette.TENTATIVE, linestyle=":", label="tentative wall"))
+    for row in np.flatnonzero(picture.map.crooked):
+        axes.plot(*ends[row].T, color=palette.CROOKED, linewidth=3.4, solid_capstyle="round", zorder=4.2)
+    if picture.map.crooked.any():
+        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="crooked: not to be relied on"))
     handles.append(_marker("o", palette.PAGE, palette.INK, 4, "corner"))
     return handles
 

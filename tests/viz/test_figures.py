@@ -57,3 +57,24 @@ def test_the_grid_lies_on_the_floor_and_below_the_paths():
     (axes,) = draw_map(picture(closed=True)).axes
     floor, paths = max(patch.zorder for patch in axes.patches[:2]), min(line.zorder for line in axes.lines)
     assert floor < axes.xaxis.zorder == axes.yaxis.zorder < paths
+
+
+@pytest.mark.parametrize(("width", "height"), [(1.0, 20.0), (20.0, 1.0), (6.0, 6.0), (80.0, 60.0)])
+def test_all_that_is_written_lies_on_the_page(width, height):
+    """A tall narrow map under a long title, with every kind of thing in the legend."""
+    plain = picture(closed=False)
+    floor = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    marks = np.array([True, False, False, False])
+    shown = replace(
+        plain, title="lifull_02bed7e3b70b_0002   invariant-ekf, nearest-robot, seed 1",
+        subtitle="words and words, " * 12, true_floor=(floor,),
+        map=replace(plain.map, tentative=marks, crooked=marks[::-1]), corners_world=floor,
+        corner_covs=np.tile(1e-6 * np.eye(2), (4, 1, 1)),
+    )  # fmt: skip
+    figure = draw_map(shown)
+    assert {"tentative wall", "crooked: not to be relied on"} <= set(labels(figure))
+    renderer = figure.canvas.get_renderer()
+    for artist in (*figure.axes[0].texts, figure.legends[0]):
+        assert all(figure.bbox.fully_contains(*corner) for corner in artist.get_window_extent(renderer).corners()), (
+            artist
+        )
