@@ -11,7 +11,8 @@ class Goal:
     """An open end to visit, or a place to look at."""
 
     kind: str
-    """`open-end`, `unseen` (floor not yet seen), `known-walls` (walls known well) or `start` (the way home)."""
+    """`open-end`, `unseen` (floor not yet seen), `unexplained` (something that is no wall of the map),
+    `known-walls` (walls known well) or `start` (the way home)."""
     wall: int | None
     """Id of the wall whose open end it is; None for a place."""
     side: int | None

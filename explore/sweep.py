@@ -1,4 +1,4 @@
-"""What is left when no open end is: floor never seen; and what came of each visit there."""
+"""What is left when no open end is: floor never seen, things that are no wall; and what came of each visit there."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy import ndarray
 from .goal import LeftPlace
 from .spots import Spots
 from .strategies import Choice, Place, Situation
-from .strategies.nearest import nearest_unseen
+from .strategies.nearest import nearest_unexplained, nearest_unseen
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class SweepConfig:
     """How often a place is visited."""
 
     visits: int = 2
-    """A border of unseen floor that is still one after so many visits is left."""
+    """A border of unseen floor, or a thing that is no wall, that is still one after so many visits is left."""
     near_m: float = 0.3
     """Borders whose middles lie this near to each other are one."""
 
@@ -45,7 +45,10 @@ class Sweep:
         self._left.append(LeftPlace(place.centre_world, trouble))
 
     def choose(self, situation: Situation) -> Choice | None:
-        """Go to the nearest floor that borders on unseen floor."""
+        """Go to the nearest floor that borders on unseen floor; when none is left, to what is no wall of the map."""
         if not len(situation.map):
             return nearest_unseen(situation, "no wall is in sight yet")
-        return nearest_unseen(situation, "every chain is done, unseen floor is left") if self._is_on else None
+        if not self._is_on:
+            return None
+        unseen = nearest_unseen(situation, "every chain is done, unseen floor is left")
+        return unseen or nearest_unexplained(situation, "every chain is done, things stand that are no wall of the map")

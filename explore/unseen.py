@@ -24,15 +24,15 @@ def unseen_borders(free_space: FreeSpace, field: DrivingField, least_cells: int 
     beside[:, :-1] |= unknown[:, 1:]
     cells = np.argwhere(beside & (free_space.evidence < 0))
     cells = cells[field.can_stay(cells)]
-    border = _connected(cells)
+    border = connected(cells, 1.5)
     order = np.argsort(border, kind="stable")
     groups = np.split(cells[order], np.cumsum(np.bincount(border))[:-1]) if len(cells) else []
     return [free_space.points(group) for group in groups if len(group) >= least_cells]
 
 
-def _connected(cells: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " n"]:
-    """Return a number for each cell, the same for cells joined by sides or corners; these are few, a grid is large."""
-    pairs = cKDTree(cells.reshape(-1, 2)).query_pairs(1.5, output_type="ndarray")
+def connected(cells: Int[np.ndarray, "n 2"], reach_cells: float) -> Int[np.ndarray, " n"]:
+    """Return a number for each cell, the same for cells joined by steps of `reach_cells`: few cells of a large grid."""
+    pairs = cKDTree(cells.reshape(-1, 2)).query_pairs(reach_cells, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from ..unexplained import is_explained
 from ..unseen import borders_on_unseen
 from ..wall_following import Surroundings
 from .strategy import Choice, Place, Situation
@@ -44,6 +45,16 @@ def nearest_unseen(situation: Situation, what: str) -> Choice | None:
     place, metres = found
     reason = f"{what}: nearest of {len(situation.unseen)} borders of seen floor, {metres:.1f} m to drive"
     return Choice(place, reason, _still_unseen(place))
+
+
+def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
+    """Return the nearest thing that is no wall of the map, as a goal until a wall stands there."""
+    found = nearest_place(situation, situation.unexplained)
+    if found is None:
+        return None
+    place, metres = found
+    reason = f"{what}: nearest of {len(situation.unexplained)}, {metres:.1f} m to drive"
+    return Choice(place, reason, lambda around: not is_explained(around.walls, place.centre_world))
 
 
 def _still_unseen(place: Place) -> Callable[[Surroundings], bool]:

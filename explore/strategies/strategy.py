@@ -17,6 +17,7 @@ from slam.stochastic_map import StochasticMap
 from ..driving_field import DrivingField
 from ..looks import LooksConfig, ideal_places
 from ..paths import PathConfig
+from ..unexplained import look_outs, unexplained
 from ..unseen import unseen_borders
 from ..wall_following import Surroundings
 
@@ -30,11 +31,13 @@ class Place:
     """What it is, in words: the robot drives `to where {what}`."""
     kind: str = "unseen"
     """The kind of `Goal` that it makes."""
+    about_world: Float[np.ndarray, 2] | None = None
+    """What is to be seen from there, m, if it is something else than the place itself."""
 
     @property
     def centre_world(self) -> Float[np.ndarray, 2]:
-        """The middle of its points, m."""
-        return self.points_world.mean(axis=0)
+        """What it is about, else the middle of its points, m."""
+        return self.points_world.mean(axis=0) if self.about_world is None else self.about_world
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,15 @@ class Situation:
         borders = unseen_borders(self.around.free_space, self.field)
         places = (Place(border, "unseen floor is left") for border in borders)
         return tuple(place for place in places if not self.was_in_vain(place.centre_world))
+
+    @cached_property
+    def unexplained(self) -> tuple[Place, ...]:
+        """Where to stand before each thing that stopped beams and is no wall of the map, the useless ones left out."""
+        floor = self.around.free_space
+        things = [thing for thing in unexplained(floor, self.map) if not self.was_in_vain(thing.mean(axis=0))]
+        places = [(look_outs(thing, floor, self.field), thing) for thing in things]
+        what = "something stands that is no wall of the map"
+        return tuple(Place(spots, what, "unexplained", thing.mean(axis=0)) for spots, thing in places if len(spots))
 
 
 def _always(around: Surroundings) -> bool:

@@ -5,6 +5,7 @@ import pytest
 from experiments.random_study import faults
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
+from explore.step import Step
 
 SMALL = (22, 60, 65, 123, 214, 277)
 """Seeds of buildings with little floor, hence quick to explore."""
@@ -16,6 +17,20 @@ CLEAN |= {"contours_closed": 1, "contours_reachable": 1}
 @pytest.mark.parametrize("seed", SMALL)
 def test_a_random_building_is_explored_whole_without_a_touch(seed):
     assert faults(run_trial(TrialConfig(f"random:{seed}", errorless=True, max_steps=5000)).summary) == []
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_pillars_that_show_three_beams_from_afar_are_walls_in_the_end():
+    """All the floor of `random:138` is seen from along its walls, and of its pillars never more than a few beams."""
+    goals: set[str] = set()
+
+    def watch(step: Step) -> None:
+        goals.update({step.goal.kind} if step.goal is not None else ())
+
+    summary = run_trial(TrialConfig("random:138", errorless=True, max_steps=5000), watch=watch).summary
+    assert "unexplained" in goals
+    assert summary["contours_closed"] == summary["contours_reachable"] == 7
+    assert summary["coverage"] > 0.99
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,12 @@ from .recording import Recording
 
 END_M = 0.16
 """Radius of the circle at an open end, m."""
-PLACES = {"unseen": "unseen floor", "known-walls": "walls known well", "start": "the start"}
+PLACES = {
+    "unseen": "unseen floor",
+    "unexplained": "not a wall of the map",
+    "known-walls": "walls known well",
+    "start": "the start",
+}
 """Goals that are no open ends, by their kind, in words."""
 QUANTUM_M = 0.005
 """A thing is drawn again when it has moved by about this."""

@@ -1,0 +1,61 @@
+"""What stopped beams and is no wall of the map: an island that showed each scan too few beams for a line."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from slam.geometry.lines import distance_to_segments
+from slam.stochastic_map import StochasticMap
+
+from .driving_field import DrivingField
+from .free_space import FreeSpace
+from .unseen import connected
+
+APART_M = 0.3
+"""What stands this far from every wall of the map is none of them."""
+TOGETHER_CELLS = 5.0
+"""Cells hit this near to each other are one thing: from afar beams meet it some centimetres apart."""
+LEAST_CELLS = 3
+LOOK_M = (0.6, 0.9)
+"""From so far away, faces of a decimetre show beams enough."""
+DIRECTIONS = 16
+SAMPLE_M = 0.1
+
+
+def unexplained(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
+    """Return what was hit and belongs to no wall of the map that is trusted, each as the cells' centres, m."""
+    cells = np.argwhere(free_space.evidence > 0)
+    if not len(cells):
+        return []
+    off = cKDTree(_along(walls)).query(free_space.points(cells), distance_upper_bound=APART_M)[0]
+    cells = cells[np.isinf(off)]
+    thing = connected(cells, TOGETHER_CELLS)
+    things = [free_space.points(cells[thing == k]) for k in range(thing.max(initial=-1) + 1)]
+    return [points for points in things if len(points) >= LEAST_CELLS]
+
+
+def look_outs(
+    thing_world: Float[np.ndarray, "n 2"], free_space: FreeSpace, field: DrivingField
+) -> Float[np.ndarray, "m 2"]:
+    """Return where the robot can stand to look at a thing from nearby, m; the thing is given as points of it."""
+    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    around = np.concatenate([d * np.stack([np.cos(angle), np.sin(angle)], axis=-1) for d in LOOK_M])
+    places = (thing_world[:, None] + around).reshape(-1, 2)
+    places = places[cKDTree(thing_world).query(places)[0] > LOOK_M[0] - 1e-6]
+    cells = free_space.cells(places)
+    places, cells = places[free_space.inside(cells)], cells[free_space.inside(cells)]
+    return places[field.can_stay(cells)]
+
+
+def is_explained(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:
+    """Return whether a trusted wall of the map stands at a place."""
+    return bool(np.any(distance_to_segments(place_world[None], walls.ends_world[~walls.tentative]) <= APART_M))
+
+
+def _along(walls: StochasticMap) -> Float[np.ndarray, "n 2"]:
+    """Return points along all trusted walls, m."""
+    ends = walls.ends_world[~walls.tentative]
+    counts = np.ceil(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / SAMPLE_M).astype(int) + 1
+    wall = np.repeat(np.arange(len(ends)), counts)
+    share = (np.arange(len(wall)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[wall] - 1, 1)
+    return ends[wall, 0] + share[:, None] * (ends[wall, 1] - ends[wall, 0])
