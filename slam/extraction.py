@@ -174,7 +174,7 @@ def _fitted(
     fit = refit(fit, beams, line, offsets, is_in / sigma2)
     counts = np.add.reduceat(is_in, offsets, dtype=int)
     off = 1.0 / (fit.a[line] * beams.cos + fit.b[line] * beams.sin) - beams.rho
-    chi2 = np.add.reduceat(is_in * np.square(off), offsets) / sigma2
+    chi2 = np.add.reduceat(np.where(is_in, np.square(off), 0.0), offsets) / sigma2
     first = np.minimum.reduceat(np.where(is_in, place, place[-1] + 1), offsets)
     last = np.maximum.reduceat(np.where(is_in, place, place[0] - 1), offsets)
     good = (counts >= MIN_FIT) & np.isfinite(fit.a + fit.b)
