@@ -1,6 +1,7 @@
 """What stopped beams and is no wall of the map: an island that showed each scan too few beams for a line."""
 
 import numpy as np
+import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
@@ -19,19 +20,16 @@ LEAST_CELLS = 3
 LOOK_M = (0.6, 0.9)
 """From so far away, faces of a decimetre show beams enough."""
 DIRECTIONS = 16
-SAMPLE_M = 0.1
 
 
 def unexplained(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
     """Return what was hit and belongs to no wall of the map that is trusted, each as the cells' centres, m."""
     cells = np.argwhere(free_space.evidence > 0)
-    if not len(cells):
-        return []
-    off = cKDTree(_along(walls)).query(free_space.points(cells), distance_upper_bound=APART_M)[0]
-    cells = cells[np.isinf(off)]
-    thing = connected(cells, TOGETHER_CELLS)
-    things = [free_space.points(cells[thing == k]) for k in range(thing.max(initial=-1) + 1)]
-    return [points for points in things if len(points) >= LEAST_CELLS]
+    trusted = shapely.STRtree(shapely.linestrings(walls.ends_world[~walls.tentative]))
+    hits = shapely.points(free_space.points(cells))
+    explained = trusted.query(hits, predicate="dwithin", distance=APART_M)[0]
+    things = connected(np.delete(cells, explained, axis=0), TOGETHER_CELLS)
+    return [free_space.points(thing) for thing in things if len(thing) >= LEAST_CELLS]
 
 
 def look_outs(
@@ -50,12 +48,3 @@ def look_outs(
 def is_explained(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:
     """Return whether a trusted wall of the map stands at a place."""
     return bool(np.any(distance_to_segments(place_world[None], walls.ends_world[~walls.tentative]) <= APART_M))
-
-
-def _along(walls: StochasticMap) -> Float[np.ndarray, "n 2"]:
-    """Return points along all trusted walls, m."""
-    ends = walls.ends_world[~walls.tentative]
-    counts = np.ceil(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / SAMPLE_M).astype(int) + 1
-    wall = np.repeat(np.arange(len(ends)), counts)
-    share = (np.arange(len(wall)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[wall] - 1, 1)
-    return ends[wall, 0] + share[:, None] * (ends[wall, 1] - ends[wall, 0])

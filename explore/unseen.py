@@ -24,17 +24,17 @@ def unseen_borders(free_space: FreeSpace, field: DrivingField, least_cells: int 
     beside[:, :-1] |= unknown[:, 1:]
     cells = np.argwhere(beside & (free_space.evidence < 0))
     cells = cells[field.can_stay(cells)]
-    border = connected(cells, 1.5)
-    order = np.argsort(border, kind="stable")
-    groups = np.split(cells[order], np.cumsum(np.bincount(border))[:-1]) if len(cells) else []
-    return [free_space.points(group) for group in groups if len(group) >= least_cells]
+    return [free_space.points(border) for border in connected(cells, 1.5) if len(border) >= least_cells]
 
 
-def connected(cells: Int[np.ndarray, "n 2"], reach_cells: float) -> Int[np.ndarray, " n"]:
-    """Return a number for each cell, the same for cells joined by steps of `reach_cells`: few cells of a large grid."""
+def connected(cells: Int[np.ndarray, "n 2"], reach_cells: float) -> list[Int[np.ndarray, "m 2"]]:
+    """Return few cells of a large grid in groups, each joined by steps of at most `reach_cells`."""
+    if not len(cells):
+        return []
     pairs = cKDTree(cells.reshape(-1, 2)).query_pairs(reach_cells, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+    group = connected_components(links, directed=False)[1]
+    return np.split(cells[np.argsort(group, kind="stable")], np.cumsum(np.bincount(group))[:-1])
 
 
 def borders_on_unseen(free_space: FreeSpace, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:

@@ -39,22 +39,27 @@ def nearest_place(situation: Situation, places: Sequence[Place]) -> tuple[Place,
 
 def nearest_unseen(situation: Situation, what: str) -> Choice | None:
     """Return the nearest border of seen floor, as a goal for as long as half of it still borders on unseen floor."""
-    found = nearest_place(situation, situation.unseen)
-    if found is None:
-        return None
-    place, metres = found
-    reason = f"{what}: nearest of {len(situation.unseen)} borders of seen floor, {metres:.1f} m to drive"
-    return Choice(place, reason, _still_unseen(place))
+    return _nearest(situation, situation.unseen, f"{what}: nearest of {{}} borders of seen floor", _still_unseen)
 
 
 def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
     """Return the nearest thing that is no wall of the map, as a goal until a wall stands there."""
-    found = nearest_place(situation, situation.unexplained)
+    return _nearest(situation, situation.unexplained, f"{what}: nearest of {{}}", _still_unexplained)
+
+
+def _nearest(
+    situation: Situation, places: Sequence[Place], words: str, holds: Callable[[Place], Callable[[Surroundings], bool]]
+) -> Choice | None:
+    """Return the nearest place as a choice, with the reason in `words`, which has a gap for how many there are."""
+    found = nearest_place(situation, places)
     if found is None:
         return None
     place, metres = found
-    reason = f"{what}: nearest of {len(situation.unexplained)}, {metres:.1f} m to drive"
-    return Choice(place, reason, lambda around: not is_explained(around.walls, place.centre_world))
+    return Choice(place, f"{words.format(len(places))}, {metres:.1f} m to drive", holds(place))
+
+
+def _still_unexplained(place: Place) -> Callable[[Surroundings], bool]:
+    return lambda around: not is_explained(around.walls, place.centre_world)
 
 
 def _still_unseen(place: Place) -> Callable[[Surroundings], bool]:
