@@ -4,7 +4,7 @@ from typing import Any
 
 import shapely
 
-from explore.certificate import Certificate, Contour, LeftOpen, LeftUnseen
+from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -22,6 +22,12 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         "unseen_borders": None
         if unseen is None
         else [{**unseen_record(border), "position_m": border.cells_world.mean(axis=0).tolist()} for border in unseen],
+        "unexplained": None
+        if certificate.unexplained is None
+        else [
+            {**unexplained_record(thing), "position_m": thing.cells_world.mean(axis=0).tolist()}
+            for thing in certificate.unexplained
+        ],
         "floor_m2": certificate.floor_m2,
         "unseen_m2": certificate.unseen_m2,
         "reachable_way": certificate.reachable_way,
@@ -46,3 +52,8 @@ def open_end_record(end: LeftOpen) -> dict[str, Any]:
 def unseen_record(border: LeftUnseen) -> dict[str, Any]:
     """Return what is said of one border of unseen floor besides its place."""
     return {"length_m": border.length_m, "why": border.why}
+
+
+def unexplained_record(thing: LeftUnexplained) -> dict[str, Any]:
+    """Return what is said of something that is no wall of the map besides its place."""
+    return {"cells": len(thing.cells_world), "why": thing.why}

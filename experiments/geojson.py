@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import shapely
 
-from explore.certificate import Certificate, Contour, LeftOpen, LeftUnseen
+from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
 from explore.step import Step
 from slam.backend import Joint
 from slam.chains import Chain
 from slam.stochastic_map import StochasticMap
 
-from .certificate import contour_record, open_end_record, unseen_record
+from .certificate import contour_record, open_end_record, unexplained_record, unseen_record
 from .corners import Corner, corners
 from .records import Log
 
@@ -39,6 +39,7 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
             *(_corner_feature(k, corner, joint) for k, corner in enumerate(found)),
             *(_open_end_feature(end) for end in certificate.open_ends),
             *(_unseen_feature(border) for border in certificate.unseen or ()),
+            *(_unexplained_feature(thing) for thing in certificate.unexplained or ()),
             _trajectory_feature(log),
         ],
     }
@@ -107,6 +108,10 @@ def _open_end_feature(end: LeftOpen) -> dict[str, Any]:
 
 def _unseen_feature(border: LeftUnseen) -> dict[str, Any]:
     return _feature("MultiPoint", border.cells_world, kind="unseen", **unseen_record(border))
+
+
+def _unexplained_feature(thing: LeftUnexplained) -> dict[str, Any]:
+    return _feature("MultiPoint", thing.cells_world, kind="unexplained", **unexplained_record(thing))
 
 
 def _trajectory_feature(log: Log) -> dict[str, Any]:

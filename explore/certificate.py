@@ -18,6 +18,7 @@ from .outcome import Outcome
 from .paths import PathConfig
 from .step import Step
 from .sweep import SweepConfig
+from .unexplained import unexplained
 from .unseen import unseen_borders
 
 LEAST_BORDER_CELLS = 4
@@ -63,6 +64,15 @@ class LeftUnseen:
 
 
 @dataclass(frozen=True)
+class LeftUnexplained:
+    """Something that stopped beams and is no wall of the map."""
+
+    cells_world: Float[np.ndarray, "n 2"]
+    """The cells that were hit, m."""
+    why: str
+
+
+@dataclass(frozen=True)
 class Certificate:
     """The end of a mission, with its reasons."""
 
@@ -71,6 +81,8 @@ class Certificate:
     open_ends: tuple[LeftOpen, ...]
     unseen: tuple[LeftUnseen, ...] | None
     """None where nobody kept the free space (a recorded robot)."""
+    unexplained: tuple[LeftUnexplained, ...] | None
+    """None as `unseen`."""
     floor_m2: float
     """Area inside the closed rooms, without their islands; 0 where no room is closed."""
     unseen_m2: float | None
@@ -96,6 +108,7 @@ def certify(
         found,
         left_open(step, outcome),
         left_unseen(step, paths, sweep) if kept else None,
+        left_unexplained(step, sweep) if kept else None,
         float(floor.area),
         unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
         reachable_way(step, paths, way_world) if kept else None,
@@ -161,9 +174,24 @@ def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen,
         LeftUnseen(
             border,
             len(border) * cell,
-            _why_unseen(border, step.left_places) if sweep else "unseen floor was not to be visited",
+            _why_left(border, step.left_places, "no scan from there shows what lies behind")
+            if sweep
+            else "unseen floor was not to be visited",
         )
         for border in borders
+    )
+
+
+def left_unexplained(step: Step, sweep: bool) -> tuple[LeftUnexplained, ...]:
+    """Return what stopped beams and is no wall of the map, each with the reason why it is left."""
+    return tuple(
+        LeftUnexplained(
+            thing,
+            _why_left(thing, step.left_places, "no scan from there shows a wall")
+            if sweep
+            else "what is no wall of the map was not to be looked at",
+        )
+        for thing in unexplained(step.free_space, step.map)
     )
 
 
@@ -173,19 +201,19 @@ def reachable_way(step: Step, paths: PathConfig, way_world: Float[np.ndarray, "s
     return float(np.isfinite(metres).mean())
 
 
-def _why_unseen(border: Float[np.ndarray, "n 2"], places: tuple[LeftPlace, ...]) -> str:
-    """Return what came of the visits of a border of unseen floor."""
+def _why_left(points: Float[np.ndarray, "n 2"], places: tuple[LeftPlace, ...], in_vain: str) -> str:
+    """Return what came of the visits of a border of unseen floor, or of a thing; `in_vain`, if all got there."""
     troubles = [
         place.trouble
         for place in places
-        if np.hypot(*(place.position_world - border.mean(axis=0))) < SweepConfig().near_m
+        if np.hypot(*(place.position_world - points.mean(axis=0))) < SweepConfig().near_m
     ]
     if not troubles:
         return "not visited yet"
     in_the_way = [trouble for trouble in troubles if trouble]
     if in_the_way:
         return f"not reached: {in_the_way[-1]}"
-    return f"visited {len(troubles)} times, and no scan from there shows what lies behind"
+    return f"visited {len(troubles)} times, and {in_vain}"
 
 
 def unseen_area(free_space: FreeSpace, floor: shapely.Polygon | shapely.MultiPolygon) -> float:

@@ -25,7 +25,7 @@ from sim.worlds import World
 from slam.backend import Belief
 from slam.backends import BACKENDS
 from slam.chains import Chain, connect
-from slam.geometry.lines import normals, through
+from slam.geometry.lines import distance_to_segments, normals, through
 from slam.robot import Scan
 from slam.stochastic_map import StochasticMap
 
@@ -92,6 +92,7 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
     assert certificate.floor_m2 == pytest.approx(ROOM.area, abs=0.05)
     assert certificate.open_ends == ()
     assert certificate.unseen == ()
+    assert certificate.unexplained == ()
     assert certificate.unseen_m2 == pytest.approx(0.0, abs=0.02)
 
 
@@ -143,6 +144,27 @@ def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
         assert words in certificate.unseen[0].why
     without = certify(replace(last, left_places=left), last.outcome, PathConfig(), False, WAY)
     assert {border.why for border in without.unseen} == {"unseen floor was not to be visited"}
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_what_stands_and_is_no_wall_of_the_map_is_told():
+    mission, _ = steps()
+    *_, last = mission
+    # In the middle of the floor, something that the beams met and no wall accounts for.
+    free = last.free_space.points(np.argwhere(last.free_space.evidence < 0))
+    lonely = free[np.argmax(distance_to_segments(free, last.map.ends_world).min(axis=1))]
+    cells = last.free_space.cells(lonely + 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    last.free_space.evidence[tuple(cells.T)] = 6
+    for troubles, sweep, words in (
+        ([], True, "not visited yet"),
+        (["", ""], True, "visited 2 times, and no scan from there shows a wall"),
+        (["no way leads there"], True, "not reached: no way leads there"),
+        ([""], False, "was not to be looked at"),
+    ):
+        left = tuple(LeftPlace(lonely, trouble) for trouble in troubles)
+        (thing,) = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep, WAY).unexplained
+        assert len(thing.cells_world) == 3
+        assert words in thing.why
 
 
 @pytest.mark.usefixtures("_unchecked")
