@@ -35,6 +35,7 @@ class FreeSpace:
         self.config = config
         self._evidence = np.zeros((0, 0), dtype=np.int8)
         self._clearance = np.zeros((0, 0), dtype=np.float32)
+        self._stood = np.zeros((0, 0), dtype=bool)
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: _Box | None = None
         self._too_tight = np.zeros((0, 2))
@@ -44,7 +45,10 @@ class FreeSpace:
         self._too_tight = np.vstack([self._too_tight, place_world])
 
     def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
-        """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit."""
+        """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit.
+
+        Those in which it stood count among them wherever they lie: what let it in lets it out.
+        """
         r0, r1, _ = box[0].indices(self.shape[0])
         c0, c1, _ = box[1].indices(self.shape[1])
         fits = np.ones((r1 - r0, c1 - c0), dtype=bool)
@@ -55,7 +59,7 @@ class FreeSpace:
             row, column = np.ogrid[rows, columns]
             near = np.hypot(row - r, column - c) * self.config.cell_m <= reach_m
             fits[rows.start - r0 : rows.stop - r0, columns.start - c0 : columns.stop - c0] &= ~near
-        return fits
+        return fits | self._stood[box]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -112,8 +116,10 @@ class FreeSpace:
         return self._clearance
 
     def clear(self) -> None:
-        """Forget every scan; where the body did not fit stays known."""
+        """Forget every scan, where the robot stood, and where the body did not fit."""
         self._evidence[:] = 0
+        self._stood[:] = False
+        self._too_tight = np.zeros((0, 2))
         self._mark(0, self.shape[0], 0, self.shape[1])
 
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
@@ -124,7 +130,9 @@ class FreeSpace:
         reach = self._reach(scan)
         beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
         tips = self.cells(to_world(beams * reach[:, None], pose_world))
-        box = self._box(self.cells(pose_world[None, :2])[0], tips, scan)
+        here = self.cells(pose_world[None, :2])[0]
+        self._stood[tuple(here)] = True
+        box = self._box(here, tips, scan)
         window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
         free = self._seen_free(pose_world, scan, reach, box)
         free[tuple(hits.T)] = False
@@ -190,16 +198,16 @@ class FreeSpace:
         first = np.where(low < old_first, low - spare, old_first)
         end = np.where(high > old_end, high + spare, old_end)
         shape = tuple((end - first)[::-1])
-        evidence = np.zeros(shape, dtype=np.int8)
+        evidence, stood = np.zeros(shape, dtype=np.int8), np.zeros(shape, dtype=bool)
         clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
         if self._evidence.size:
             c, r = (self._first - first).tolist()
             place = (slice(r, r + self._evidence.shape[0]), slice(c, c + self._evidence.shape[1]))
-            evidence[place], clearance[place] = self._evidence, self._clearance
+            evidence[place], clearance[place], stood[place] = self._evidence, self._clearance, self._stood
             if self._dirty is not None:
                 r0, r1, c0, c1 = self._dirty
                 self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
-        self._evidence, self._clearance, self._first = evidence, clearance, first
+        self._evidence, self._clearance, self._stood, self._first = evidence, clearance, stood, first
 
     def _mark(self, r0: int, r1: int, c0: int, c1: int) -> None:
         """Remember where occupied cells changed since the clearances were computed."""

@@ -6,6 +6,7 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 
 from explore.free_space import FreeSpace, FreeSpaceConfig
+from explore.paths import PathConfig, Planner
 from sim.lidar import LidarConfig, RangeFinder
 from slam.robot import Scan
 
@@ -220,8 +221,35 @@ def test_where_the_body_did_not_fit_is_known_in_any_part_of_the_grid(seed):
     tight = grid.cells(grid._too_tight)
     gap = CELL * np.hypot(*(index[:, None] - tight).transpose(2, 0, 1))
     expected = (gap > reach).all(axis=1).reshape(grid.shape)
+    expected[tuple(grid.cells(np.zeros((1, 2)))[0])] = True  # the robot stood there
     assert not expected.all()
     for _ in range(20):
         (r0, r1), (c0, c1) = np.sort(rng.integers(0, max(grid.shape) + 20, (2, 2)), axis=1)
         box = (slice(r0, r1), slice(c0, c1))
         np.testing.assert_array_equal(grid.may_fit(box, reach), expected[box])
+
+
+def test_the_way_through_a_narrow_door_is_open_to_who_came_by_it():
+    walls = shapely.union(shapely.box(0.0, -2.0, 0.1, -0.22), shapely.box(0.0, 0.22, 0.1, 2.0))
+    room = shapely.box(-2, -2, 2, 2).difference(walls)
+    grid, config = FreeSpace(), PathConfig()
+    goal = np.array([[-1.0, 0.0]])
+
+    def way_out():
+        return Planner(grid, np.array([1.0, 0.0]), config).to(goal)
+
+    for x in (-1.0, 1.0):
+        pose = np.array([x, 0.0, 0.0])
+        grid.integrate(pose, scan_from(room, pose))
+    assert way_out() is not None
+    grid.note_too_tight(np.array([0.05, 0.0]))
+    assert way_out() is None
+    for x in np.arange(-1.0, 1.0, 0.05):
+        pose = np.array([x, 0.0, 0.0])
+        grid.integrate(pose, scan_from(room, pose))
+    assert way_out() is not None
+    grid.clear()
+    for x in (-1.0, 1.0):
+        pose = np.array([x, 0.0, 0.0])
+        grid.integrate(pose, scan_from(room, pose))
+    assert way_out() is not None, "where the body did not fit is forgotten with the grid that it was said of"
