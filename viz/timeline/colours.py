@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Int, UInt32
 
 from slam.chains import Chain
+from slam.stochastic_map import StochasticMap
 
 from .. import palette
 
@@ -22,11 +23,14 @@ def pale(colours: UInt32[np.ndarray, " k"]) -> UInt32[np.ndarray, " k"]:
 
 _CLOSED = np.array([packed(colour) for colour in palette.CLOSED], dtype=np.uint32)
 _OPEN = np.array([packed(colour) for colour in palette.OPEN_SHADES], dtype=np.uint32)
-_TENTATIVE = packed(palette.TENTATIVE)
+_TENTATIVE, _CROOKED = packed(palette.TENTATIVE), packed(palette.CROOKED)
 
 
-class ChainColours:
-    """A colour for each chain, warm while it is open and cool once it is closed, kept as long as its oldest wall."""
+class WallColours:
+    """Red for a crooked wall, else a colour for each chain, warm while it is open and cool once it is closed.
+
+    A chain keeps its colour as long as its oldest wall.
+    """
 
     def __init__(self) -> None:
         self._turn: dict[int, int] = {}
@@ -34,8 +38,11 @@ class ChainColours:
         self._colours: UInt32[np.ndarray, " n"] = np.zeros(0, dtype=np.uint32)
         self._ids: Int[np.ndarray, " n"] = np.zeros(0, dtype=np.int64)
 
-    def of_walls(self, ids: Int[np.ndarray, " n"], chains: tuple[Chain, ...]) -> UInt32[np.ndarray, " n"]:
+    def of_walls(self, walls: StochasticMap, chains: tuple[Chain, ...]) -> UInt32[np.ndarray, " n"]:
         """Return the colour of each wall; grey for walls in no chain."""
+        return np.where(walls.crooked, np.uint32(_CROOKED), self._of_chains(walls.ids, chains))
+
+    def _of_chains(self, ids: Int[np.ndarray, " n"], chains: tuple[Chain, ...]) -> UInt32[np.ndarray, " n"]:
         key = [(chain.walls, chain.is_closed) for chain in chains]
         if key == self._key and np.array_equal(ids, self._ids):
             return self._colours

@@ -15,7 +15,7 @@ from slam.matching import Matches
 from slam.robot import Scan
 from slam.segments import Segments
 
-from .colours import ChainColours
+from .colours import WallColours
 
 EVERY_ALL, EVERY_SEEN = 50, 3
 """The covariance of every wall is asked for once in so many steps, that of walls just seen once in so many."""
@@ -97,14 +97,14 @@ class Keeper:
     def __init__(self) -> None:
         self._own = FreeSpace(FreeSpaceConfig(cell_m=OWN_CELL_M))
         self._graph_shown: tuple[object, bytes] = ((), b"")
-        self._colours = ChainColours()
+        self._colours = WallColours()
         self._coloured = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint32))
 
     def moment(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> Moment:
         """Return what is drawn of a step; it asks the step's belief, so before the back end moves on."""
         belief, walls = step.map.belief, step.map
         last = step.ended is not None
-        ids, colours = walls.ids.copy(), self._colours.of_walls(walls.ids, step.chains)
+        ids, colours = walls.ids.copy(), self._colours.of_walls(walls, step.chains)
         return Moment(
             step.index, step.time_s, belief.pose_world.copy(), belief.pose_cov.copy(), true_pose_world, step.scan,
             step.segments, step.matches, step.walls_of_segments, ids, belief.means.copy(), belief.anchors.copy(),
