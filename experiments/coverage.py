@@ -53,6 +53,24 @@ def alignment(estimated_world: Float[np.ndarray, "3"], true_world: Float[np.ndar
     return compose(true_world, inverse(estimated_world))
 
 
+def began(lines: Int[np.ndarray, " s"]) -> int:
+    """Return the step at which a map of so many lines at each step began: the first, but for a start in the blind."""
+    return min(int(np.max(np.flatnonzero(lines == 0), initial=-1)) + 1, len(lines) - 1)
+
+
+def own_alignment(
+    start_estimate: Float[np.ndarray, "3"],
+    estimated_world: Float[np.ndarray, "s 3"],
+    true_world: Float[np.ndarray, "s 3"],
+    step: int,
+) -> Float[np.ndarray, "3"]:
+    """Return the motion that carries the map to the truth from the poses at the step where it began.
+
+    What the robot lost before its first wall no scan can tell; it moves the map as a whole.
+    """
+    return alignment(estimated_world[step] if step else start_estimate, true_world[step])
+
+
 def covered(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> Bool[np.ndarray, " p"]:
     """Return which points lie within `near_m` of a wall whose normal agrees within 45 degrees."""
     result = np.zeros(len(samples.points_world), dtype=bool)

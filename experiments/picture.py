@@ -15,7 +15,7 @@ from slam.stochastic_map import StochasticMap
 from viz.figures import Picture, draw_map, png
 
 from .corners import corners
-from .coverage import alignment
+from .coverage import own_alignment
 from .scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from .trial import TrialResult
 
@@ -53,13 +53,13 @@ def over_truth(
     start_estimate: Float[np.ndarray, "3"],
 ) -> Picture:
     """Return what the picture of a map shows."""
-    to_estimate = inverse(alignment(start_estimate, true_world[0]))
+    to_estimate = inverse(own_alignment(start_estimate, estimated_world, true_world, summary["map_began_step"]))
     rings = (world.free.exterior, *world.free.interiors)
     off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
-        f"coverage {100 * summary['coverage']:.1f} %",
+        f"coverage {100 * summary['coverage_own_frame']:.1f} %",
         f"pose error rms {off_cm:.1f} cm (wheels alone {wheels_cm:.0f} cm)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"

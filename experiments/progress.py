@@ -62,6 +62,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("path", f"{summary['path_length_m']:.1f} m in {summary['drive_time_s']:.0f} s"),
         ("contours closed", f"{summary['contours_closed']} of {summary['contours_reachable']}"),
         ("coverage", f"{100 * summary['coverage']:.2f} %"),
+        *_own_frame(summary),
         ("floor swept", f"{100 * summary['swept']:.2f} %"),
         ("open ends left, set aside", f"{summary['open_ends']}, {len(summary['set_aside'])}"),
         *_way_back(summary["certificate"]["reachable_way"]),
@@ -81,6 +82,13 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         for pair, d in list(summary["distances"].items())[:6]
     ]
     return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
+
+
+def _own_frame(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return a row where the map began in the blind, so that it is off as a whole by what was lost before."""
+    if not summary["map_began_step"]:
+        return []
+    return [("the same, aligned where the map began", f"{100 * summary['coverage_own_frame']:.2f} %")]
 
 
 def _way_back(share: float | None) -> list[tuple[str, str]]:

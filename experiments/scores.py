@@ -15,7 +15,7 @@ from slam.geometry.poses import compose, to_world, wrap
 
 from .association import Votes, duplicate_lines
 from .corners import corners, label_distances
-from .coverage import NEAR_M, NEAR_NOISY_M, alignment, closed_contours, coverage, sample
+from .coverage import NEAR_M, NEAR_NOISY_M, alignment, began, closed_contours, coverage, own_alignment, sample
 from .records import Log
 from .scenario import Scenario
 from .swept import swept
@@ -150,6 +150,8 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
     errorless = scenario.config.errorless
     near = NEAR_M if errorless else NEAR_NOISY_M
     to_true = alignment(scenario.start_estimate, log.true_world[0])
+    began_at = began(log.lines)
+    own = own_alignment(scenario.start_estimate, log.estimated_world, log.true_world, began_at)
     samples = sample(truth)
     aligned = to_world(walls.ends_world, to_true)
     labels = votes.walls_of(walls.ids)
@@ -159,11 +161,13 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
         "lines_tentative": int(np.count_nonzero(~firm)),
         "lines_crooked": int(np.count_nonzero(walls.crooked)),
         "lines_unlabelled": int(np.count_nonzero(firm & (labels < 0))),
-        "contours_closed": len(closed_contours(samples, walls, step.chains, votes, to_true, near)),
+        "contours_closed": len(closed_contours(samples, walls, step.chains, votes, own, near)),
         "contours_reachable": truth.contour.contours,
         "chains_closed": int(log.closed_chains[-1]),
         "chains_open": len(step.chains) - int(log.closed_chains[-1]),
         "coverage": coverage(samples, aligned[firm], near),
+        "coverage_own_frame": coverage(samples, to_world(walls.ends_world[firm], own), near),
+        "map_began_step": began_at,
         "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
         "map_anees": None
         if errorless

@@ -4,12 +4,13 @@ import shapely
 
 from experiments.association import Votes, duplicate_lines
 from experiments.corners import corners, label_distances
-from experiments.coverage import NEAR_M, closed_contours, coverage, sample
+from experiments.coverage import NEAR_M, alignment, began, closed_contours, coverage, own_alignment, sample
 from experiments.swept import swept, visible_floor
 from experiments.truth import collinear, truth_of
 from sim.robot import RobotConfig
 from sim.worlds import World
 from slam.geometry.lines import intersect
+from slam.geometry.poses import compose, to_world
 from slam.segments import Segments
 
 CONFIG = RobotConfig()
@@ -68,6 +69,25 @@ def test_coverage_is_a_share_of_the_whole_reachable_contour(truth):
     missing_ends = coverage(sample(truth), half, 0.001)
     length = np.hypot(*(half[0, 1] - half[0, 0]))
     assert missing_ends == pytest.approx(length / truth.contour.length_m, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("lines", "step"), [([4, 5, 5], 0), ([0, 0, 3, 4], 2), ([0, 2, 0, 1, 3], 3), ([0, 0], 1), ([0], 0), ([1], 0)]
+)
+def test_a_map_begins_with_the_first_wall_that_it_still_has(lines, step):
+    assert began(np.array(lines)) == step
+
+
+def test_a_map_that_began_in_the_blind_is_whole_in_its_own_frame(truth):
+    samples, faces = sample(truth), truth.faces
+    true = np.array([[0.5, 0.5, 0.1], [1.0, 0.7, 0.3], [1.4, 0.8, 0.2]])
+    lost = np.array([0.4, -0.7, 0.2])
+    estimated = np.array([true[0], compose(lost, true[1]), compose(lost, true[2])])
+    mapped = to_world(faces, lost)
+    by_first, own = alignment(true[0], true[0]), own_alignment(true[0], estimated, true, 1)
+    assert coverage(samples, to_world(mapped, by_first), NEAR_M) < 0.6
+    assert coverage(samples, to_world(mapped, own), NEAR_M) == 1.0
+    np.testing.assert_allclose(own_alignment(true[0] + lost, estimated, true, 0), alignment(true[0] + lost, true[0]))
 
 
 def test_a_line_is_labelled_by_its_beams_and_a_wrong_fusion_is_counted(truth):

@@ -10,8 +10,8 @@ def legend(title: str, plans: bool) -> str:
     return f"""**{title}**. Drag the time cursor below: everything moves together.
 
 **Map**, the estimate over the truth. Broad grey: true walls; pink: true path and robot.
-Estimated walls: orange and brown in chains still open, blue and violet in closed ones, grey not yet trusted, red crooked;
-black dots: corners. Red circles: open ends, to be explored; grey circles: given up.{goal}
+Estimated walls: orange and brown in chains still open, blue and violet in closed ones, grey not yet trusted,
+red crooked; black dots: corners. Red circles: open ends, to be explored; grey circles: given up.{goal}
 Robot with its 3σ ellipse, {POSE_TIMES:.0f} times enlarged; small dots: the scan;
 its segments: green fused, blue new, red refused (and why), grey unused.
 Pale blue: floor seen so far. Thin lines: the visibility graph.
