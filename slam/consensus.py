@@ -34,12 +34,14 @@ def agree(
     may_seed: Bool[np.ndarray, " c"],
     gate: float,
     doubt: float,
+    density: float,
 ) -> Consensus:
     """Return the candidates (pairs of `segment` and `line`, seen together) that the best hypothesis keeps.
 
     Each candidate within the level of doubt is the seed of a hypothesis, which costs its squared distance, and for each
     segment that of its best candidate given the seed, or the level of doubt where that is beyond the gate: what lies
-    along a wall is hardly ever another. The cheapest wins; a seed beyond the gate only if another segment agrees.
+    along a wall is hardly ever another. The cheapest wins; a seed beyond the gate only if another segment agrees, or if
+    it is likelier so than a wall that nobody has seen, of which there are `density` per rad m.
     """
     level, unmatched = gate_level(gate, 2), gate_level(doubt, 2)
     segments, column = np.unique(segment, return_inverse=True)
@@ -54,7 +56,8 @@ def agree(
         nearer = (given[:, c] <= level) & (given[:, c] < best[:, k])
         best[nearer, k] = given[nearer, c]
         choice[nearer, k] = c
-    believed = (own[seeds] <= level) | (np.count_nonzero(choice != _UNMATCHED, axis=1) > 1)
+    alone = np.maximum(level, _unlike_new(seen, density)[seeds])
+    believed = (own[seeds] <= alone) | (np.count_nonzero(choice != _UNMATCHED, axis=1) > 1)
     costs = np.where(believed, own[seeds] + best.sum(axis=1), np.inf)
     if not believed.any():
         return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
@@ -92,10 +95,21 @@ def nearest_alone(
 
 
 def _own_distances(seen: JointSightings) -> Float[np.ndarray, " c"]:
+    return _squares(seen.e.reshape(-1, 2), _own_covariances(seen))
+
+
+def _own_covariances(seen: JointSightings) -> Float[np.ndarray, "c 2 2"]:
     count = len(seen.e) // 2
     each = np.arange(count)
-    e, S = seen.e.reshape(count, 2), seen.S.reshape(count, 2, count, 2)[each, :, each, :]
-    return _squares(e, S)
+    return seen.S.reshape(count, 2, count, 2)[each, :, each, :]
+
+
+def _unlike_new(seen: JointSightings, density: float) -> Float[np.ndarray, " c"]:
+    """Return the squared distance up to which a sighting is likelier of its wall than of a new one.
+
+    There the Gaussian's own density, exp(-d2 / 2) / (2 pi sqrt(det S)), is that of new walls.
+    """
+    return np.asarray(-2.0 * np.log(2.0 * np.pi * density) - np.linalg.slogdet(_own_covariances(seen))[1])
 
 
 def _distances(seen: JointSightings, seeds: Int[np.ndarray, " h"]) -> Float[np.ndarray, "h c"]:

@@ -40,6 +40,9 @@ class MatchingConfig:
     """Distance from a wall, across it, within which a short segment of which it covers half is not a new wall."""
     beside_rad: float = 0.35
     """Largest difference in direction, beyond three sigmas of the short segment's, for the same."""
+    density: float = 0.1
+    """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
+    sight is matched beyond the gate too where a new one would be less likely."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
 
@@ -189,7 +192,7 @@ def _agreed(
     """Return the candidates among `rows` that agree on where the robot is, where no other choice is nearly as good."""
     seen = taken_together(joint, found.line[rows], found.model.take(rows))
     sure = ~segments.is_tentative[found.segment[rows]]
-    agreed = agree(found.segment[rows], found.line[rows], seen, sure, config.gate, config.doubt)
+    agreed = agree(found.segment[rows], found.line[rows], seen, sure, config.gate, config.doubt, config.density)
     clear = agreed.pairs[agreed.margin >= config.clear]
     return rows[clear[compatible(seen.take(clear), config.gate, config.doubt)]]
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from scipy.stats import multivariate_normal
 
 from slam.consensus import agree, nearest_alone
 from slam.consistency import gate_level
@@ -28,7 +29,13 @@ def conditioned(seen, c, seed):
     return joint - alone.e @ np.linalg.solve(alone.S, alone.e)
 
 
-def hypotheses(segment, seen, seeds, gate, doubt):
+def likelihood(seen, c):
+    """Return the density, per rad m, of the sighting of one wall where it was seen."""
+    one = seen.take(np.array([c]))
+    return multivariate_normal(np.zeros(2), one.S).pdf(one.e)
+
+
+def hypotheses(segment, seen, seeds, gate, doubt, density):
     """Return cost and choice (candidate by segment) of each hypothesis that may win, one candidate at a time."""
     found = []
     for seed in seeds:
@@ -41,7 +48,7 @@ def hypotheses(segment, seen, seeds, gate, doubt):
             cost += costs[best] if costs[best] <= gate else doubt
             if costs[best] <= gate:
                 choice[s] = best
-        if own <= gate or (own <= doubt and len(choice) > 1):
+        if own <= gate or (own <= doubt and (len(choice) > 1 or likelihood(seen, seed) > density)):
             found.append((cost, choice))
     return found
 
@@ -52,8 +59,8 @@ def test_the_cheapest_hypothesis_of_all_is_found_and_its_margin(seed):
     segment = np.sort(rng.integers(0, 5, rng.integers(1, 12)))
     line = np.concatenate([rng.permutation(12)[: np.count_nonzero(segment == s)] for s in np.unique(segment)])
     seen, may_seed = sightings(rng, segment), rng.uniform(size=len(segment)) < 0.8
-    agreed = agree(segment, line, seen, may_seed, 0.99, 0.999999)
-    found = hypotheses(segment, seen, np.flatnonzero(may_seed), gate_level(0.99, 2), gate_level(0.999999, 2))
+    agreed = agree(segment, line, seen, may_seed, 0.99, 0.999999, 1e-3)
+    found = hypotheses(segment, seen, np.flatnonzero(may_seed), gate_level(0.99, 2), gate_level(0.999999, 2), 1e-3)
     if not found:
         assert not len(agreed.pairs)
         return
@@ -80,6 +87,31 @@ def test_a_slip_by_what_a_wall_bends_gives_no_segment_to_its_neighbour():
         belief = walker.scan().map.belief
         # Where nothing can be told apart nothing is fused, and the stated sigma says so.
         assert abs(belief.pose_world[2] - before) < 4.0 * np.sqrt(belief.pose_cov[2, 2])
+
+
+@pytest.mark.parametrize(("slip_sigmas", "is_matched"), [(0.0, True), (3.5, True), (-3.2, True), (8.0, False)])
+def test_the_only_wall_in_sight_is_the_same_after_a_slip_that_happens_once_in_a_thousand_steps(slip_sigmas, is_matched):
+    """Refused, it would leave the robot to its wheels, and soon come back as a second wall."""
+    hall = shapely.box(-30, 0, 30, 40)
+    walker = Walker(faces_of(hall), [0.0, 1.0, -1.2], np.random.default_rng(3))
+    for _ in range(6):
+        walker.scan()
+    sigma = np.deg2rad(1.6)
+    slip = Odometry(np.array([0.0, 0.0, slip_sigmas * sigma]), np.diag([2e-3, 2e-3, sigma]) ** 2)
+    walker.mapper.predict(slip)
+    update = walker.scan()
+    assert len(update.matches.pairs) == is_matched
+    assert len(update.map) == 1 + (not is_matched)
+
+
+def test_a_robot_that_is_lost_takes_no_wall_beyond_the_gate():
+    """Where it may be anywhere within a metre, a new wall is as likely."""
+    far = np.sqrt(12.0)
+    for sigmas, kept in (((0.026, 0.005), 1), ((0.12, 0.3), 0)):
+        S = np.diag(np.square(sigmas))
+        seen = JointSightings(np.array([far * sigmas[0], 0.0]), np.zeros((3, 2)), S)
+        agreed = agree(np.array([0]), np.array([0]), seen, np.array([True]), 0.99, 0.999999, 0.1)
+        assert len(agreed.pairs) == kept
 
 
 def alone(d2, between, cov_between):
