@@ -78,10 +78,12 @@ class Ekf(Generic[M]):
         """Start from a map without lines.
 
         With `at_wall` lines are anchored where they were seen; without, at the world's origin (the paper's form).
-        With `relinearise` a joint update takes its Jacobian where it takes the estimate.
+        With `relinearise` a joint update takes its Jacobian where the wheels slipped to.
         """
         self._map = gaussian
         self._at_wall, self._relinearise = at_wall, relinearise
+        self._slip = np.zeros((POSE, POSE))
+        """Covariance of what the wheels have slipped since the last update."""
         self._frame: Frame | None = None
         self._has_driven = False
         self._version = 0
@@ -99,7 +101,9 @@ class Ekf(Generic[M]):
         self._move_on()
         self._has_driven = True
         motion = self._motion(odometry)
-        self._map.move(motion.pose_world, motion.F, motion.W @ odometry.cov @ motion.W.T)
+        noise = motion.W @ odometry.cov @ motion.W.T
+        self._map.move(motion.pose_world, motion.F, noise)
+        self._slip = motion.F @ self._slip @ motion.F.T + noise
 
     def update(self, first: Observations, second: Observations) -> None:
         """Fuse one scan's matches at once (`second`; a joint filter has no use for `first`)."""
@@ -107,6 +111,7 @@ class Ekf(Generic[M]):
             rows = self.belief.rows(second.ids)
             self._move_on()
             self._condition(self._linear(rows, second))
+            self._slip = np.zeros((POSE, POSE))
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
@@ -139,6 +144,7 @@ class Ekf(Generic[M]):
         """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
         self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
         self._map.move(np.zeros(POSE), np.zeros((POSE, POSE)), np.zeros((POSE, POSE)))
+        self._slip = np.zeros((POSE, POSE))
 
     def _motion(self, odometry: Odometry) -> Motion:
         return move(self._map.pose_world, odometry.motion)
@@ -164,25 +170,20 @@ class Ekf(Generic[M]):
         return None
 
     def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
-        """Linearise a scan where it takes the estimate, not where the wheels left it (one Gauss-Newton iteration).
+        """Linearise a scan at the pose that the wheels slipped to, not where they left the estimate.
 
-        A slip of the wheels by 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is
-        known to. The innovation is given from the estimate as it is, with the Jacobian of where it will be.
+        A slip by 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The slip is
+        what the scan says of it if all else were known: were pose and lines to go where the whole update takes them, their
+        common shift and turn, which no scan can tell, would move the Jacobian too, and be taken for measured.
         """
-        here = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
+        pose, means = self._map.pose_world, self._map.means[rows]
+        here = stack(rows, self._innovations(rows, seen, pose, means))
         if not self._relinearise:
             return here
-        joint = self._map.joint(here.rows)
-        PHt = joint.cov @ here.H.T
-        step = PHt @ np.linalg.solve(here.H @ PHt + here.R, here.e)
-        ahead = joint.mean + step
-        means = ahead[POSE:].reshape(-1, 2)[np.argmax(here.rows == rows[:, None], axis=1)]
-        self._look_from(here.rows, ahead)
-        there = stack(rows, self._innovations(rows, seen, ahead[:POSE], means))
-        return Linear(there.rows, there.H, there.e + there.H @ step, there.R)
-
-    def _look_from(self, rows: Int[np.ndarray, " u"], ahead: Float[np.ndarray, " s"]) -> None:
-        """Take note that the next Jacobian is taken at other means of the pose and these rows."""
+        H = here.H[:, :POSE]
+        step = self._slip @ H.T @ np.linalg.solve(H @ self._slip @ H.T + here.R, here.e)
+        there = stack(rows, self._innovations(rows, seen, pose + step, means))
+        return Linear(there.rows, there.H, there.e + there.H[:, :POSE] @ step, there.R)
 
     def _move_on(self) -> None:
         self._version += 1

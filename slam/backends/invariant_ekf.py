@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import POSE
-from ..models import Linear
+from ..backend import POSE, Observations
+from ..models import Linear, stack
 from .dense_map import DenseMap
 from .ekf import Ekf
 from .linear import carry
@@ -26,8 +26,25 @@ class InvariantEkf(Ekf[DenseMap]):
         self._carried_to: tuple[np.ndarray, np.ndarray] | None = None
         """Position (2,) and directions (n,) at which P holds its errors while an update is on its way."""
 
-    def _look_from(self, rows: Int[np.ndarray, " u"], ahead: Float[np.ndarray, " s"]) -> None:
-        """Carry P to where the Jacobian is taken: there H must find its unobservable directions."""
+    def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
+        """Linearise a scan where it takes the estimate (one Gauss-Newton iteration), and carry P there first.
+
+        There H finds the unobservable directions of P, wherever it is; the innovation is given from the estimate as it is.
+        """
+        here = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
+        if not self._relinearise:
+            return here
+        joint = self._map.joint(here.rows)
+        PHt = joint.cov @ here.H.T
+        step = PHt @ np.linalg.solve(here.H @ PHt + here.R, here.e)
+        ahead = joint.mean + step
+        self._carry_to(here.rows, ahead)
+        means = ahead[POSE:].reshape(-1, 2)[np.argmax(here.rows == rows[:, None], axis=1)]
+        there = stack(rows, self._innovations(rows, seen, ahead[:POSE], means))
+        return Linear(there.rows, there.H, there.e + there.H @ step, there.R)
+
+    def _carry_to(self, rows: Int[np.ndarray, " u"], ahead: Float[np.ndarray, " s"]) -> None:
+        """Carry P to other means of the pose and these rows."""
         position, alpha = self._point()
         turned = alpha.copy()
         turned[rows] = ahead[POSE::2]
