@@ -172,9 +172,9 @@ class Ekf(Generic[M]):
     def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Linearise a scan at the pose that the wheels slipped to, not where they left the estimate.
 
-        A slip by 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The slip is
-        what the scan says of it if all else were known: were pose and lines to go where the whole update takes them, their
-        common shift and turn, which no scan can tell, would move the Jacobian too, and be taken for measured.
+        A slip by 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The slip
+        is what the scan says of it if all else were known: were pose and lines to go where the whole update takes them,
+        their common shift and turn, which no scan can tell, would move the Jacobian too, and be taken for measured.
         """
         pose, means = self._map.pose_world, self._map.means[rows]
         here = stack(rows, self._innovations(rows, seen, pose, means))

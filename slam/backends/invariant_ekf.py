@@ -29,7 +29,7 @@ class InvariantEkf(Ekf[DenseMap]):
     def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Linearise a scan where it takes the estimate (one Gauss-Newton iteration), and carry P there first.
 
-        There H finds the unobservable directions of P, wherever it is; the innovation is given from the estimate as it is.
+        There H finds the unobservable directions of P, wherever it is; the innovation is that of the estimate as it is.
         """
         here = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
         if not self._relinearise:

@@ -1,4 +1,4 @@
-"""Where a scan is linearised: where the wheels slipped to, which bends a prediction; never along what no scan can tell."""
+"""Where a scan is linearised: where the wheels slipped to; never along what no scan can tell."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ SEEDS = 20
 
 
 def heading_nees(walls, relinearise, seed):
-    """Return the NEES of the heading against the first wall, after a blind metre and 60 looks at walls not seen before."""
+    """Return the NEES of the heading against the first wall, after a blind metre and 60 looks at new walls."""
     rng, backend = np.random.default_rng(seed), FullEkf(START, P0, relinearise=relinearise)
     known = backend.grow(*walls.look(START, np.arange(3), rng))
     backend.predict(Odometry(np.zeros(3), LOST))
