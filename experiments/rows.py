@@ -79,6 +79,7 @@ def one(config: TrialConfig) -> Row:
         mapped = distance["mapped_m"]
         row[f"distance_error_{pair}_m"] = None if mapped is None else mapped - distance["true_m"]
     row["set_aside"] = len(summary.get("set_aside", []))
+    row["reachable_way"] = summary.get("certificate", {}).get("reachable_way")
     if result.log is not None:
         parts = np.array_split(1e3 * result.log.seconds, PARTS)
         row["step_ms_along"] = [float(part.mean()) if len(part) else None for part in parts]

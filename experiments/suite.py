@@ -67,7 +67,7 @@ def table(rows: list[dict[str, Any]], by_world: bool) -> Table:
     """Return a row for each world, or one for all trials together, and the total."""
     shown = Table(title=f"{len(rows)} trials", title_justify="left")
     shown.add_column("world", overflow="fold")
-    columns = "complete|coverage min|mean|closed|false|duplicates|collisions|path m"
+    columns = "complete|coverage min|mean|own frame|closed|false|duplicates|collisions|path m"
     columns += "|pose ANEES|in band|map ANEES|wheels m|step ms|planning ms|growth|MiB"
     for column in columns.split("|"):
         shown.add_column(column, justify="right")
@@ -88,6 +88,7 @@ def _cells(rows: list[dict[str, Any]]) -> list[str]:
         f"{complete}/{len(rows)}",
         f"{coverage.min():.4f}" if len(coverage) else "-",
         _mean(scored, "coverage", 4),
+        _mean(scored, "coverage_own_frame", 4),
         f"{closed}/{len(rows)}",
         *(str(sum(int(row[key]) for row in scored)) for key in ("false_matches", "duplicate_lines", "collisions")),
         _mean(scored, "path_length_m", 1),
@@ -132,6 +133,10 @@ def main() -> int:
     for row in rows:
         if row["status"] != "complete" or (suite.each and row["coverage"] < 0.99):
             found = "" if row.get("coverage") is None else f", coverage {row['coverage']:.4f}"
+            if row.get("map_began_step"):
+                found += f" ({row['coverage_own_frame']:.4f} from where the map began)"
+            if (way := row.get("reachable_way")) is not None and way < 0.9:
+                found += f", {100 * way:.0f} % of its way open to it at the end"
             print(f"{row['file']} seed {row['seed']}: {row['status']}{found}: {row['reason']}")
     for key in sorted({key for row in rows for key in row if key.startswith("distance_error")}):
         worst = _values(rows, key)
