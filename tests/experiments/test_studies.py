@@ -144,14 +144,15 @@ def test_a_study_goes_on_where_it_was_left(tmp_path):
 
 
 def test_the_origin_matters_to_lines_that_are_measured_from_it_alone():
-    """Equation (4): the same drive, the world put 100 m away."""
-    study = OriginStudy(length_m=20.0)
+    """Equation (4): the same drives, the world put 100 m away."""
+    study = OriginStudy(length_m=20.0, p0="large")
     here, there, apart = study.ridden(FullEkf, True, 1)
     assert apart < 1e-9
     assert there == pytest.approx(here, rel=1e-6)
-    here, there, apart = study.ridden(FullEkf, False, 1)
-    assert apart > 1e-3
-    assert there > 1.2 * here
+    here, there, apart = np.mean([study.ridden(FullEkf, False, seed) for seed in (1, 2, 3)], axis=0)
+    print(f"pose ANEES measured from the origin: {here:.1f}, with the origin 100 m away {there:.0f}")
+    assert apart > 1e-2
+    assert there > 5.0 * here
 
 
 def test_a_map_that_has_only_moved_keeps_its_shape():
