@@ -49,8 +49,6 @@ class DrivingConfig:
     """Beside the way are returns from this far behind the robot to this far beyond its aim."""
     obstructed_m: float = 0.17
     """A return this near to the path ahead is in the way: less than the radius, since the path keeps to a grid."""
-    retreats: int = 3
-    """Steps back out of a margin on one path; with one more, forward and back again is all that there is."""
     arrived_m: float = 0.08
     """The end of the path counts as reached within this."""
 
@@ -62,7 +60,6 @@ class Pilot:
         self._points = path.points_world
         self._planner, self._config = planner, config
         self._at = 0
-        self._retreats = 0
 
     @property
     def remaining_m(self) -> float:
@@ -121,21 +118,10 @@ class Pilot:
             command = MotionCommand(share * forward, turn)
             if _is_safe(command, points, self._config, narrow):
                 return self._careful(command, pose_world, free_space)
-        retreat = self._retreat(points, narrow)
-        if narrow or retreat is not None:
-            return retreat
-        return MotionCommand(0.0, turn) if abs(turn) > 0.02 else None
-
-    def _retreat(self, points_robot: Float[np.ndarray, "m 2"], narrow: bool) -> MotionCommand | None:
-        """Return a short step out of the margin of a return, unless there were enough of them on this path."""
-        back: MotionCommand | None = MotionCommand(-self._config.careful_m, 0.0)
-        if not narrow:
-            back = _away(points_robot, self._config)
-        elif not _is_safe(MotionCommand(-self._config.careful_m, 0.0), points_robot, self._config, narrow):
-            back = None
-        if back is not None:
-            self._retreats += 1
-        return back if self._retreats <= self._config.retreats else None
+        back = MotionCommand(-self._config.careful_m, 0.0)
+        if narrow:
+            return back if _is_safe(back, points, self._config, narrow) else None
+        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the farthest point of the path within the lookahead to which the straight way is clear."""
