@@ -131,7 +131,8 @@ class FreeSpace:
         beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
         tips = self.cells(to_world(beams * reach[:, None], pose_world))
         here = self.cells(pose_world[None, :2])[0]
-        self._stood[tuple(here)] = True
+        # With the cells beside it: steps of 0.15 m leave no gap between.
+        self._stood[here[0] - 1 : here[0] + 2, here[1] - 1 : here[1] + 2] = True
         box = self._box(here, tips, scan)
         window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
         free = self._seen_free(pose_world, scan, reach, box)

@@ -221,7 +221,8 @@ def test_where_the_body_did_not_fit_is_known_in_any_part_of_the_grid(seed):
     tight = grid.cells(grid._too_tight)
     gap = CELL * np.hypot(*(index[:, None] - tight).transpose(2, 0, 1))
     expected = (gap > reach).all(axis=1).reshape(grid.shape)
-    expected[tuple(grid.cells(np.zeros((1, 2)))[0])] = True  # the robot stood there
+    r, c = grid.cells(np.zeros((1, 2)))[0]
+    expected[r - 1 : r + 2, c - 1 : c + 2] = True  # the robot stood there
     assert not expected.all()
     for _ in range(20):
         (r0, r1), (c0, c1) = np.sort(rng.integers(0, max(grid.shape) + 20, (2, 2)), axis=1)
@@ -244,7 +245,7 @@ def test_the_way_through_a_narrow_door_is_open_to_who_came_by_it():
     assert way_out() is not None
     grid.note_too_tight(np.array([0.05, 0.0]))
     assert way_out() is None
-    for x in np.arange(-1.0, 1.0, 0.05):
+    for x in np.arange(-1.0, 1.0, 0.15):
         pose = np.array([x, 0.0, 0.0])
         grid.integrate(pose, scan_from(room, pose))
     assert way_out() is not None
