@@ -143,16 +143,18 @@ def test_a_study_goes_on_where_it_was_left(tmp_path):
         study(1)
 
 
-def test_the_origin_matters_to_lines_that_are_measured_from_it_alone():
+@pytest.mark.parametrize(("p0", "seeds", "least"), [("small", range(1, 9), 1.2), ("large", range(1, 4), 5.0)])
+def test_the_origin_matters_to_lines_that_are_measured_from_it_alone(p0, seeds, least):
     """Equation (4): the same drives, the world put 100 m away."""
-    study = OriginStudy(length_m=20.0, p0="large")
+    study = OriginStudy(length_m=20.0, p0=p0)
     here, there, apart = study.ridden(FullEkf, True, 1)
     assert apart < 1e-9
     assert there == pytest.approx(here, rel=1e-6)
-    here, there, apart = np.mean([study.ridden(FullEkf, False, seed) for seed in (1, 2, 3)], axis=0)
+    found = np.array([study.ridden(FullEkf, False, seed) for seed in seeds])
+    assert found[:, 2].min() > 1e-3
+    here, there, _ = found.mean(axis=0)
     print(f"pose ANEES measured from the origin: {here:.1f}, with the origin 100 m away {there:.0f}")
-    assert apart > 1e-2
-    assert there > 5.0 * here
+    assert there > least * here
 
 
 def test_a_map_that_has_only_moved_keeps_its_shape():
