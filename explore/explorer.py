@@ -124,7 +124,7 @@ class Explorer:
                 self._looked_again = 0
                 return command
             self._give_up(around)
-        return None
+        return self._look_again(around, len(self.set_aside) > known)
 
     def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
         """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do.

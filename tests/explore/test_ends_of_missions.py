@@ -250,3 +250,22 @@ def test_unseen_floor_is_measured_by_cells():
     plain = np.count_nonzero(shapely.contains_xy(floor, points[:, 0], points[:, 1])) * 0.05**2
     assert plain > 0.3
     assert unseen_area(free_space, floor) == pytest.approx(plain, rel=0.15)
+
+
+def test_a_mission_does_not_end_before_every_end_has_its_reason():
+    """More ends than one step has attempts for: in a door one noisy scan refused them all, and half was unseen."""
+    angle = 2 * np.pi * np.arange(24) / 24
+    walls, _ = closed_map(8.0 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    walls.extents[:, 0] += 0.5
+    walls.extents[:, 1] -= 0.5
+    scan = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, 0.15), 0.01, 4.0, 0.0)
+    around = Surroundings(walls, FreeSpace(), scan)
+    around.free_space.integrate(walls.belief.pose_world, scan)
+    explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
+    for _ in range(20):
+        chains = connect(walls, explorer.set_aside)
+        if explorer.command(around, chains, nx.DiGraph()) is None:
+            break
+    ends = {(end.wall, end.side) for chain in chains for end in chain.open_ends}
+    assert len(ends) == 48
+    assert set(explorer.set_aside) == ends
