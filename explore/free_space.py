@@ -41,8 +41,9 @@ class FreeSpace:
         self._too_tight = np.zeros((0, 2))
 
     def note_too_tight(self, place_world: Float[np.ndarray, "2"]) -> None:
-        """Remember that the body did not get through a narrow place."""
-        self._too_tight = np.vstack([self._too_tight, place_world])
+        """Remember that the body did not get through a narrow place, once for each."""
+        if not np.any(np.all(self._too_tight == place_world, axis=1)):
+            self._too_tight = np.vstack([self._too_tight, place_world])
 
     def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
         """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit.

@@ -245,6 +245,8 @@ def test_the_way_through_a_narrow_door_is_open_to_who_came_by_it():
     assert way_out() is not None
     grid.note_too_tight(np.array([0.05, 0.0]))
     assert way_out() is None
+    grid.note_too_tight(np.array([0.05, 0.0]))
+    assert len(grid._too_tight) == 1, "a place that is tried again and again is one place"
     for x in np.arange(-1.0, 1.0, 0.15):
         pose = np.array([x, 0.0, 0.0])
         grid.integrate(pose, scan_from(room, pose))
