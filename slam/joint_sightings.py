@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from .backend import Joint, Observations, columns_of
 from .consistency import gate_level
-from .models import Innovations, innovations, stack
+from .models import Innovations, halfway, innovations, stack
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,9 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
     means = joint.mean[3:].reshape(-1, 2)[rows]
     model = innovations(joint.mean[:3], joint.anchors[rows], means, observed.lines, observed.cov)
     seen = taken_together(joint, rows, model)
+    step = seen.gain() @ seen.e
+    turn = step[3 + 2 * rows] - step[2]
+    seen = taken_together(joint, rows, halfway(model, observed.lines, observed.cov, turn))
     gain = seen.gain()
     return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
 

@@ -15,7 +15,7 @@ from .consistency import gate_level
 from .geometry.lines import directions
 from .geometry.poses import to_world
 from .joint_sightings import compatible, taken_together
-from .models import Innovations, innovations
+from .models import Innovations, halfway, innovations
 from .segments import Segments
 
 
@@ -140,12 +140,21 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     alpha_world = segments.lines[:, 0] + pose[2]
     turned = alpha_world[:, None] - means[:, 0]
     segment, line = np.nonzero(np.cos(turned) > np.cos(config.angle_rad))
-    model = innovations(pose, joint.anchors[line], means[line], segments.lines[segment], segments.cov[segment])
+    lines, cov = segments.lines[segment], segments.cov[segment]
+    model = innovations(pose, joint.anchors[line], means[line], lines, cov)
+    model = halfway(model, lines, cov, model.e[:, 0] * _share_of_heading(line, joint, model))
     d2 = _distances(model, line, joint)
     near = (np.abs(model.e[:, 1]) < config.offset_m) | (d2 <= gate_level(config.doubt, 2))
     segment, line = segment[near], line[near]
     gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
     return _Candidates(segment, line, model.take(near), d2[near], gap)
+
+
+def _share_of_heading(line: Int[np.ndarray, " c"], joint: Joint, model: Innovations) -> Float[np.ndarray, " c"]:
+    """Return how much of the turn between a segment and its line the robot's heading and the line's own explain."""
+    at = 3 + 2 * line
+    variance = joint.cov[2, 2] - 2.0 * joint.cov[2, at] + joint.cov[at, at]
+    return np.asarray(variance / (variance + model.R[:, 0, 0]))
 
 
 def _gaps(

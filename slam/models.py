@@ -92,7 +92,7 @@ def innovations(
     t0 = cov[:, 0, 1] / cov[:, 0, 0]
     cosine, sine = np.cos(epsilon), np.sin(epsilon)
     r = lines[:, 1]
-    along = r * sine + t0 * cosine
+    along = _along(lines, cov, epsilon)
 
     e = np.empty((m, 2))
     e[:, 0], e[:, 1] = epsilon, r * cosine - t0 * sine - r_predicted
@@ -109,6 +109,31 @@ def innovations(
     R[:, 0, 0] = cov[:, 0, 0]
     R[:, 1, 1] = (cov[:, 1, 1] - cov[:, 0, 1] * t0) * (cosine - t0 * sine / r) ** 2
     return Innovations(e, H_pose, H_line, R)
+
+
+def halfway(
+    model: Innovations,
+    lines: Float[np.ndarray, "m 2"],
+    cov: Float[np.ndarray, "m 2 2"],
+    turn: Float[np.ndarray, " m"],
+) -> Innovations:
+    """Return the innovations of seen lines with H taken halfway to where the heading makes up for `turn` of epsilon.
+
+    How far off a line lies is bent in the heading: after a slip by 5 degrees a wall 2 m away lies 7 mm off the tangent
+    at the estimate, and 0.1 mm off this one.
+    """
+    less = _along(lines, cov, model.e[:, 0] - 0.5 * turn) - model.H_pose[:, 1, 2]
+    H_pose, H_line = model.H_pose.copy(), model.H_line.copy()
+    H_pose[:, 1, 2] += less
+    H_line[:, 1, 0] -= less
+    return Innovations(model.e, H_pose, H_line, model.R)
+
+
+def _along(
+    lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], epsilon: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, " m"]:
+    """Return where the centres of seen pieces lie along lines turned by `epsilon` from them."""
+    return lines[:, 1] * np.sin(epsilon) + cov[:, 0, 1] / cov[:, 0, 0] * np.cos(epsilon)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from slam.geometry.poses import compose, inverse, wrap
 from slam.joint_sightings import relocate
 from slam.mapper import Mapper
 from slam.matching import KnownWalls, MatchingConfig, match
+from slam.models import lines_robot
 from slam.robot import Odometry, Scan
 from slam.segments import Segments
 
@@ -87,6 +88,23 @@ def test_one_true_match_in_a_hundred_is_refused_by_the_gate():
             assert matches.unmatched.tolist() == [0]
             assert matches.refusals[0]
     assert abs(refused / trials - level) < 3 * np.sqrt(level * (1 - level) / trials) + 1e-3
+
+
+@pytest.mark.parametrize("slip_rad", [-0.1, -0.05, 0.08])
+def test_how_far_off_a_wall_is_after_a_slip_is_what_the_slip_itself_costs(slip_rad):
+    """The wall is known to a millimetre: from a tangent at the estimate a slip of 0.085 rad cost 24 for 11."""
+    alpha, anchor = 0.3, np.array([[2.0, 0.4]])
+    sigma = 0.03
+    joint = Joint(np.array([0.0, 0.0, 0.0, alpha, 0.0]), np.diag([1e-3, 1e-3, sigma, 1e-4, 1e-4]) ** 2, anchor)
+    line = lines_robot(np.array([0.0, 0.0, slip_rad]), anchor, joint.mean[None, 3:])[0]
+    t0, along = 0.5, np.array([-np.sin(line[0]), np.cos(line[0])])
+    turn = np.array([[1.0, 0.0], [t0, 1.0]])
+    cov = turn @ np.diag([1e-3, 1e-3]) ** 2 @ turn.T
+    ends = line[1] * np.array([np.cos(line[0]), np.sin(line[0])]) + np.array([[t0 - 0.5], [t0 + 0.5]]) * along
+    one = np.array([60])
+    segment = Segments(line[None], cov[None], ends[None], np.array([[0, 59]]), one, np.zeros((1, 2), int), np.zeros(1))
+    found = match(segment, KnownWalls(np.array([5]), np.array([[-3.0, 3.0]])), joint, clear_only=True)
+    assert found.distances == pytest.approx([(slip_rad / sigma) ** 2], rel=0.05)
 
 
 def test_without_walls_nothing_matches_and_nothing_is_doubtful():

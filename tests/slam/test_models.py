@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from slam.geometry.lines import lines_to_world
 from slam.geometry.poses import to_robot, to_world, wrap
 from slam.line_fit import Beams, fit_runs, polar, prefix_sums
-from slam.models import grow, innovations, lines_robot, move
+from slam.models import grow, halfway, innovations, lines_robot, move
 
 seeds = st.integers(0, 2**32)
 few = settings(max_examples=20, deadline=None, derandomize=True)
@@ -81,6 +81,26 @@ def test_the_innovation_jacobians_are_minus_the_derivatives_of_e(epsilon, off_si
     by_line = jacobian(lambda m: innovations(pose, anchors, m[None], line, cov).e[0], means[0])
     np.testing.assert_allclose(model.H_pose[0], -by_pose, atol=1e-7)
     np.testing.assert_allclose(model.H_line[0], -by_line, atol=1e-7)
+
+
+@few
+@given(seed=seeds, slip_rad=st.floats(-0.12, 0.12))
+def test_halfway_a_slip_of_the_heading_is_linear_in_what_is_seen(seed, slip_rad):
+    """The tangent at the estimate is off by r slip^2 / 2, 29 mm of a line 4 m away."""
+    rng = np.random.default_rng(seed)
+    pose = random_pose(rng)
+    line, cov, centre = seen_line(rng)
+    new = grow(pose, line[None], centre[None])
+    slipped = pose - [0.0, 0.0, slip_rad]
+    model = innovations(slipped, new.anchors, new.means, line[None], cov[None])
+    model = halfway(model, line[None], cov[None], model.e[:, 0])
+    np.testing.assert_allclose(model.e[0], model.H_pose[0, :, 2] * slip_rad, atol=abs(slip_rad) ** 3 + 1e-12)
+    by_turn = innovations(slipped, new.anchors, new.means, line[None], cov[None])
+    kept = halfway(by_turn, line[None], cov[None], np.zeros(1))
+    np.testing.assert_allclose(kept.H_pose, by_turn.H_pose, atol=1e-14)
+    # A turn of the line and a turn of the robot are one, but that the line turns about its anchor.
+    lever = model.H_line[0, 1, 0] + model.H_pose[0, 1, 2]
+    assert lever == pytest.approx(by_turn.H_line[0, 1, 0] + by_turn.H_pose[0, 1, 2], abs=1e-12)
 
 
 @few
