@@ -23,6 +23,7 @@ from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.worlds import WORLDS, World, WorldError, load
 from slam.consistency import nees
 from slam.extraction import extract
+from slam.firmness import FirmnessConfig
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import to_robot, wrap
 from slam.robot import Scan
@@ -217,6 +218,8 @@ def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
     rows["all of 5 beams or more"] = clean & long
     rows["lines of 4 beams"] = clean & (lines.beams == 4)
     rows["lines of 3 beams"] = clean & (lines.beams == 3)
+    is_known = np.sqrt(lines.cov[:, 0, 0]) < FirmnessConfig().few_heading_rad
+    rows["lines of 3 or 4 beams that may move the estimate"] = clean & ~long & is_known
     return rows
 
 

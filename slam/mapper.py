@@ -13,7 +13,6 @@ from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
 from .faint import FaintConfig, FaintLines
-from .firmness import are_clear
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
 from .matching import KnownWalls, Matches, MatchingConfig, match
@@ -95,7 +94,7 @@ class Mapper:
         near = self._nearby(scan, walls)
         joint = self.backend.belief.joint(near.ids)
         clear = self._match(segments, near, joint, self.config.matching, clear_only=True)
-        first = self._firm(clear, segments, walls)
+        first = self._firm(clear, segments)
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         relocated = relocate(joint, near.ids, first)
         # 4. Match the remaining features with their re-prediction from the new robot pose.
@@ -103,7 +102,7 @@ class Mapper:
         again = self._match(segments.take(rest), near, relocated, self.config.matching)
         matches = _both(clear, again)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(first, self._firm(matches, segments, walls))
+        self.backend.update(first, self._firm(matches, segments))
         owners = self._store(scan, segments, matches)
         walls, merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
@@ -119,11 +118,10 @@ class Mapper:
             return segments
         return sure_pieces(self._extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
 
-    def _firm(self, matches: Matches, segments: Segments, walls: StochasticMap) -> Observations:
-        """Return the matches that may move the estimate: of enough beams, of a clear direction, on a straight wall."""
+    def _firm(self, matches: Matches, segments: Segments) -> Observations:
+        """Return the matches that may move the estimate."""
         observed = matches.observations(segments)
-        firm = are_clear(segments, self.config.walls.firmness)[matches.pairs[:, 0]]
-        firm &= ~walls.crooked[walls.belief.rows(observed.ids)]
+        firm = self._walls.may_move(segments.take(matches.pairs[:, 0]), observed.ids)
         return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
 
     def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:

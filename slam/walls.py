@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from .backend import Belief
 from .firmness import Firmness, FirmnessConfig
@@ -63,6 +63,10 @@ class Walls:
         tentative = self._sightings < self._config.trusted_sightings
         crooked = self._firmness.are_crooked(self._ids)
         return StochasticMap(belief, self._extents.copy(), self._sightings.copy(), tentative, crooked)
+
+    def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
+        """Return which segments, each on the wall of that id, may move the estimate (`firmness`)."""
+        return self._firmness.may_move(segments, ids)
 
     def see(
         self,

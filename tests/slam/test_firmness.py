@@ -78,7 +78,7 @@ def test_a_clear_sighting_far_from_all_vague_ones_gives_the_wall_away():
         firmness = Firmness()
         for _ in range(35):
             firmness.see(sighting(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, 0.0)
-        firmness.see(sighting(off, np.deg2rad(4.5)), OWNER, 0.0)
+        firmness.see(sighting(off, np.deg2rad(2.8)), OWNER, 0.0)
         assert firmness.are_crooked(OWNER).tolist() == [crooked]
 
 
@@ -142,3 +142,22 @@ def test_a_line_laid_down_the_stairs_is_found_out_and_moves_nothing_more():
     assert len(crooked[-1]) < 5, "the four walls of the room are straight"
     for before, ids in zip(crooked[:-1], moved[1:], strict=True):
         assert not before & ids
+
+
+def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction():
+    firmness, few = Firmness(), sighting(0.0, 0.01, beams=3)
+    assert not firmness.may_move(few, OWNER).any(), "of this wall nothing is known"
+    for _ in range(200):
+        firmness.see(sighting(0.0, 0.12, beams=6), OWNER, 0.0)
+    assert not firmness.may_move(few, OWNER).any(), "only vague sightings"
+    firmness.see(sighting(0.0, 0.02, beams=8), OWNER, 0.0)
+    assert not firmness.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
+    assert firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).all()
+    for _ in range(5):
+        firmness.see(sighting(0.0, 0.02, beams=8), OWNER, 0.0)
+    assert firmness.may_move(few, OWNER).all()
+    assert not firmness.may_move(sighting(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
+    for _ in range(300):
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, 0.0)
+    assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing moves the estimate"
+    assert not firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).any()
