@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from .backend import Joint, Observations
 from .consensus import agree, nearest_alone
 from .consistency import gate_level
+from .duplicates import DuplicatesConfig
 from .geometry.lines import directions
 from .geometry.poses import to_world
 from .joint_sightings import compatible, taken_together
@@ -43,6 +44,8 @@ class MatchingConfig:
     density: float = 0.1
     """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
     sight is matched beyond the gate too where a new one would be less likely."""
+    one_wall: float = DuplicatesConfig().gate
+    """Probability level within which two entries of the map may be one wall, so that either will do."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
 
@@ -212,7 +215,7 @@ def _nearest(
     """Return for each segment its nearest candidate among `rows`, unless another wall is nearly as near."""
     model = found.model.take(rows)
     seen = taken_together(joint, found.line[rows], model)
-    return rows[nearest_alone(found.segment[rows], found.d2[rows], seen, model.R, config.gate, config.clear)]
+    return rows[nearest_alone(found.segment[rows], found.d2[rows], seen, model.R, config.one_wall, config.clear)]
 
 
 def _still_overlapping(

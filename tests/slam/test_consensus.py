@@ -5,11 +5,13 @@ import pytest
 import shapely
 from scipy.stats import multivariate_normal
 
+from slam.backend import Joint
 from slam.consensus import agree, nearest_alone
 from slam.consistency import gate_level
 from slam.joint_sightings import JointSightings
+from slam.matching import KnownWalls, match
 from slam.robot import Odometry
-from tests.slam.test_matching import Walker, faces_of
+from tests.slam.test_matching import Walker, faces_of, straight_pieces
 
 
 def sightings(rng, segment, noise=0.3):
@@ -129,3 +131,17 @@ def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_o
     assert alone([1.0, 2.0], between=0.01, cov_between=1e-2) == [0]
     assert alone([2.0, 1.0], between=0.01, cov_between=1e-2) == [1]
     assert alone([1.0, 12.0], between=1.0, cov_between=1e-4) == [0]
+
+
+def test_the_only_wall_in_sight_is_found_where_it_stands_in_the_map_as_two_that_would_be_merged():
+    """Half of a hall's wall was entered again, 4 sigmas off: refused, the robot drove along it by its wheels alone."""
+    walls = KnownWalls(np.array([3, 7]), np.array([[-4.0, 0.1], [-0.1, 4.0]]))
+    anchors, sigma = np.array([[0.0, 1.5], [0.0, 1.5]]), np.deg2rad(0.03)
+    for turned, matched in ((3.8, 1), (30.0, 0)):
+        mean = np.array([0.0, 0.0, 0.0, np.pi / 2, 0.0, np.pi / 2 + turned * sigma, 0.0])
+        stated = np.diag([0.003, 0.003, np.deg2rad(1.5), 1e-5, 1e-4, sigma, 1e-4]) ** 2
+        joint = Joint(mean, stated, anchors)
+        segment = straight_pieces([[[3.0, 1.5], [-3.0, 1.5]]])
+        found = match(segment, walls, joint, clear_only=True)
+        assert not len(found.pairs)
+        assert len(match(segment, walls, joint).pairs) == matched
