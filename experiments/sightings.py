@@ -13,7 +13,7 @@ from sim.chance import Channel, standard_normals
 from slam.backend import Backend, Joint, Observations
 from slam.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.extraction import extract
-from slam.firmness import are_clear
+from slam.firmness import Firmness
 from slam.mapper import seen_centres
 from slam.pieces import sure_pieces
 from slam.robot import Odometry, Scan
@@ -101,6 +101,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
     witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
     rules = trial.mission.mapper.walls
+    firmness = Firmness(rules.firmness)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k, ranges in enumerate(recording.ranges_m):
@@ -112,10 +113,14 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
         faces = witness.faces(segments)
         walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
         known = np.isin(walls, list(true_lines))
-        seen = known & are_clear(segments, rules.firmness)
+        seen = np.flatnonzero(known)
+        seen = seen[firmness.may_move(segments.take(seen), walls[seen])]
         rest = np.flatnonzero(~known)
         begun = rest[begins_a_line(walls[rest], segments.beam_counts[rest], set(true_lines))]
         begun = begun[~segments.is_tentative[begun]]
+        owned = known & ~segments.is_tentative
+        owned[begun] = True
+        firmness.see(segments, np.where(owned, walls, -1), float(run.true_poses_world[k, 2]))
         again.append(_looks(segments, walls).take(seen))
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
