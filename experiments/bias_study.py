@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 import tyro
 from jaxtyping import Float
-from rich.console import Console
 from rich.table import Table
 
 from slam.backends import BACKENDS
@@ -25,6 +24,7 @@ from slam.geometry.poses import to_world
 from slam.trajectories import ate
 
 from .campaign.score import offsets, wall_errors
+from .console import plain_console
 from .coverage import alignment
 from .faults import Fault, faulty
 from .recordings import record
@@ -97,7 +97,7 @@ class Study:
                 values = {n: np.array([found[key][score] for key in keys[n]]) for n in self.backends}
                 means = (f"{np.nanmean(column):.3g}" for column in values.values())
                 table.add_row(fault.title, *means, *(ratio(values[a], values[b]) for a, b in self.pairs))
-            Console(width=max(Console().width, 140)).print(table)
+            plain_console(width=max(plain_console().width, 140)).print(table)
 
     @property
     def shown(self) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from slam.backend import Joint
@@ -20,6 +19,7 @@ from slam.mapper import MapperConfig, Matcher
 from slam.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
 from slam.segments import Segments
 
+from .console import plain_console
 from .replay import RecordedRun, replay, run_of
 from .results import log_arrays
 from .scenario import TrialConfig, UsageError, load_world
@@ -92,7 +92,7 @@ def main() -> int:
     except UsageError as error:
         print(f"duplicates_study: {error}", file=sys.stderr)
         return 2
-    Console(width=None if sys.stdout.isatty() else 140).print(table)
+    plain_console(width=None if sys.stdout.isatty() else 140).print(table)
     return 0
 
 

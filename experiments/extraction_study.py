@@ -29,6 +29,8 @@ from slam.geometry.poses import to_robot, wrap
 from slam.robot import Scan
 from slam.segments import MIN_BEAMS, Segments
 
+from .console import plain_console
+
 PLANS = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans"
 FLAT_RAD, FLAT_M = 1e-3, 2e-3
 MIXED_SHARE = 0.8
@@ -159,7 +161,7 @@ def worlds(config: StudyConfig) -> Iterator[World]:
         try:
             yield load(str(name))
         except WorldError as refusal:
-            Console(stderr=True).print(f"left out: {refusal}")
+            plain_console(stderr=True).print(f"left out: {refusal}")
 
 
 def sample(config: StudyConfig) -> tuple[Lines, Walls]:
@@ -246,7 +248,7 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
 
 def main(config: StudyConfig) -> None:
     """Take the scans and print the tables."""
-    report(*sample(config), Console(width=120))
+    report(*sample(config), plain_console(width=120))
 
 
 if __name__ == "__main__":

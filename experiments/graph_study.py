@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 import tyro
 from jaxtyping import Float, Int
-from rich.console import Console
 from rich.table import Table
 from scipy.linalg import cho_factor, cho_solve
 
@@ -18,6 +17,7 @@ from slam.backends.graph import Graph
 from slam.geometry.lines import lines_to_world, normals
 from slam.geometry.poses import wrap
 
+from .console import plain_console
 from .recordings import record
 from .replay import Association, ReplayOptions, replay
 from .scenario import TrialConfig
@@ -182,7 +182,7 @@ class Study:
             assert isinstance(graph, Graph)
             prepare(graph)
             table.add_row(words, *(f"{value:.4f}" for value in differences(graph).values()))
-        Console().print(table)
+        plain_console().print(table)
 
 
 if __name__ == "__main__":

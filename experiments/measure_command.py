@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 from rich.table import Table
 
+from .console import plain_console
 from .mapped import MappedCorners, read_corners
 from .measurements import Measured
 from .scenario import UsageError
@@ -51,7 +51,7 @@ def _corner(name: str, mapped: MappedCorners, folder: Path) -> int:
 
 
 def _list(mapped: MappedCorners, folder: Path) -> None:
-    console = Console(width=None)
+    console = plain_console(width=None)
     corners = Table(title=f"corners of {folder}{_estimator(folder)}", title_justify="left")
     for title in ("corner", "x m", "y m", "sigma mm", "walls", "chain"):
         corners.add_column(title, justify="right")

@@ -9,7 +9,6 @@ from resource import getpagesize
 
 import numpy as np
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from slam.backend import Backend, Observations
@@ -17,6 +16,7 @@ from slam.backends import BACKENDS
 from slam.geometry.lines import directions, normals
 from slam.robot import Odometry
 
+from .console import plain_console
 from .scenario import UsageError, choose
 
 SEEN = 10
@@ -48,7 +48,7 @@ class Study:
             with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as pool:
                 grown = [pool.submit(megabytes, name, *kind).result() for kind in kinds]
             table.add_row(name, *(f"{mb:.1f}" for mb in grown))
-        Console(width=max(Console().width, 120)).print(table)
+        plain_console(width=max(plain_console().width, 120)).print(table)
 
 
 def megabytes(name: str, lines: int, steps: int) -> float:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import tyro
 from jaxtyping import Float
-from rich.console import Console
 from rich.table import Table
 
 from slam.backend import Backend
@@ -21,6 +20,7 @@ from slam.backends.invariant_ekf import InvariantEkf
 from slam.backends.relocation_ekf import RelocationEkf
 from slam.geometry.lines import normals
 
+from .console import plain_console
 from .corridor import Loop, drive
 from .scenario import P0, P0_SIGMAS, choose
 from .sightings import Sightings, ride, start
@@ -57,7 +57,7 @@ class Study:
                 here, there, apart = sound[:, 0].mean(), sound[:, 1].mean(), sound[:, 2].max()
                 row = f"{here:.3f}", f"{there:.3f}", f"{apart:.2g} m", str(len(found) - len(sound))
                 table.add_row(kind.__name__, anchor, *row)
-        Console(width=max(Console().width, 90)).print(table)
+        plain_console(width=max(plain_console().width, 90)).print(table)
 
     def ridden(self, kind: type[Any], at_wall: bool, seed: int) -> tuple[float, float, float]:
         """Return the pose ANEES here and there and how far apart the paths are, m; NaN where one breaks down."""

@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from explore.step import Step
+
+from .console import plain_console
 
 
 @contextmanager
@@ -17,10 +18,10 @@ def progress(title: str) -> Iterator[Callable[[Step], None]]:
 
     The bar is the share of walls in closed chains: it may fall when something new comes into sight.
     """
-    console = Console(stderr=True)
+    console = plain_console(stderr=True)
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TextColumn("{task.fields[words]}"),
         TimeElapsedColumn(),
@@ -50,7 +51,7 @@ def print_summary(summary: dict[str, Any]) -> None:
     table.add_column("value", justify="right", overflow="fold")
     for name, value in _rows(summary):
         table.add_row(name, value)
-    Console().print(table)
+    plain_console().print(table)
 
 
 def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -122,7 +123,7 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
         table.add_column(title_of_column, justify="right")
     for summary in summaries:
         table.add_row(summary["backend"], *(_short(summary[key]) for key in columns.values()))
-    Console().print(table)
+    plain_console().print(table)
 
 
 def _short(value: Any) -> str:

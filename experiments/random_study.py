@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import tyro
-from rich.console import Console
 
+from .console import plain_console
 from .rows import rows_of
 from .scenario import TrialConfig, UsageError
 from .suite import table
@@ -78,7 +78,7 @@ def main() -> int:
     for row in sorted(rows, key=lambda row: int(row["file"].partition(":")[2])):
         if faults(row):
             print(f"{row['file']}: {'; '.join(faults(row))}")
-    Console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=False))
+    plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=False))
     paths = np.array([row["path_length_m"] for row in rows if row.get("path_length_m") is not None])
     clean = sum(not faults(row) for row in rows)
     print(f"{clean} of {len(rows)} clean, median path {np.median(paths):.0f} m; rows in {study.out}")

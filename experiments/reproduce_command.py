@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from viz.figures import saved
 
+from .console import plain_console
 from .explore_command import prepare
 from .files import json_bytes, write
 from .reproductions import REPRODUCTIONS, Reproduction
@@ -37,7 +37,7 @@ class Reproduce:
         if not 0 <= self.seed < SEED_LARGEST:
             raise UsageError(f"expected a seed from 0 to 2^32 - 1, found {self.seed}: choose another")
         prepare(self.out)
-        console = Console(width=max(Console().width, 130))
+        console = plain_console(width=max(plain_console().width, 130))
         for name in names:
             began = time.perf_counter()
             with console.status(f"{name}: {REPRODUCTIONS[name].about}"):

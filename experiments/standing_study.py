@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import tyro
 from jaxtyping import Float
-from rich.console import Console
 from rich.table import Table
 
 from slam.backend import Observations
@@ -17,6 +16,7 @@ from slam.backends import BACKENDS
 from slam.geometry.lines import through
 from slam.geometry.poses import J
 
+from .console import plain_console
 from .corridor import look, on_ring, ring
 from .scenario import P0, P0_SIGMAS, UsageError, choose
 from .sightings import start
@@ -52,7 +52,7 @@ class Study:
                 trace, bound = stand(name, p0, self.looks, self.seed)
                 cells = [f"{trace[mark - 1]:.4g}" for mark in marks]
                 table.add_row(name, *cells, f"{slope(trace):.3f}", f"{bound.min():.1e}")
-            Console(width=max(Console().width, 100)).print(table)
+            plain_console(width=max(plain_console().width, 100)).print(table)
         print("slope: of the trace over the number of looks, log-log, from the tenth on; last column: least eigenvalue")
         print("at any look, over the trace of P0, with A at the estimate")
 

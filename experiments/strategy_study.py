@@ -23,6 +23,7 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.geometry.poses import to_world
 
+from .console import plain_console
 from .coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
 from .records import Log
 from .scenario import Scenario, TrialConfig, build, check
@@ -132,7 +133,7 @@ class Study:
         self.out.parent.mkdir(parents=True, exist_ok=True)
         for row in self._rows(trials):
             append(self.out, row)
-        print_report(pd.read_csv(self.out), Console(width=160))
+        print_report(pd.read_csv(self.out), plain_console(width=160))
 
     def _rows(self, trials: list[TrialConfig]) -> Iterator[dict[str, Any]]:
         if self.jobs <= 1:

@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float
-from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from .console import plain_console
 from .files import csv_bytes, write
 from .scenario import UsageError
 
@@ -37,7 +37,7 @@ def fill(
     path.parent.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(jobs) as pool:
         done = pool.map(run, missing)
-        for found in track(done, "running", len(missing), console=Console(stderr=True)):
+        for found in track(done, "running", len(missing), console=plain_console(stderr=True)):
             rows |= found
             cells = [(*key, *scores) for key, scores in sorted(rows.items())]
             write(path, csv_bytes((*columns[0], *columns[1]), cells))
@@ -70,7 +70,7 @@ def show(title: str, runs: Mapping[str, Float[np.ndarray, "r c"]], scores: Seque
         sound = values[np.isfinite(values).all(axis=1)]
         cells = [_summary(column) for column in sound.T] if len(sound) else ["-"] * len(scores)
         table.add_row(name, *cells, str(len(values) - len(sound)))
-    Console(width=max(Console().width, 140)).print(table)
+    plain_console(width=max(plain_console().width, 140)).print(table)
 
 
 def _summary(values: Float[np.ndarray, " n"]) -> str:

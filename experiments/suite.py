@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from sim.worlds import WORLDS
 
+from .console import plain_console
 from .rows import rows_of
 from .scenario import P0, TrialConfig, UsageError
 
@@ -117,7 +117,7 @@ def _mean(rows: list[dict[str, Any]], key: str, digits: int) -> str:
 def main() -> int:
     """Run the suite that the command line names and return the exit status."""
     suite = tyro.cli(Suite, prog="experiments.suite")
-    console = Console(width=200 if not sys.stdout.isatty() else None)
+    console = plain_console(width=200 if not sys.stdout.isatty() else None)
     try:
         trials = suite.trials()
         rows = []

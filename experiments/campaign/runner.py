@@ -9,9 +9,9 @@ from typing import Any
 
 from joblib import Parallel, delayed
 from joblib.externals.loky.process_executor import TerminatedWorkerError
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ..console import plain_console
 from ..scenario import UsageError
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
@@ -54,7 +54,7 @@ def run_campaign(store: Store, executor: Executor) -> Tally:
         TextColumn("{task.description}"), BarColumn(bar_width=32), MofNCompleteColumn(), TimeElapsedColumn(),
         TextColumn("left"), TimeRemainingColumn(),
     )  # fmt: skip
-    console = Console(stderr=True)
+    console = plain_console(stderr=True)
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         total = len(drives) + len(rest)
         task = bar.add_task("trials", total=total)

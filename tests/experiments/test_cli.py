@@ -55,6 +55,13 @@ def test_explore_leaves_its_folder_and_one_table(capsys, tmp_path):
     assert {"summary.json", "map.png", "log.npz"} <= {path.name for path in (tmp_path / "run").iterdir()}
 
 
+def test_a_world_is_called_by_its_name_though_that_is_an_emoji(capsys, tmp_path):
+    assert main(["explore", "random:1234", "--max-steps", "2", "--out", str(tmp_path / "[/run]")]) == 0
+    said = capsys.readouterr().out
+    assert "random:1234: full-ekf" in said
+    assert "[/run]" in said
+
+
 def test_help_ends_in_zero(capsys):
     with pytest.raises(SystemExit) as leaving:
         main(["explore", "--help"])
