@@ -45,7 +45,7 @@ def bends_within(
     offset = points[:, None] - segments.ends[None, :, 0]
     along = np.vecdot(offset, directions(segments.lines[:, 0]))
     across = np.vecdot(offset, normals(segments.lines[:, 0]))
-    length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=-1)
+    length = segments.lengths_m
     on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
     on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
     passed = on.any(axis=1)

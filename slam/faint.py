@@ -134,5 +134,5 @@ def _sightings(pose_world: Float[np.ndarray, "3"], segments: Segments) -> _Sight
         to_world(centres, pose_world),
         var_alpha,
         segments.cov[:, 1, 1] - covariance**2 / var_alpha,
-        0.5 * np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T),
+        0.5 * segments.lengths_m,
     )

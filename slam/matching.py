@@ -175,7 +175,7 @@ def _gaps(
 
 def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -> np.ndarray:
     """Which candidates are short segments lying along a wall, however badly their direction is known."""
-    length = np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T)[found.segment]
+    length = segments.lengths_m[found.segment]
     turn = config.beside_rad + 3.0 * np.sqrt(segments.cov[found.segment, 0, 0])
     return (
         (length < config.short_m)

@@ -48,6 +48,11 @@ class Segments:
         """Which segments have fewer than `MIN_BEAMS` beams, shape (n,)."""
         return self.beam_counts < MIN_BEAMS
 
+    @property
+    def lengths_m(self) -> Float[np.ndarray, " n"]:
+        """How long each seen piece is."""
+        return np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T)
+
     def take(self, index: np.ndarray) -> "Segments":
         """Return the chosen segments (integer or boolean index), in the order asked for."""
         return Segments(

@@ -38,10 +38,10 @@ def scans(faces, poses, rng):
         )
 
 
-def sighting(alpha, sigma_rad, beams=6, chi2=None):
+def sighting(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
     """Return one segment with a direction and how well it is known."""
     cov = np.diag([sigma_rad**2, 1e-5])[None]
-    ends, none = np.zeros((1, 2, 2)), np.zeros((1, 2), dtype=int)
+    ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
     chi2 = beams - 2.0 if chi2 is None else chi2
     return Segments(np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none, np.array([chi2]))
 
@@ -159,5 +159,19 @@ def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction(
     assert not firmness.may_move(sighting(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
     for _ in range(300):
         firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, 0.0)
-    assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing moves the estimate"
+    assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
     assert not firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).any()
+
+
+def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
+    """Refused, the only wall in sight cost 8 degrees of heading in 3.5 m; its bend is one."""
+    firmness, straight = Firmness(), 1
+    for _ in range(60):
+        firmness.see(sighting(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, 0.0)
+        firmness.see(sighting(0.0, 0.02, beams=8), np.array([straight]), 0.0)
+    assert firmness.are_crooked(np.array([0, straight])).tolist() == [True, False]
+    long, short = (sighting(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
+    assert firmness.may_move(long, OWNER).tolist() == [True]
+    assert firmness.may_move(short, OWNER).tolist() == [False]
+    both = long.take(np.array([0, 0]))
+    assert firmness.may_move(both, np.array([0, straight])).tolist() == [False, True]
