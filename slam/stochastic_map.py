@@ -22,8 +22,8 @@ class StochasticMap:
     tentative: Bool[np.ndarray, " n"]
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
-    """Walls whose beams, over many scans, do not lie on a line (`firmness`): matched and chained, but they hardly move an
-    estimate, and what is stated of them is not to be believed."""
+    """Walls whose beams, over many scans, do not lie on a line (`firmness`): matched and chained, but they move no
+    estimate that another wall can move, and what is stated of them is not to be believed."""
 
     def __len__(self) -> int:
         return len(self.extents)
