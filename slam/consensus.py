@@ -38,35 +38,67 @@ def agree(
 ) -> Consensus:
     """Return the candidates (pairs of `segment` and `line`, seen together) that the best hypothesis keeps.
 
-    Each candidate within the level of doubt is the seed of a hypothesis, which costs its squared distance, and for each
-    segment that of its best candidate given the seed, or the level of doubt where that is beyond the gate: what lies
-    along a wall is hardly ever another. The cheapest wins; a seed beyond the gate only if another segment agrees, or if
-    it is likelier so than a wall that nobody has seen, of which there are `density` per rad m.
+    Each candidate within the level of doubt is the seed of a hypothesis: with it, for each segment, goes its best
+    candidate within the gate given the seed, less those that contradict the others. A hypothesis costs the squared
+    distance of its pairs taken together, and the level of doubt for each segment without one: what lies along a wall
+    is hardly ever another. The cheapest wins; a lone pair beyond the gate only if it is likelier so than a wall that
+    nobody has seen, of which there are `density` per rad m.
     """
     level, unmatched = gate_level(gate, 2), gate_level(doubt, 2)
     segments, column = np.unique(segment, return_inverse=True)
     own = _own_distances(seen)
     seeds = np.flatnonzero(may_seed & (own <= unmatched))
+    if not len(seeds):
+        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
     given = _distances(seen, seeds)
     given[segment[None, :] == segment[seeds][:, None]] = np.inf  # a segment is one sighting
     given[np.arange(len(seeds)), seeds] = 0.0
-    best = np.full((len(seeds), len(segments)), unmatched)
+    best = np.full((len(seeds), len(segments)), level)
     choice = np.full((len(seeds), len(segments)), _UNMATCHED)
     for c, k in enumerate(column):
-        nearer = (given[:, c] <= level) & (given[:, c] < best[:, k])
+        nearer = given[:, c] <= best[:, k]
         best[nearer, k] = given[nearer, c]
         choice[nearer, k] = c
-    alone = np.maximum(level, _unlike_new(seen, density)[seeds])
-    believed = (own[seeds] <= alone) | (np.count_nonzero(choice != _UNMATCHED, axis=1) > 1)
-    costs = np.where(believed, own[seeds] + best.sum(axis=1), np.inf)
-    if not believed.any():
-        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+    choice, costs = _together(seen, np.unique(choice, axis=0), unmatched)
+    alone = np.maximum(level, _unlike_new(seen, density))
+    matched = choice != _UNMATCHED
+    first = choice[np.arange(len(choice)), np.argmax(matched, axis=1)]
+    costs[(np.count_nonzero(matched, axis=1) == 1) & (own[first] > alone[first])] = np.inf
     winner = int(np.argmin(costs))
-    walls = np.where(choice == _UNMATCHED, _UNMATCHED, line[choice])
-    other = (walls != walls[winner]) & (walls != _UNMATCHED)
+    if not np.isfinite(costs[winner]):
+        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+    walls = np.where(matched, line[choice], _UNMATCHED)
+    other = (walls != walls[winner]) & matched
     margins = np.where(other, costs[:, None], np.inf).min(axis=0) - costs[winner]
-    matched = choice[winner] != _UNMATCHED
-    return Consensus(choice[winner, matched], margins[matched])
+    return Consensus(choice[winner, matched[winner]], margins[matched[winner]])
+
+
+def _together(
+    seen: JointSightings, choice: Int[np.ndarray, "h k"], unmatched: float
+) -> tuple[Int[np.ndarray, "h k"], Float[np.ndarray, " h"]]:
+    """Return what is left of each hypothesis, and its cost.
+
+    A pair that costs more, given all others of its hypothesis, than a segment without one is dropped, the worst first.
+    """
+    choice, (hypotheses, count) = choice.copy(), choice.shape
+    e, S = seen.e.reshape(-1, 2), seen.S.reshape(len(seen.e) // 2, 2, -1, 2)
+    each = np.arange(count)
+    while True:
+        kept = choice != _UNMATCHED
+        both = kept[:, :, None, None, None] & kept[:, None, :, None, None]
+        blocks = np.where(both, S[choice[:, :, None], :, choice[:, None, :], :], 0.0)
+        blocks[:, each, each] += ~kept[:, :, None, None] * np.eye(2)
+        inverse = np.linalg.inv(blocks.transpose(0, 1, 3, 2, 4).reshape(hypotheses, 2 * count, 2 * count))
+        left = (e[choice] * kept[..., None]).reshape(hypotheses, 2 * count)
+        weighted = (inverse @ left[..., None])[..., 0]
+        # What the sum of squares loses when one pair is left out is its own, given all others.
+        own = inverse.reshape(hypotheses, count, 2, count, 2)[:, each, :, each].swapaxes(0, 1)
+        losses = _squares(weighted.reshape(hypotheses, count, 2), own)
+        worst = np.argmax(losses, axis=1)
+        wrong = losses[np.arange(hypotheses), worst] > unmatched
+        if not wrong.any():
+            return choice, np.vecdot(left, weighted) + unmatched * np.count_nonzero(~kept, axis=1)
+        choice[wrong, worst[wrong]] = _UNMATCHED
 
 
 def nearest_alone(

@@ -37,21 +37,36 @@ def likelihood(seen, c):
     return multivariate_normal(np.zeros(2), one.S).pdf(one.e)
 
 
+def together(seen, pairs):
+    """Return the squared distance of some sightings taken together."""
+    some = seen.take(np.array(pairs, dtype=np.int64))
+    return some.e @ np.linalg.solve(some.S, some.e)
+
+
 def hypotheses(segment, seen, seeds, gate, doubt, density):
     """Return cost and choice (candidate by segment) of each hypothesis that may win, one candidate at a time."""
     found = []
     for seed in seeds:
-        one = seen.take(np.array([seed]))
-        own, choice = one.e @ np.linalg.solve(one.S, one.e), {segment[seed]: seed}
-        cost = own
+        if together(seen, [seed]) > doubt:
+            continue
+        choice = {segment[seed]: seed}
         for s in set(segment.tolist()) - {segment[seed]}:
             costs = {c: conditioned(seen, c, seed) for c in np.flatnonzero(segment == s)}
             best = min(costs, key=costs.get)
-            cost += costs[best] if costs[best] <= gate else doubt
             if costs[best] <= gate:
                 choice[s] = best
-        if own <= gate or (own <= doubt and (len(choice) > 1 or likelihood(seen, seed) > density)):
-            found.append((cost, choice))
+        while len(choice) > 1:
+            pairs = list(choice.values())
+            without = {s: together(seen, [c for c in pairs if c != own]) for s, own in choice.items()}
+            worst = min(without, key=without.get)
+            if together(seen, pairs) - without[worst] <= doubt:
+                break
+            del choice[worst]
+        pairs = list(choice.values())
+        own = together(seen, pairs[:1])
+        if len(pairs) > 1 or own <= gate or likelihood(seen, pairs[0]) > density:
+            missing = len(set(segment.tolist())) - len(pairs)
+            found.append((together(seen, pairs) + doubt * missing, choice))
     return found
 
 
