@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from .coast import look_outs_on_coast, on_coast, tiles
 from .goal import LeftPlace
 from .spots import Spots
 from .strategies import Choice, Place, Situation
-from .strategies.nearest import nearest_unexplained, nearest_unseen
+from .strategies.nearest import nearest_seen_from, nearest_unexplained, nearest_unseen
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,8 @@ class SweepConfig:
     """A border of unseen floor, or a thing that is no wall, that is still one after so many visits is left."""
     near_m: float = 0.3
     """Borders whose middles lie this near to each other are one."""
+    reach: float = 0.8
+    """Unseen floor in a hall is looked at from within this share of the scanner's range."""
 
 
 class Sweep:
@@ -28,6 +32,7 @@ class Sweep:
         """Without `is_on`, only look for a first wall."""
         self._config, self._is_on = config, is_on
         self._visited = Spots(config.near_m)
+        self._looked_at = Spots(config.near_m)
         self._left: list[LeftPlace] = []
 
     @property
@@ -41,14 +46,42 @@ class Sweep:
 
     def ended(self, place: Place, trouble: str) -> None:
         """Take note that the visit of a place ended, and what was in the way, if anything."""
+        if _is_seen_from_afar(place):
+            self._looked_at.add(place.centre_world)
+            return
         self._visited.add(place.centre_world)
         self._left.append(LeftPlace(place.centre_world, trouble))
 
     def choose(self, situation: Situation) -> Choice | None:
-        """Go to the nearest floor that borders on unseen floor; when none is left, to what is no wall of the map."""
+        """Go to the nearest floor that borders on unseen floor; when none is left, to what is no wall of the map.
+
+        Floor out of sight of the walls is looked at from where there are some in sight first.
+        """
         if not len(situation.map):
             return nearest_unseen(situation, "no wall is in sight yet")
         if not self._is_on:
             return None
-        unseen = nearest_unseen(situation, "every chain is done, unseen floor is left")
+        why = "every chain is done, unseen floor is left"
+        unseen = nearest_seen_from(situation, self._beside_walls(situation), why) or nearest_unseen(situation, why)
         return unseen or nearest_unexplained(situation, "every chain is done, things stand that are no wall of the map")
+
+    def _beside_walls(self, situation: Situation) -> list[tuple[Place, Place]]:
+        """Return where to go with walls in sight, and what unseen floor is seen from there."""
+        floor, coast_m = situation.around.free_space, situation.paths.coast_m
+        reach_m = self._config.reach * situation.around.scan.range_max_m
+        found = []
+        for place in situation.unseen:
+            if np.all(on_coast(place.points_world, situation.map, coast_m)):
+                found.append((place, place))
+                continue
+            for tile in tiles(place.points_world):
+                if self._looked_at.count(tile.mean(axis=0)):
+                    continue
+                spots = look_outs_on_coast(tile, situation.map, coast_m, reach_m, floor, situation.field)
+                if len(spots):
+                    found.append((Place(spots, place.what, place.kind, tile.mean(axis=0)), Place(tile, place.what)))
+        return found
+
+
+def _is_seen_from_afar(place: Place) -> bool:
+    return place.kind == "unseen" and place.about_world is not None

@@ -42,6 +42,17 @@ def nearest_unseen(situation: Situation, what: str) -> Choice | None:
     return _nearest(situation, situation.unseen, f"{what}: nearest of {{}} borders of seen floor", _still_unseen)
 
 
+def nearest_seen_from(situation: Situation, places: Sequence[tuple[Place, Place]], what: str) -> Choice | None:
+    """Return the nearest first of each pair, as a goal for as long as half of the second borders on unseen floor."""
+    found = nearest_place(situation, [stand for stand, _ in places])
+    if found is None:
+        return None
+    stand, metres = found
+    seen = next(seen for candidate, seen in places if candidate is stand)
+    words = f"{what}: in sight of walls, nearest of {len(places)}, {metres:.1f} m to drive"
+    return Choice(stand, words, _still_unseen(seen))
+
+
 def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
     """Return the nearest thing that is no wall of the map, as a goal until a wall stands there."""
     return _nearest(situation, situation.unexplained, f"{what}: nearest of {{}}", _still_unexplained)
