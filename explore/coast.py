@@ -18,9 +18,7 @@ NEARLY_M = 0.3
 """Of the places that see a piece of border, those not farther from it than the nearest and this much."""
 
 
-def on_coast(
-    points_world: Float[np.ndarray, "n 2"], walls: StochasticMap, coast_m: float
-) -> Bool[np.ndarray, " n"]:
+def on_coast(points_world: Float[np.ndarray, "n 2"], walls: StochasticMap, coast_m: float) -> Bool[np.ndarray, " n"]:
     """Return which points lie within `coast_m` of a trusted wall of the map."""
     trusted = walls.ends_world[~walls.tentative]
     if not len(trusted):
@@ -43,7 +41,7 @@ def look_outs_on_coast(
     free_space: FreeSpace,
     field: DrivingField,
 ) -> Float[np.ndarray, "m 2"]:
-    """Return where the robot can stand within `coast_m` of a wall to see a piece of border `reach_m` away at most, m."""
+    """Return where the robot can stand within `coast_m` of a wall to see a piece of border within `reach_m`, m."""
     angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     metres = reach_m * np.arange(1, DISTANCES + 1) / DISTANCES
     middle = border_world.mean(axis=0)

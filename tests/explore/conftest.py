@@ -105,6 +105,20 @@ def scene_of():
 
 
 @pytest.fixture(scope="session")
+def hall():
+    """Return a hall of 16 m without anything in it, seen along its walls only."""
+    side = 16.0
+    corners = np.array([[0, 0], [side, 0], [side, side], [0, side]])
+    faces = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    share = np.arange(0.0, 1.0, 0.05)[:, None]
+    inner = 0.5 + (side - 1.0) / side * faces
+    places = np.concatenate([tail + share * (head - tail) for tail, head in inner])
+    scene = Scene(shapely.box(0, 0, side, side), faces, FreeSpace(), places)
+    look_from(scene, places)
+    return scene
+
+
+@pytest.fixture(scope="session")
 def look():
     """Return the function that lets the robot look around in a scene."""
     return look_from
