@@ -11,6 +11,8 @@ from .blocks import BLOCK, blocks_with_any
 from .free_space import FreeSpace
 from .paths import PathConfig, passable, roomy
 
+DIRECTIONS = 16
+"""Places on a ring."""
 NEAR_M = 8.0
 """The search goes so far first; most of what is asked for is nearer, and a whole building costs far more."""
 
@@ -58,6 +60,16 @@ class DrivingField:
         free, clearance = self._free_space.evidence[at] < 0, self._free_space.clearance()[at]
         block = cells // BLOCK - self._far.first_block + 1
         return roomy(free, clearance, self._config) & np.isfinite(self._far.metres[tuple(block.T)])
+
+    def stands_around(
+        self, places_world: Float[np.ndarray, "n 2"], metres: Float[np.ndarray, " k"]
+    ) -> Float[np.ndarray, "m 2"]:
+        """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`."""
+        angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        around = (metres[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
+        stands = (places_world[:, None] + around).reshape(-1, 2)
+        stands = stands[self._free_space.inside(self._free_space.cells(stands))]
+        return stands[self.can_stay(self._free_space.cells(stands))]
 
     @cached_property
     def _near(self) -> _Reach:

@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from .coast import look_outs_on_coast, on_coast, tiles
+from .coast import look_outs_on_coast, tiles
 from .goal import LeftPlace
 from .spots import Spots
 from .strategies import Choice, Place, Situation
 from .strategies.nearest import nearest_seen_from, nearest_unexplained, nearest_unseen
+from .trusted_walls import TrustedWalls
 
 
 @dataclass(frozen=True)
@@ -65,21 +66,22 @@ class Sweep:
         unseen = nearest_seen_from(situation, self._beside_walls(situation), why) or nearest_unseen(situation, why)
         return unseen or nearest_unexplained(situation, "every chain is done, things stand that are no wall of the map")
 
-    def _beside_walls(self, situation: Situation) -> list[tuple[Place, Place]]:
-        """Return where to go with walls in sight, and what unseen floor is seen from there."""
+    def _beside_walls(self, situation: Situation) -> dict[Place, Place]:
+        """Return where to go with walls in sight, each with the unseen floor that is seen from there."""
         floor, coast_m = situation.around.free_space, situation.paths.coast_m
         reach_m = self._config.reach * situation.around.scan.range_max_m
-        found = []
+        walls, found = TrustedWalls(situation.map), {}
         for place in situation.unseen:
-            if np.all(on_coast(place.points_world, situation.map, coast_m)):
-                found.append((place, place))
+            if np.all(walls.near(place.points_world, coast_m)):
+                found[place] = place
                 continue
             for tile in tiles(place.points_world):
-                if self._looked_at.count(tile.mean(axis=0)):
+                middle = tile.mean(axis=0)
+                if self._looked_at.count(middle):
                     continue
-                spots = look_outs_on_coast(tile, situation.map, coast_m, reach_m, floor, situation.field)
+                spots = look_outs_on_coast(middle, walls, coast_m, reach_m, floor, situation.field)
                 if len(spots):
-                    found.append((Place(spots, place.what, place.kind, tile.mean(axis=0)), Place(tile, place.what)))
+                    found[Place(spots, place.what, place.kind, middle)] = Place(tile, place.what)
         return found
 
 

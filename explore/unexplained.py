@@ -1,15 +1,14 @@
 """What stopped beams and is no wall of the map: an island that showed each scan too few beams for a line."""
 
 import numpy as np
-import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from slam.geometry.lines import distance_to_segments
 from slam.stochastic_map import StochasticMap
 
 from .driving_field import DrivingField
 from .free_space import FreeSpace
+from .trusted_walls import TrustedWalls
 from .unseen import connected
 
 APART_M = 0.3
@@ -19,32 +18,21 @@ TOGETHER_CELLS = 5.0
 LEAST_CELLS = 3
 LOOK_M = (0.6, 0.9)
 """From so far away, faces of a decimetre show beams enough."""
-DIRECTIONS = 16
 
 
 def unexplained(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
     """Return what was hit and belongs to no wall of the map that is trusted, each as the cells' centres, m."""
     cells = np.argwhere(free_space.evidence > 0)
-    trusted = shapely.STRtree(shapely.linestrings(walls.ends_world[~walls.tentative]))
-    hits = shapely.points(free_space.points(cells))
-    explained = trusted.query(hits, predicate="dwithin", distance=APART_M)[0]
-    things = connected(np.delete(cells, explained, axis=0), TOGETHER_CELLS)
+    things = connected(cells[~TrustedWalls(walls).near(free_space.points(cells), APART_M)], TOGETHER_CELLS)
     return [free_space.points(thing) for thing in things if len(thing) >= LEAST_CELLS]
 
 
-def look_outs(
-    thing_world: Float[np.ndarray, "n 2"], free_space: FreeSpace, field: DrivingField
-) -> Float[np.ndarray, "m 2"]:
+def look_outs(thing_world: Float[np.ndarray, "n 2"], field: DrivingField) -> Float[np.ndarray, "m 2"]:
     """Return where the robot can stand to look at a thing from nearby, m; the thing is given as points of it."""
-    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    around = np.concatenate([d * np.stack([np.cos(angle), np.sin(angle)], axis=-1) for d in LOOK_M])
-    places = (thing_world[:, None] + around).reshape(-1, 2)
-    places = places[cKDTree(thing_world).query(places)[0] > LOOK_M[0] - 1e-6]
-    cells = free_space.cells(places)
-    places, cells = places[free_space.inside(cells)], cells[free_space.inside(cells)]
-    return places[field.can_stay(cells)]
+    places = field.stands_around(thing_world, np.array(LOOK_M))
+    return places[cKDTree(thing_world).query(places)[0] > LOOK_M[0] - 1e-6]
 
 
 def is_explained(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:
     """Return whether a trusted wall of the map stands at a place."""
-    return bool(np.any(distance_to_segments(place_world[None], walls.ends_world[~walls.tentative]) <= APART_M))
+    return bool(TrustedWalls(walls).near(place_world[None], APART_M)[0])

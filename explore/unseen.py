@@ -33,8 +33,12 @@ def connected(cells: Int[np.ndarray, "n 2"], reach_cells: float) -> list[Int[np.
         return []
     pairs = cKDTree(cells.reshape(-1, 2)).query_pairs(reach_cells, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
-    group = connected_components(links, directed=False)[1]
-    return np.split(cells[np.argsort(group, kind="stable")], np.cumsum(np.bincount(group))[:-1])
+    return in_groups(cells, connected_components(links, directed=False)[1])
+
+
+def in_groups(rows: np.ndarray, group: Int[np.ndarray, " n"]) -> list[np.ndarray]:
+    """Return the rows of each group, numbered from 0, in their order."""
+    return np.split(rows[np.argsort(group, kind="stable")], np.cumsum(np.bincount(group))[:-1])
 
 
 def borders_on_unseen(free_space: FreeSpace, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .consistency import gate_level
-from .joint_sightings import JointSightings
+from .joint_sightings import JointSightings, judged_by_the_rest, squared_distances
 
 _UNMATCHED = -1
 
@@ -25,6 +25,9 @@ class Consensus:
     margin: Float[np.ndarray, " m"]
     """By how much the best hypothesis that gives the segment to another wall costs more (in squared Mahalanobis
     distances); infinite where there is none."""
+
+
+_NONE = Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
 def agree(
@@ -49,7 +52,7 @@ def agree(
     own = _own_distances(seen)
     seeds = np.flatnonzero(may_seed & (own <= unmatched))
     if not len(seeds):
-        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return _NONE
     given = _distances(seen, seeds)
     given[segment[None, :] == segment[seeds][:, None]] = np.inf  # a segment is one sighting
     given[np.arange(len(seeds)), seeds] = 0.0
@@ -66,7 +69,7 @@ def agree(
     costs[(np.count_nonzero(matched, axis=1) == 1) & (own[first] > alone[first])] = np.inf
     winner = int(np.argmin(costs))
     if not np.isfinite(costs[winner]):
-        return Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return _NONE
     walls = np.where(matched, line[choice], _UNMATCHED)
     other = (walls != walls[winner]) & matched
     margins = np.where(other, costs[:, None], np.inf).min(axis=0) - costs[winner]
@@ -88,16 +91,13 @@ def _together(
         both = kept[:, :, None, None, None] & kept[:, None, :, None, None]
         blocks = np.where(both, S[choice[:, :, None], :, choice[:, None, :], :], 0.0)
         blocks[:, each, each] += ~kept[:, :, None, None] * np.eye(2)
-        inverse = np.linalg.inv(blocks.transpose(0, 1, 3, 2, 4).reshape(hypotheses, 2 * count, 2 * count))
+        joint = blocks.transpose(0, 1, 3, 2, 4).reshape(hypotheses, 2 * count, 2 * count)
         left = (e[choice] * kept[..., None]).reshape(hypotheses, 2 * count)
-        weighted = (inverse @ left[..., None])[..., 0]
-        # What the sum of squares loses when one pair is left out is its own, given all others.
-        own = inverse.reshape(hypotheses, count, 2, count, 2)[:, each, :, each].swapaxes(0, 1)
-        losses = _squares(weighted.reshape(hypotheses, count, 2), own)
+        squared, losses = judged_by_the_rest(left, joint)
         worst = np.argmax(losses, axis=1)
         wrong = losses[np.arange(hypotheses), worst] > unmatched
         if not wrong.any():
-            return choice, np.vecdot(left, weighted) + unmatched * np.count_nonzero(~kept, axis=1)
+            return choice, squared + unmatched * np.count_nonzero(~kept, axis=1)
         choice[wrong, worst[wrong]] = _UNMATCHED
 
 
@@ -127,7 +127,7 @@ def nearest_alone(
 
 
 def _own_distances(seen: JointSightings) -> Float[np.ndarray, " c"]:
-    return _squares(seen.e.reshape(-1, 2), _own_covariances(seen))
+    return squared_distances(seen.e.reshape(-1, 2), _own_covariances(seen))
 
 
 def _own_covariances(seen: JointSightings) -> Float[np.ndarray, "c 2 2"]:
@@ -153,10 +153,4 @@ def _distances(seen: JointSightings, seeds: Int[np.ndarray, " h"]) -> Float[np.n
     gain = cross @ np.linalg.inv(S[seeds, :, seeds, :])[:, None]
     left = S[each, :, each, :] - gain @ cross.swapaxes(2, 3)
     left[np.arange(len(seeds)), seeds] = np.eye(2)  # nothing is left of the seed itself
-    return _squares(e - (gain @ e[seeds][:, None, :, None])[..., 0], left)
-
-
-def _squares(e: Float[np.ndarray, "*n 2"], S: Float[np.ndarray, "*n 2 2"]) -> Float[np.ndarray, "*n"]:
-    det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] * S[..., 1, 0]
-    a, b = e[..., 0], e[..., 1]
-    return np.asarray((S[..., 1, 1] * a**2 - 2.0 * S[..., 0, 1] * a * b + S[..., 0, 0] * b**2) / det)
+    return squared_distances(e - (gain @ e[seeds][:, None, :, None])[..., 0], left)

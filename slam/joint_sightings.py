@@ -65,16 +65,29 @@ def compatible(seen: JointSightings, gate: float, together: float) -> Int[np.nda
     kept = np.arange(len(seen.e) // 2)
     while len(kept) > 1:
         left = seen.take(kept)
-        inverse = np.linalg.inv(left.S)
-        weighted = inverse @ left.e
-        # What the sum of squares loses when one sighting is left out is its own, given all others.
-        each = np.arange(len(kept))
-        own = inverse.reshape(len(kept), 2, len(kept), 2)[each, :, each]
-        w = weighted.reshape(-1, 2, 1)
-        losses = (w.swapaxes(1, 2) @ np.linalg.solve(own, w))[:, 0, 0]
+        squared, losses = judged_by_the_rest(left.e, left.S)
         worst = int(np.argmax(losses))
-        in_sum = left.e @ weighted <= gate_level(together, 2 * len(kept))
-        if in_sum and losses[worst] <= gate_level(gate, 2):
+        if squared <= gate_level(together, 2 * len(kept)) and losses[worst] <= gate_level(gate, 2):
             break
         kept = np.delete(kept, worst)
     return kept
+
+
+def judged_by_the_rest(
+    e: Float[np.ndarray, "*h k"], S: Float[np.ndarray, "*h k k"]
+) -> tuple[Float[np.ndarray, "*h"], Float[np.ndarray, "*h m"]]:
+    """Return the squared distance of m sightings taken together, k = 2 m, and that of each given all others."""
+    inverse = np.linalg.inv(S)
+    weighted = (inverse @ e[..., None])[..., 0]
+    *h, k = e.shape
+    own = np.diagonal(inverse.reshape(*h, k // 2, 2, k // 2, 2), axis1=-4, axis2=-2)
+    # What the sum of squares loses when one sighting is left out is its own, given all others.
+    losses = squared_distances(weighted.reshape(*h, k // 2, 2), np.moveaxis(own, -1, -3))
+    return np.asarray(np.vecdot(e, weighted)), losses
+
+
+def squared_distances(e: Float[np.ndarray, "*n 2"], S: Float[np.ndarray, "*n 2 2"]) -> Float[np.ndarray, "*n"]:
+    """Return the squared Mahalanobis distance of each two-vector, e' S^-1 e."""
+    det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] * S[..., 1, 0]
+    a, b = e[..., 0], e[..., 1]
+    return np.asarray((S[..., 1, 1] * a**2 - 2.0 * S[..., 0, 1] * a * b + S[..., 0, 0] * b**2) / det)

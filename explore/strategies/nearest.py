@@ -1,6 +1,6 @@
 """What several strategies share: the nearest of some open ends, of some places."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -42,15 +42,10 @@ def nearest_unseen(situation: Situation, what: str) -> Choice | None:
     return _nearest(situation, situation.unseen, f"{what}: nearest of {{}} borders of seen floor", _still_unseen)
 
 
-def nearest_seen_from(situation: Situation, places: Sequence[tuple[Place, Place]], what: str) -> Choice | None:
-    """Return the nearest first of each pair, as a goal for as long as half of the second borders on unseen floor."""
-    found = nearest_place(situation, [stand for stand, _ in places])
-    if found is None:
-        return None
-    stand, metres = found
-    seen = next(seen for candidate, seen in places if candidate is stand)
-    words = f"{what}: in sight of walls, nearest of {len(places)}, {metres:.1f} m to drive"
-    return Choice(stand, words, _still_unseen(seen))
+def nearest_seen_from(situation: Situation, seen: Mapping[Place, Place], what: str) -> Choice | None:
+    """Return the nearest place from which another is seen, as a goal while half of that borders on unseen floor."""
+    words = f"{what}: in sight of walls, nearest of {{}}"
+    return _nearest(situation, list(seen), words, lambda stand: _still_unseen(seen[stand]))
 
 
 def nearest_unexplained(situation: Situation, what: str) -> Choice | None:

@@ -101,7 +101,7 @@ class Situation:
         """Where to stand before each thing that stopped beams and is no wall of the map, the useless ones left out."""
         floor = self.around.free_space
         things = [thing for thing in unexplained(floor, self.map) if not self.was_in_vain(thing.mean(axis=0))]
-        places = [(look_outs(thing, floor, self.field), thing) for thing in things]
+        places = [(look_outs(thing, self.field), thing) for thing in things]
         what = "something stands that is no wall of the map"
         return tuple(Place(spots, what, "unexplained", thing.mean(axis=0)) for spots, thing in places if len(spots))
 

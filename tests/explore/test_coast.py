@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from explore.coast import TILE_M, look_outs_on_coast, on_coast, tiles
+from explore.coast import TILE_M, look_outs_on_coast, tiles
 from explore.driving_field import DrivingField
 from explore.mission import MissionConfig, explore_mission
 from explore.strategies import STRATEGIES
 from explore.sweep import Sweep, SweepConfig
+from explore.trusted_walls import TrustedWalls
 from explore.unseen import unseen_borders
 from sim.robot import SimulatedRobot
 from sim.worlds import World
@@ -29,21 +30,21 @@ def test_a_border_is_cut_into_squares_and_nothing_is_lost():
 
 def test_the_places_have_walls_near_see_the_floor_and_can_be_driven_to(hall):
     start, pose = hall.places[0], np.append(hall.places[0], 0.0)
-    walls = hall.walls(pose)
+    walls = TrustedWalls(hall.walls(pose))
     field = DrivingField(hall.grid, start, hall.situation(pose, []).paths)
     count = 0
     for border in unseen_borders(hall.grid, field):
-        assert not on_coast(border, walls, COAST_M).any(), "from beside the walls all floor near them was seen"
+        assert not walls.near(border, COAST_M).any(), "from beside the walls all floor near them was seen"
         for tile in tiles(border):
-            places = look_outs_on_coast(tile, walls, COAST_M, REACH_M, hall.grid, field)
+            places = look_outs_on_coast(tile.mean(axis=0), walls, COAST_M, REACH_M, hall.grid, field)
             count += len(places)
             assert len(places), "every piece of this border shows from the coast"
             assert np.all(distance_to_segments(places, hall.faces).min(axis=1) <= COAST_M)
             assert np.all(np.hypot(*(places - tile.mean(axis=0)).T) <= REACH_M + 1e-9)
             assert np.all(np.isfinite(field.metres(places)))
     assert count > 20
-    nobody = replace(walls, tentative=np.ones(len(walls), dtype=bool))
-    assert not on_coast(hall.places, nobody, COAST_M).any(), "a wall seen once is no coast"
+    tentative = replace(hall.walls(pose), tentative=np.ones(len(hall.faces), dtype=bool))
+    assert not TrustedWalls(tentative).near(hall.places, COAST_M).any(), "a wall seen once is no coast"
 
 
 def test_looks_from_the_coast_come_first_and_each_once_then_visits_and_then_an_end(hall):
@@ -55,7 +56,7 @@ def test_looks_from_the_coast_come_first_and_each_once_then_visits_and_then_an_e
         if choice is None:
             break
         assert choice.target.kind == "unseen"
-        on_the_coast.append(on_coast(choice.target.points_world, hall.walls(pose), COAST_M).all())
+        on_the_coast.append(TrustedWalls(hall.walls(pose)).near(choice.target.points_world, COAST_M).all())
         sweep.ended(choice.target, "")
         assert len(on_the_coast) < 200
     first_visit = on_the_coast.index(False)

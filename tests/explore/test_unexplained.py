@@ -44,7 +44,7 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
     situation = some.situation(pose, [])
     field = DrivingField(some.grid, pose[:2], situation.paths)
     (thing, *_) = unexplained(some.grid, some.walls(pose))
-    places = look_outs(thing, some.grid, field)
+    places = look_outs(thing, field)
     assert len(places)
     assert np.all(np.isfinite(field.metres(places)))
     nearest = np.hypot(*np.moveaxis(places[:, None] - thing, -1, 0)).min(axis=1)
