@@ -20,11 +20,13 @@ CAMPAIGN = Campaign(
     arms=("closed", "replay-true"), max_steps=6,
 )  # fmt: skip
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
-WITNESS = """<script>
-const wrong = []; addEventListener("error", e => wrong.push(String(e.message || e.target.src)), true);
-addEventListener("load", () => { document.title = JSON.stringify({ wrong,
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine: apt-get install chromium")
+WITNESS = """<meta http-equiv="Content-Security-Policy" content="default-src data: 'unsafe-inline'"><script>
+const wrong = [], fetched = [];
+addEventListener("error", e => wrong.push(String(e.message || e.target.src)), true);
+addEventListener("securitypolicyviolation", e => fetched.push(e.blockedURI));
+addEventListener("load", () => { document.title = JSON.stringify({ wrong, fetched,
   pictures: document.images.length, shown: [...document.images].filter(i => i.complete && i.naturalWidth > 0).length,
-  fetched: performance.getEntriesByType("resource").map(r => r.name).filter(n => !n.startsWith("data:")),
   wide: document.documentElement.scrollWidth - innerWidth,
   cut: [...document.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth + 1).length }); });
 </script>"""
@@ -89,20 +91,53 @@ def test_the_tables_are_there_as_latex(folder):
     assert not re.findall(r"(?<!\\)[%_#]", tables)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine: apt-get install chromium")
-@pytest.mark.parametrize("width", [390, 1000])
-def test_a_browser_shows_all_pictures_and_finds_no_error(folder, tmp_path, width):
-    copy = tmp_path / "report.html"
-    copy.write_text((folder / "report.html").read_text().replace("<head>", "<head>" + WITNESS))
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
+def seen_in_a_browser(page, folder, width):
+    """Return what the witness saw of a page, and whether the browser's console said something."""
+    copy = folder / "report.html"
+    copy.write_text(page.replace("<head>", "<head>" + WITNESS))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}", "--dump-dom"]
     command = [BROWSER, *flags, f"--window-size={width},900", f"file://{copy}"]
     seen = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    told = json.loads(re.search(r"<title>(.*?)</title>", seen.stdout).group(1))
-    assert told["wrong"] == told["fetched"] == []
-    assert told["shown"] == told["pictures"] >= 4
-    assert told["wide"] <= 0
-    assert told["cut"] == 0
-    assert "CONSOLE" not in seen.stderr
+    return json.loads(re.search(r"<title>(.*?)</title>", seen.stdout).group(1)), "CONSOLE" in seen.stderr
+
+
+def faults(told):
+    """Return the names of what is wrong with a page by what the witness saw."""
+    found = {name for name in ("wrong", "fetched", "cut") if told[name]}
+    return (
+        found
+        | ({"wide"} if told["wide"] > 0 else set())
+        | ({"pictures"} if told["shown"] < told["pictures"] else set())
+    )
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [390, 1000])
+def test_a_browser_shows_all_pictures_and_finds_no_error(folder, tmp_path, width):
+    told, spoke = seen_in_a_browser((folder / "report.html").read_text(), tmp_path, width)
+    assert faults(told) == set()
+    assert told["pictures"] >= 4
+    assert not spoke
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("fault", "body"),
+    [
+        ("pictures", '<img src="data:image/png;base64,AAAA">'),
+        ("wrong", "<script>throw Error('e')</script>"),
+        ("fetched", '<link rel="stylesheet" href="other.css">'),
+        ("fetched", '<img src="http://127.0.0.1:9/other.png">'),
+        ("wide", '<div style="width: 2000px">w</div>'),
+        ("cut", '<div class="scroll" style="overflow: auto"><p style="width: 2000px">w</p></div>'),
+    ],
+)
+def test_the_browser_would_tell(tmp_path, fault, body):
+    page = f"<!doctype html><html><head></head><body>{body}</body></html>"
+    (tmp_path / "other.css").write_text("p { color: red }")
+    sound = page.replace(body, "<p>w</p>")
+    assert fault in faults(seen_in_a_browser(page, tmp_path, 1000)[0])
+    assert faults(seen_in_a_browser(sound, tmp_path, 1000)[0]) == set()
 
 
 def test_a_folder_without_a_campaign_gets_one_line_and_status_2(tmp_path, capsys):
