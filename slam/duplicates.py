@@ -1,10 +1,14 @@
-"""One wall that stands in the map twice: found by where the entries lie, believed by their joint covariance."""
+"""One wall that stands in the map twice: found by where the entries lie, believed by their joint covariance.
+
+Where one entry would hide the other from every beam, no covariance is asked: after a thousand sightings an EKF is surer
+of the millimetres between the two than it has a right to be, and would keep both for good.
+"""
 
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from .backend import Joint
 from .consistency import gate_level
@@ -30,6 +34,14 @@ class DuplicatesConfig:
     turn_sigma_rad: float = float(np.deg2rad(1.0))
     """The turn from one to the other is known to this, sigma: the direction of half a metre seen twice is known to a
     degree or two, and a wall that turns by as much would be made straight for good."""
+    hidden_m: float = 0.01
+    """Two faces on one side no farther apart than this, at both ends of the shorter one, are one to a laser whose
+    beams are as far off: the nearer hides the farther. With 0.02 m eight mergers in 121 apartments were false, none
+    by the gate alone: an entry across a step of 2 cm from wall to wall lies near both."""
+    hidden_overlap_m: float = 1.0
+    """They overlap by at least this."""
+    hidden_share: float = 0.5
+    """And along at least this share of the shorter one."""
 
 
 def duplicate_of(
@@ -40,21 +52,26 @@ def duplicate_of(
     The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
     uncertainty between the two, is what the bounds of geometry are for.
     """
-    pairs = lying_along(walls, touched, config)
+    pairs, hidden = lying_along(walls, touched, config)
     if not len(pairs):
         return None
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
-    for pair, rows in zip(pairs.tolist(), np.searchsorted(ids, pairs), strict=True):
+    for pair, rows, is_hidden in zip(pairs.tolist(), np.searchsorted(ids, pairs), hidden, strict=True):
         two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
-        if turn <= config.turn_sigma_rad**2 and same_line(two, config.gate):
+        if turn <= config.turn_sigma_rad**2 and (is_hidden or same_line(two, config.gate)):
             return pair[0], pair[1]
     return None
 
 
-def lying_along(walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig) -> Int[np.ndarray, "p 2"]:
-    """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position."""
+def lying_along(
+    walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig
+) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
+    """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position.
+
+    And of which pairs the one hides the other.
+    """
     firm = np.flatnonzero(~walls.tentative)
     ours = firm[np.isin(walls.ids[firm], list(touched))]
     alpha, ends = walls.belief.means[:, 0], walls.ends_world
@@ -72,8 +89,12 @@ def lying_along(walls: StochasticMap, touched: Collection[int], config: Duplicat
     off = ends[shorter] - ends[longer, :1]
     across = np.abs(np.vecdot(off, normals(alpha[longer])[:, None])).max(axis=1)
     along = np.vecdot(off, directions(alpha[longer])[:, None])
-    apart = np.maximum(along[:, 0] - length[longer], -along[:, 1])
-    return walls.ids[np.stack([older, younger], axis=-1)[(across <= config.across_m) & (apart <= -config.overlap_m)]]
+    # By so much one would have to slide until they part: their overlap, or more where one lies amid the other.
+    overlap = np.minimum(length[longer] - along[:, 0], along[:, 1])
+    found = (across <= config.across_m) & (overlap >= config.overlap_m)
+    hidden = (across <= config.hidden_m) & (length[shorter] >= config.hidden_overlap_m)
+    hidden &= overlap >= np.maximum(config.hidden_overlap_m, config.hidden_share * length[shorter])
+    return walls.ids[np.stack([older, younger], axis=-1)[found]], hidden[found]
 
 
 def same_line(joint: Joint, gate: float) -> bool:
