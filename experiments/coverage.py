@@ -10,6 +10,7 @@ from slam.chains import Chain
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import compose, inverse, to_world
 from slam.stochastic_map import StochasticMap
+from slam.trajectories import alignment_of_paths
 
 from .association import Votes
 from .truth import Truth
@@ -64,11 +65,20 @@ def own_alignment(
     true_world: Float[np.ndarray, "s 3"],
     step: int,
 ) -> Float[np.ndarray, "3"]:
-    """Return the motion that carries the map to the truth from the poses at the step where it began.
+    """Return the motion that carries the map to the truth: by the path since the step where it began, if not the first.
 
-    What the robot lost before its first wall no scan can tell; it moves the map as a whole.
+    What the robot lost before its first wall no scan can tell; it moves the map as a whole, also later on, since a
+    filter that does not know its heading to some degrees is turned by small innovations.
     """
-    return alignment(estimated_world[step] if step else start_estimate, true_world[step])
+    if not step:
+        return alignment(start_estimate, true_world[0])
+    return alignment_of_paths(*(_with_headings(path[step:]) for path in (estimated_world, true_world)))
+
+
+def _with_headings(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "r 3"]:
+    """Return poses and a place a metre ahead of each: a robot that stands still has a heading too."""
+    ahead = np.column_stack([np.cos(poses_world[:, 2]), np.sin(poses_world[:, 2]), np.zeros(len(poses_world))])
+    return np.concatenate([poses_world, poses_world + ahead])
 
 
 def covered(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> Bool[np.ndarray, " p"]:

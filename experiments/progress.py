@@ -89,7 +89,7 @@ def _own_frame(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Return a row where the map began in the blind, so that it is off as a whole by what was lost before."""
     if not summary["map_began_step"]:
         return []
-    return [("the same, aligned where the map began", f"{100 * summary['coverage_own_frame']:.2f} %")]
+    return [("the same, laid over the truth by its path", f"{100 * summary['coverage_own_frame']:.2f} %")]
 
 
 def _way_back(share: float | None) -> list[tuple[str, str]]:

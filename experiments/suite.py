@@ -134,7 +134,7 @@ def main() -> int:
         if row["status"] != "complete" or (suite.each and row["coverage"] < 0.99):
             found = "" if row.get("coverage") is None else f", coverage {row['coverage']:.4f}"
             if row.get("map_began_step"):
-                found += f" ({row['coverage_own_frame']:.4f} from where the map began)"
+                found += f" ({row['coverage_own_frame']:.4f} laid over the truth by its path)"
             if (way := row.get("reachable_way")) is not None and way < 0.9:
                 found += f", {100 * way:.0f} % of its way open to it at the end"
             print(f"{row['file']} seed {row['seed']}: {row['status']}{found}: {row['reason']}")

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from .geometry.poses import rotation, wrap
+from .geometry.poses import rotation, to_world, wrap
 
 
 def position_errors(
@@ -27,11 +27,18 @@ def aligned(
     estimated_world: Float[np.ndarray, "s 3"], true_world: Float[np.ndarray, "s 3"]
 ) -> Float[np.ndarray, "s 3"]:
     """Return the estimated path after the rigid motion that brings its positions nearest to the true ones."""
+    motion = alignment_of_paths(estimated_world, true_world)
+    return np.column_stack([to_world(estimated_world[:, :2], motion), wrap(estimated_world[:, 2] + motion[2])])
+
+
+def alignment_of_paths(
+    estimated_world: Float[np.ndarray, "s 3"], true_world: Float[np.ndarray, "s 3"]
+) -> Float[np.ndarray, "3"]:
+    """Return the rigid motion (m, m, rad) that brings the estimated positions nearest to the true ones."""
     from_centre, to_centre = estimated_world[:, :2].mean(axis=0), true_world[:, :2].mean(axis=0)
     a, b = estimated_world[:, :2] - from_centre, true_world[:, :2] - to_centre
     turn = float(np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b)))
-    places = a @ rotation(turn).T + to_centre
-    return np.column_stack([places, wrap(estimated_world[:, 2] + turn)])
+    return np.append(to_centre - rotation(turn) @ from_centre, turn)
 
 
 def rpe(

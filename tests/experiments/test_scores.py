@@ -87,6 +87,8 @@ def test_a_map_that_began_in_the_blind_is_whole_in_its_own_frame(truth):
     by_first, own = alignment(true[0], true[0]), own_alignment(true[0], estimated, true, 1)
     assert coverage(samples, to_world(mapped, by_first), NEAR_M) < 0.6
     assert coverage(samples, to_world(mapped, own), NEAR_M) == 1.0
+    standing = own_alignment(true[0], estimated[[0, 1, 1]], true[[0, 1, 1]], 1)
+    np.testing.assert_allclose(standing, own)
     np.testing.assert_allclose(own_alignment(true[0] + lost, estimated, true, 0), alignment(true[0] + lost, true[0]))
 
 
