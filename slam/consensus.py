@@ -108,8 +108,10 @@ def nearest_alone(
     R: Float[np.ndarray, "c 2 2"],
     gate: float,
     clear: float,
-) -> Int[np.ndarray, " k"]:
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "t 2"]]:
     """Return for each segment its nearest candidate, unless another wall costs hardly more (by less than `clear`).
+
+    The second are the segments that are torn so, each by its nearest candidate and the likeliest of the others.
 
     Two entries of one wall are not another: by the gate their covariance does not tell them apart. `R` is the noise of
     each candidate's segment, which is the same for all candidates of one.
@@ -123,7 +125,9 @@ def nearest_alone(
     cov = S[best, :, best, :] + S[each, :, each, :] - S[best, :, each, :] - S[each, :, best, :] - 2.0 * R
     differ = np.einsum("ci,cij,cj->c", apart, np.linalg.pinv(cov, hermitian=True), apart) > gate_level(gate, 2)
     rivals = (best != each) & differ & (d2 < d2[best] + clear)
-    return np.setdiff1d(first, best[rivals])
+    likeliest = order[rivals[order]]
+    likeliest = likeliest[np.unique(segment[likeliest], return_index=True)[1]]
+    return np.setdiff1d(first, best[likeliest]), np.stack([best[likeliest], likeliest], axis=-1)
 
 
 def _own_distances(seen: JointSightings) -> Float[np.ndarray, " c"]:

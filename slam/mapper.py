@@ -20,6 +20,7 @@ from .pieces import sure_pieces
 from .robot import Odometry, Scan
 from .segments import Segments
 from .stochastic_map import StochasticMap
+from .torn import TornConfig, observed_either_way
 from .walls import Walls, WallsConfig
 
 
@@ -33,6 +34,7 @@ class MapperConfig:
     walls: WallsConfig = field(default_factory=WallsConfig)
     faint: FaintConfig = field(default_factory=FaintConfig)
     gaps: GapsConfig = field(default_factory=GapsConfig)
+    torn: TornConfig = field(default_factory=TornConfig)
     duplicates: DuplicatesConfig | None = field(default_factory=DuplicatesConfig)
     """None where one wall may stand in the map twice."""
 
@@ -102,7 +104,10 @@ class Mapper:
         again = self._match(segments.take(rest), near, relocated, self.config.matching)
         matches = _both(clear, again)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(first, self._firm(matches, segments))
+        firm = self._firm(matches, segments)
+        if not len(firm.ids):
+            firm = self._may_move(segments, *observed_either_way(matches, segments, near.ids, joint, self.config.torn))
+        self.backend.update(first, firm)
         owners = self._store(scan, segments, matches)
         walls, merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
@@ -120,8 +125,11 @@ class Mapper:
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
-        observed = matches.observations(segments)
-        firm = self._walls.may_move(segments.take(matches.pairs[:, 0]), observed.ids)
+        return self._may_move(segments, matches.pairs[:, 0], matches.observations(segments))
+
+    def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
+        """Return those of the observations, made by the segments of these rows, that may move the estimate."""
+        firm = self._walls.may_move(segments.take(rows), observed.ids)
         return Observations(observed.ids[firm], observed.lines[firm], observed.cov[firm])
 
     def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:
@@ -177,6 +185,7 @@ def _both(clear: Matches, again: Matches) -> Matches:
         np.concatenate([clear.distances, again.distances]),
         rest[again.unmatched],
         rest[again.doubtful],
+        np.column_stack([rest[again.torn[:, 0]], again.torn[:, 1:]]),
         {int(rest[k]): why for k, why in again.refusals.items()},
     )
 

@@ -62,6 +62,8 @@ class Matches:
     """Indices of the segments that belong to no wall."""
     doubtful: Int[np.ndarray, " d"]
     """Those of the unmatched that lie too near a wall to be a new one."""
+    torn: Int[np.ndarray, "t 3"]
+    """Those of the unmatched that two walls fit about as well: index of the segment, ids of the likelier and other."""
     refusals: dict[int, str]
     """For each unmatched segment with a wall near it, why that wall was refused."""
 
@@ -72,7 +74,12 @@ class Matches:
 
 
 NO_MATCHES = Matches(
-    np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), {}
+    np.zeros((0, 2), dtype=np.int64),
+    np.zeros(0),
+    np.zeros(0, dtype=np.int64),
+    np.zeros(0, dtype=np.int64),
+    np.zeros((0, 3), dtype=np.int64),
+    {},
 )
 
 
@@ -121,8 +128,9 @@ def match(
     if clear_only:
         chosen = _agreed(found, np.flatnonzero(covers), segments, joint, config)
         chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
+        torn = np.zeros((0, 2), dtype=np.int64)
     else:
-        chosen = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
+        chosen, torn = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     beside = _is_beside(found, segments, config)
@@ -134,6 +142,7 @@ def match(
         found.d2[chosen],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
+        np.column_stack([found.segment[torn[:, 0]], ids[found.line[torn]]]),
         _refusals(found, ids, ~matched, level, config),
     )
 
@@ -211,11 +220,13 @@ def _agreed(
 
 def _nearest(
     found: _Candidates, rows: Int[np.ndarray, " r"], joint: Joint, config: MatchingConfig
-) -> Int[np.ndarray, " k"]:
-    """Return for each segment its nearest candidate among `rows`, unless another wall is nearly as near."""
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "t 2"]]:
+    """Return for each segment its nearest candidate among `rows`, unless another is nearly as near; and those two."""
     model = found.model.take(rows)
     seen = taken_together(joint, found.line[rows], model)
-    return rows[nearest_alone(found.segment[rows], found.d2[rows], seen, model.R, config.one_wall, config.clear)]
+    segment, d2 = found.segment[rows], found.d2[rows]
+    alone, torn = nearest_alone(segment, d2, seen, model.R, config.one_wall, config.clear)
+    return rows[alone], rows[torn]
 
 
 def _still_overlapping(
