@@ -164,4 +164,6 @@ def test_the_only_wall_in_sight_is_found_where_it_stands_in_the_map_as_two_that_
         segment = straight_pieces([[[3.0, 1.5], [-3.0, 1.5]]])
         found = match(segment, walls, joint, clear_only=True)
         assert not len(found.pairs)
-        assert len(match(segment, walls, joint).pairs) == matched
+        found = match(segment, walls, joint)
+        assert len(found.pairs) == matched
+        assert sorted(found.torn.ravel().tolist()) == ([] if matched else [0, 3, 7])
