@@ -11,6 +11,7 @@ import tyro
 
 from .compare_command import Compare
 from .explore_command import Explore
+from .interrupts import nothing_half_built_speaks
 from .listings import Backends, Strategies, Worlds
 from .measure_command import Measure
 from .replay_command import Replay
@@ -45,6 +46,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 }
 
 
+@nothing_half_built_speaks()
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 done, 1 failed, 2 bad usage or input, 130 Ctrl-C."""
     try:

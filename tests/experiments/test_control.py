@@ -1,6 +1,7 @@
 """How a run is stopped, and how it goes on."""
 
 import csv
+import gc
 import io
 import json
 import os
@@ -16,7 +17,7 @@ import pytest
 
 from experiments.cli import main
 from experiments.files import json_bytes
-from experiments.interrupts import first_interrupt_waits
+from experiments.interrupts import first_interrupt_waits, nothing_half_built_speaks
 from experiments.saved import from_record, read_trial
 from experiments.scenario import TrialConfig, UsageError
 from experiments.scores import TIMED
@@ -136,6 +137,36 @@ def test_what_was_started_to_ignore_ctrl_c_goes_on_ignoring_it():
             stop_if_asked()
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+class HalfBuilt:
+    """Its finalizer needs what the interrupt kept from being built, as pyparsing's does."""
+
+    def __init__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        self.expr = None
+
+    def __del__(self):
+        assert self.expr is None
+
+
+def test_what_an_interrupt_leaves_half_built_says_nothing(monkeypatch):
+    def interrupted():
+        try:
+            HalfBuilt()
+        except KeyboardInterrupt:
+            return True
+
+    said = []
+    monkeypatch.setattr(sys, "unraisablehook", said.append)
+    with nothing_half_built_speaks():
+        assert interrupted()
+    assert not said
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert interrupted()
+    gc.collect()
+    assert len(said) == 1, "as Python does"
+    said.clear()
 
 
 @pytest.mark.parametrize("times", [1, 2])
