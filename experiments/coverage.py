@@ -77,8 +77,8 @@ def own_alignment(
 
 def _with_headings(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "r 3"]:
     """Return poses and a place a metre ahead of each: a robot that stands still has a heading too."""
-    ahead = np.column_stack([np.cos(poses_world[:, 2]), np.sin(poses_world[:, 2]), np.zeros(len(poses_world))])
-    return np.concatenate([poses_world, poses_world + ahead])
+    ahead = np.column_stack([poses_world[:, :2] + normals(poses_world[:, 2]), poses_world[:, 2]])
+    return np.concatenate([poses_world, ahead])
 
 
 def covered(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> Bool[np.ndarray, " p"]:

@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from skimage.graph import MCP_Geometric
 
+from slam.geometry.lines import normals
+
 from .blocks import BLOCK, blocks_with_any
 from .free_space import FreeSpace
 from .paths import PathConfig, passable, roomy
@@ -66,10 +68,11 @@ class DrivingField:
     ) -> Float[np.ndarray, "m 2"]:
         """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`."""
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-        around = (metres[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
+        around = (metres[:, None, None] * normals(angle)).reshape(-1, 2)
         stands = (places_world[:, None] + around).reshape(-1, 2)
-        stands = stands[self._free_space.inside(self._free_space.cells(stands))]
-        return stands[self.can_stay(self._free_space.cells(stands))]
+        cells = self._free_space.cells(stands)
+        inside = self._free_space.inside(cells)
+        return stands[inside][self.can_stay(cells[inside])]
 
     @cached_property
     def _near(self) -> _Reach:

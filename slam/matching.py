@@ -15,7 +15,7 @@ from .consistency import gate_level
 from .duplicates import DuplicatesConfig
 from .geometry.lines import directions
 from .geometry.poses import to_world
-from .joint_sightings import compatible, taken_together
+from .joint_sightings import compatible, squared_distances, taken_together
 from .models import Innovations, halfway, innovations
 from .segments import Segments
 
@@ -202,9 +202,7 @@ def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) ->
     cross = model.H_pose @ pose_line @ model.H_line.swapaxes(1, 2)
     S = model.H_pose @ joint.cov[:3, :3] @ model.H_pose.swapaxes(1, 2) + cross + cross.swapaxes(1, 2)
     S += model.H_line @ line_line @ model.H_line.swapaxes(1, 2) + model.R
-    det = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] * S[:, 1, 0]
-    e0, e1 = model.e[:, 0], model.e[:, 1]
-    return (S[:, 1, 1] * e0**2 - 2 * S[:, 0, 1] * e0 * e1 + S[:, 0, 0] * e1**2) / det
+    return squared_distances(model.e, S)
 
 
 def _agreed(
