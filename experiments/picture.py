@@ -56,10 +56,11 @@ def over_truth(
     to_estimate = inverse(own_alignment(start_estimate, estimated_world, true_world, summary["map_began_step"]))
     rings = (world.free.exterior, *world.free.interiors)
     off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
+    laid_over = " laid over the truth" if summary["map_began_step"] else ""
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
-        f"coverage {100 * summary['coverage_own_frame']:.1f} %",
+        f"coverage {100 * summary['coverage_own_frame']:.1f} %{laid_over}",
         f"pose error rms {off_cm:.1f} cm (wheels alone {wheels_cm:.0f} cm)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"
