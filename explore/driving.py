@@ -26,7 +26,11 @@ class DrivingConfig:
     spin_rad: float = float(np.deg2rad(30.0))
     """With more than this to turn, the robot turns on the spot first."""
     lookahead_m: float = 0.6
-    """How far ahead on its path the robot aims."""
+    """How far ahead on its path the robot aims; half as far, and half again, where no step towards that is safe ..."""
+    least_lookahead_m: float = 0.15
+    """... but no less than this, ..."""
+    short_points: int = 8
+    """... for so many points of the path, 0.05 m apart."""
     radius_m: float = 0.2
     """The robot's disc."""
     margin_m: float = 0.02
@@ -60,6 +64,7 @@ class Pilot:
         self._points = path.points_world
         self._planner, self._config = planner, config
         self._at = 0
+        self._lookahead_m, self._full_again_at = config.lookahead_m, 0
 
     @property
     def remaining_m(self) -> float:
@@ -104,31 +109,32 @@ class Pilot:
         a narrow place the noise of so many would leave none.
         """
         points = returns(scan)
-        aim, narrow = _centred(to_robot(self._aim(pose_world[:2])[None], pose_world)[0], points, self._config)
-        error, distance = float(np.arctan2(aim[1], aim[0])), float(np.hypot(aim[0], aim[1]))
-        turn = float(np.clip(error, -self._config.turn_rad, self._config.turn_rad))
-        if abs(error) > (self._config.narrow_spin_rad if narrow else self._config.spin_rad):
-            return MotionCommand(0.0, turn)
-        forward = min(self._config.step_m * (1.0 - 0.8 * abs(error) / self._config.spin_rad), distance)
-        if narrow:
-            forward = min(forward, self._config.careful_m)
-        else:
-            points = np.concatenate([points, recent_robot])
-        for share in (1.0, 0.5, 0.25):
-            command = MotionCommand(share * forward, turn)
-            if _is_safe(command, points, self._config, narrow):
+        if self._at >= self._full_again_at:
+            self._lookahead_m = self._config.lookahead_m
+        while True:
+            aim = to_robot(self._aim(pose_world[:2])[None], pose_world)[0]
+            aim, narrow = _centred(aim, points, self._config)
+            near = points if narrow else np.concatenate([points, recent_robot])
+            command = _towards(aim, near, self._config, narrow)
+            if command is not None:
                 return self._careful(command, pose_world, free_space)
-        back = MotionCommand(-self._config.careful_m, 0.0)
+            if narrow or self._lookahead_m <= self._config.least_lookahead_m:
+                break
+            # The straight way to the aim leaves the path where it bends round something: keep closer to the path.
+            self._lookahead_m *= 0.5
+            self._full_again_at = self._at + self._config.short_points
         if narrow:
-            return back if _is_safe(back, points, self._config, narrow) else None
-        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
+            back = MotionCommand(-self._config.careful_m, 0.0)
+            return back if _is_safe(back, near, self._config, narrow) else None
+        turn = _turn_towards(aim, self._config)
+        return _away(near, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the farthest point of the path within the lookahead to which the straight way is clear."""
         gaps = np.hypot(*(self._points[self._at : self._at + 40] - position_world).T)
         self._at += int(np.argmin(gaps))
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._points[self._at :], axis=0).T))])
-        last = int(np.searchsorted(along, self._config.lookahead_m, side="right")) - 1
+        last = int(np.searchsorted(along, self._lookahead_m, side="right")) - 1
         for row in range(last, 0, -1):
             if self._planner.clear_ahead(position_world, self._points[self._at + row]):
                 return self._points[self._at + row]
@@ -147,6 +153,28 @@ class Pilot:
 
 
 _RIM = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=-1)
+
+
+def _turn_towards(aim_robot: Float[np.ndarray, "2"], config: DrivingConfig) -> float:
+    return float(np.clip(np.arctan2(aim_robot[1], aim_robot[0]), -config.turn_rad, config.turn_rad))
+
+
+def _towards(
+    aim_robot: Float[np.ndarray, "2"], points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, narrow: bool
+) -> MotionCommand | None:
+    """Return a safe step towards the aim, a turn on the spot where it lies far to one side; None where none is safe."""
+    error, distance = float(np.arctan2(aim_robot[1], aim_robot[0])), float(np.hypot(aim_robot[0], aim_robot[1]))
+    turn = _turn_towards(aim_robot, config)
+    if abs(error) > (config.narrow_spin_rad if narrow else config.spin_rad):
+        return MotionCommand(0.0, turn)
+    forward = min(config.step_m * (1.0 - 0.8 * abs(error) / config.spin_rad), distance)
+    if narrow:
+        forward = min(forward, config.careful_m)
+    for share in (1.0, 0.5, 0.25):
+        command = MotionCommand(share * forward, turn)
+        if _is_safe(command, points_robot, config, narrow):
+            return command
+    return None
 
 
 def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> MotionCommand | None:
