@@ -5,6 +5,7 @@ than chance does, and yet the one line is wrong by many of the sigmas that so ma
 after scan. The map, which has seen each part alone, knows where to cut.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,17 +32,26 @@ class BendsConfig:
     known: float = 0.9999
     """Probability level at which the two walls are not one line: in a straight building two pieces of one wall may
     stand in the map for a while."""
+    cut_reach_m: float = 0.5
+    """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
+    met either of them near the bend."""
     past_m: float = 0.05
     """A segment goes on at least so far on both sides of the bend: ends are known no better."""
 
 
 def bends_within(
-    segments: Segments, walls: StochasticMap, config: BendsConfig = BendsConfig()
+    segments: Segments,
+    walls: StochasticMap,
+    config: BendsConfig = BendsConfig(),
+    cut: Collection[tuple[int, int]] = (),
 ) -> Float[np.ndarray, " b"]:
-    """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief."""
+    """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief.
+
+    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`kinks`).
+    """
     if not len(segments):
         return np.zeros(0)
-    points, alpha, pairs = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config)
+    points, alpha, pairs, is_cut = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
     offset = points[:, None] - segments.ends[None, :, 0]
     along = np.vecdot(offset, directions(segments.lines[:, 0]))
     across = np.vecdot(offset, normals(segments.lines[:, 0]))
@@ -49,7 +59,8 @@ def bends_within(
     on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
     on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
     passed = on.any(axis=1)
-    found = points[passed][_are_known(walls, pairs[passed], config)]
+    passed[~is_cut & passed] = _are_known(walls, pairs[~is_cut & passed], config)
+    found = points[passed]
     return np.arctan2(found[:, 1], found[:, 0])
 
 
@@ -63,9 +74,11 @@ def _are_known(walls: StochasticMap, pairs: Int[np.ndarray, "b 2"], config: Bend
 
 
 def _bends(
-    walls: StochasticMap, range_m: float, config: BendsConfig
-) -> tuple[Float[np.ndarray, "b 2"], Float[np.ndarray, " b"], Int[np.ndarray, "b 2"]]:
+    walls: StochasticMap, range_m: float, config: BendsConfig, cut: Collection[tuple[int, int]]
+) -> tuple[Float[np.ndarray, "b 2"], Float[np.ndarray, " b"], Int[np.ndarray, "b 2"], Bool[np.ndarray, " b"]]:
     """Return where bends may lie, m, the normals rad of the walls before them, robot frame, and both walls' ids.
+
+    And which of these pairs are known to be two walls.
 
     Walls that begin beyond `range_m` have none that a scan of that range shows.
     """
@@ -78,7 +91,9 @@ def _bends(
     across = np.vecdot(offset, normals(alpha)[:, None, None])[..., 0]
     gap, runs_on = along[..., 0], along[..., 1] > 0.0
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
-    is_bend = (gap < config.reach_m) & (gap > -length[:, None]) & runs_on
+    is_cut = _are_pairs(walls.ids[rows], cut)
+    reach = np.where(is_cut, config.cut_reach_m, config.reach_m)
+    is_bend = (gap < reach) & (gap > -length[:, None]) & runs_on
     is_bend &= (np.abs(across) < config.beside_m) & (np.abs(turn) < config.largest_rad)
     before, after = np.nonzero(is_bend)
     gap, across, turn = gap[is_bend], across[is_bend], turn[is_bend]
@@ -88,4 +103,14 @@ def _bends(
     low, high = np.minimum(gap, 0.0) - config.reach_m, np.maximum(gap, 0.0) + config.reach_m
     at = np.where((crossing > low) & (crossing < high), crossing, 0.5 * gap)
     pairs = walls.ids[rows][np.stack([before, after], axis=-1)]
-    return ends[before, 1] + at[:, None] * directions(alpha[before]), alpha[before], pairs
+    return ends[before, 1] + at[:, None] * directions(alpha[before]), alpha[before], pairs, is_cut[is_bend]
+
+
+def _are_pairs(ids: Int[np.ndarray, " n"], pairs: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n n"]:
+    """Return for each two of the ids, which ascend, whether they are one of the pairs, in either order."""
+    are_pairs = np.zeros((len(ids), len(ids)), dtype=bool)
+    wanted = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
+    wanted = wanted[np.isin(wanted, ids).all(axis=1)]
+    one, other = np.searchsorted(ids, wanted).T
+    are_pairs[one, other] = are_pairs[other, one] = True
+    return are_pairs

@@ -45,9 +45,14 @@ class DuplicatesConfig:
 
 
 def duplicate_of(
-    walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig = DuplicatesConfig()
+    walls: StochasticMap,
+    touched: Collection[int],
+    config: DuplicatesConfig = DuplicatesConfig(),
+    cut: Collection[tuple[int, int]] = (),
 ) -> tuple[int, int] | None:
     """Return the ids (older, younger) of two entries of one wall, one of them among `touched`, or None.
+
+    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`kinks`).
 
     The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
     uncertainty between the two, is what the bounds of geometry are for.
@@ -58,6 +63,8 @@ def duplicate_of(
     ids = np.unique(pairs)
     joint = walls.belief.joint(ids)
     for pair, rows, is_hidden in zip(pairs.tolist(), np.searchsorted(ids, pairs), hidden, strict=True):
+        if tuple(pair) in cut:
+            continue
         two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
         if turn <= config.turn_sigma_rad**2 and (is_hidden or same_line(two, config.gate)):

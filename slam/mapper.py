@@ -13,8 +13,10 @@ from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
 from .faint import FaintConfig, FaintLines
+from .firmness import are_clear
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
+from .kinks import Kink, Kinks, KinksConfig, sides_of
 from .matching import KnownWalls, Matches, MatchingConfig, match
 from .pieces import sure_pieces
 from .robot import Odometry, Scan
@@ -35,6 +37,7 @@ class MapperConfig:
     faint: FaintConfig = field(default_factory=FaintConfig)
     gaps: GapsConfig = field(default_factory=GapsConfig)
     torn: TornConfig = field(default_factory=TornConfig)
+    kinks: KinksConfig = field(default_factory=KinksConfig)
     duplicates: DuplicatesConfig | None = field(default_factory=DuplicatesConfig)
     """None where one wall may stand in the map twice."""
 
@@ -54,6 +57,8 @@ class MapUpdate:
 
 
 Matcher = Callable[..., Matches]
+NONE = np.zeros(0, dtype=np.int64)
+"""No rows."""
 
 
 @runtime_checkable
@@ -82,6 +87,7 @@ class Mapper:
         self._walls = Walls(config.walls)
         self._faint = FaintLines(config.faint)
         self._gaps = Gaps(config.gaps)
+        self._kinks = Kinks(config.kinks)
 
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by what the wheels report."""
@@ -108,7 +114,11 @@ class Mapper:
         if not len(firm.ids):
             firm = self._may_move(segments, *observed_either_way(matches, segments, near.ids, joint, self.config.torn))
         self.backend.update(first, firm)
-        owners = self._store(scan, segments, matches)
+        kink = self._kinks.see(self.backend.belief, scan, segments, matches.pairs)
+        sides = NONE
+        if kink is not None:
+            segments, matches, sides = self._cut(kink, scan, segments, matches)
+        owners = self._store(scan, segments, matches, sides)
         walls, merged = self._merge(owners)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._gaps.see(walls, scan)
@@ -117,11 +127,36 @@ class Mapper:
 
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
-        segments = sure_pieces(self._extract(scan), scan, self.config.walls.pieces)
-        bends = bends_within(segments, walls, self.config.bends)
-        if not len(bends):
-            return segments
-        return sure_pieces(self._extract(scan, bends_rad=bends), scan, self.config.walls.pieces)
+        segments = self._pieces(scan)
+        bends = self._bends(segments, walls)
+        return self._pieces(scan, bends) if len(bends) else segments
+
+    def _pieces(self, scan: Scan, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+        return sure_pieces(self._extract(scan, bends_rad=bends_rad), scan, self.config.walls.pieces)
+
+    def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
+        return bends_within(segments, walls, self.config.bends, self._kinks.cut)
+
+    def _cut(
+        self, kink: Kink, scan: Scan, segments: Segments, matches: Matches
+    ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
+        """Forget a wall that bends, so that its sides can take its place.
+
+        Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
+        beside the bend; all as it was, and none, while the scan shows a side too poorly.
+        """
+        bends = self._bends(segments, self._walls.map(self.backend.belief))
+        pieces = self._pieces(scan, np.append(bends, kink.bearing_rad))
+        clear = np.flatnonzero(are_clear(pieces, self.config.walls.firmness))
+        sides = sides_of(kink, segments, pieces.take(clear), scan)
+        if sides is None:
+            return segments, matches, NONE
+        self.backend.remove([kink.wall])
+        self._walls.drop(np.array([kink.wall]))
+        self._kinks.split(kink.wall)
+        near = self._nearby(scan, self._walls.map(self.backend.belief))
+        again = self._match(pieces, near, self.backend.belief.joint(near.ids), self.config.matching)
+        return pieces, again, clear[list(sides)]
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
@@ -138,8 +173,13 @@ class Mapper:
         near = walls.distances_m < scan.range_max_m + max(self.config.matching.offset_m, lost_m)
         return KnownWalls(walls.ids[near], walls.extents[near])
 
-    def _store(self, scan: Scan, segments: Segments, matches: Matches) -> Int[np.ndarray, " s"]:
-        """Grow the map by the segments that belong to no wall, and note how far each wall was seen."""
+    def _store(
+        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+    ) -> Int[np.ndarray, " s"]:
+        """Grow the map by the segments that belong to no wall, and note how far each wall was seen.
+
+        `sides` are the two segments beside a bend that was found now: many scans stand behind them.
+        """
         owners = np.full(len(segments), -1, dtype=np.int64)
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
@@ -150,7 +190,11 @@ class Mapper:
         if len(fresh):
             centres = seen_centres(segments, fresh)
             owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
-        forgotten = self._walls.see(self.backend.belief, scan, segments, owners, owners[believed])
+        known = np.unique(owners[sides][owners[sides] >= 0])
+        if len(known) == 2:
+            self._kinks.keep_apart(*known.tolist())
+        believed_ids = np.union1d(owners[believed], known)
+        forgotten = self._walls.see(self.backend.belief, scan, segments, owners, believed_ids)
         if len(forgotten):
             self.backend.remove(forgotten.tolist())
         return owners
@@ -165,10 +209,11 @@ class Mapper:
             return walls, ()
         merged: list[tuple[int, int]] = []
         touched = set(owners[owners >= 0].tolist())
-        while twice := duplicate_of(walls, touched, self.config.duplicates):
+        while twice := duplicate_of(walls, touched, self.config.duplicates, self._kinks.cut):
             keep, drop = twice
             self._walls.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)
+            self._kinks.merge(keep, drop)
             owners[owners == drop] = keep
             merged.append(twice)
             walls = self._walls.map(self.backend.belief)

@@ -20,6 +20,12 @@ class PiecesConfig:
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 
+def beams_of(run: Int[np.ndarray, "2"], beams: int) -> Int[np.ndarray, " m"]:
+    """Return the beams from the first to the last of a segment, in a scan of so many."""
+    first, last = run
+    return np.arange(first, last + 1 if first <= last else last + 1 + beams) % beams
+
+
 def owners_of_beams(segments: Segments, owners: Int[np.ndarray, " s"], beams: int) -> Int[np.ndarray, " k"]:
     """Return for each beam of a scan the id of the wall that its segment belongs to, -1 for none."""
     owner = np.full(beams, -1, dtype=np.int64)

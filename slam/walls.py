@@ -78,7 +78,7 @@ class Walls:
     ) -> Int[np.ndarray, " f"]:
         """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
 
-        `believed` are new walls that were seen often before they became walls.
+        `believed` are walls that were seen often before they became walls.
         """
         self._scans += 1
         self._firmness.see(segments, owners, float(belief.pose_world[2]))
@@ -89,7 +89,8 @@ class Walls:
         self._stretch(belief, scan, segments, used, rows)
         self._uncover(belief, segments, owners, used, rows)
         self._sightings[np.unique(rows)] += 1
-        self._sightings[np.searchsorted(self._ids, believed)] = self._config.trusted_sightings
+        seen_often = np.searchsorted(self._ids, believed)
+        self._sightings[seen_often] = np.maximum(self._sightings[seen_often], self._config.trusted_sightings)
         self._last_seen[rows] = self._scans
         self._weigh(belief, scan, segments, owners)
         stale = self._scans - self._last_seen > self._config.patience_steps
@@ -97,7 +98,7 @@ class Walls:
         shaky |= (self._claimed >= self._config.claims) & (self._sightings < self._config.established_sightings)
         forgotten = self._ids[shaky | (self._extents[:, 1] - self._extents[:, 0] < self._config.least_m)]
         if len(forgotten):
-            self._drop(forgotten)
+            self.drop(forgotten)
             owners[np.isin(owners, forgotten)] = -1
         return forgotten
 
@@ -149,7 +150,7 @@ class Walls:
                 self._spacing[row, side] = self._spacing[other, side]
         self._sightings[row] += self._sightings[other]
         self._last_seen[row] = max(self._last_seen[row], self._last_seen[other])
-        self._drop(np.array([drop]))
+        self.drop(np.array([drop]))
 
     def _append(self, ids: Int[np.ndarray, " m"]) -> None:
         m = len(ids)
@@ -162,7 +163,8 @@ class Walls:
         self._overlaid = np.concatenate([self._overlaid, np.zeros((m, 2), dtype=np.int64)])
         self._claimed = np.concatenate([self._claimed, np.zeros(m, dtype=np.int64)])
 
-    def _drop(self, ids: Int[np.ndarray, " m"]) -> None:
+    def drop(self, ids: Int[np.ndarray, " m"]) -> None:
+        """Forget walls of these ids; they must be in the map."""
         kept = ~np.isin(self._ids, ids)
         self._ids, self._extents, self._spacing = self._ids[kept], self._extents[kept], self._spacing[kept]
         self._sightings, self._overlaid = self._sightings[kept], self._overlaid[kept]

@@ -79,6 +79,16 @@ def test_a_bend_lies_within_the_segments_that_pass_over_it(first, last, is_on):
     assert len(bends_within(segment_of(first, last), map_of(bent()))) == is_on
 
 
+def test_what_was_cut_is_known_and_need_not_come_near_the_bend():
+    """Two walls of one direction as far as the map knows, whose ends far beams have left 0.4 m apart."""
+    segment, pair = segment_of([1.0, 0.0], [3.0, -0.03]), {(0, 1)}
+    assert len(bends_within(segment, map_of(bent(slope=0.001)), cut=pair)) == 1
+    (bearing,) = bends_within(segment, map_of(bent(gap=0.4, slope=0.001)), cut=pair)
+    np.testing.assert_allclose(bearing, np.arctan2(-2.0, 1.2) - POSE[2], atol=1e-3)
+    assert not len(bends_within(segment, map_of(bent(gap=0.6)), cut=pair))
+    assert not len(bends_within(segment, map_of(bent(slope=0.001)), cut={(1, 2), (0, 7)}))
+
+
 def test_a_wall_seen_once_makes_no_bend():
     walls = map_of(bent())
     walls.tentative[1] = True

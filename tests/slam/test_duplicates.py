@@ -53,6 +53,8 @@ def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, on
     assert duplicate_of(walls(lines), {10}) == (3, 10)
     assert duplicate_of(walls(lines), {3}) == (3, 10)
     assert duplicate_of(walls(lines), set()) is None
+    assert duplicate_of(walls(lines), {10}, cut={(3, 10)}) is None, "known to be two"
+    assert duplicate_of(walls(lines), {10}, cut={(3, 11)}) == (3, 10)
 
 
 @settings(max_examples=60, deadline=None)
