@@ -8,7 +8,7 @@ wrong ones. One scan cannot tell such a line from a wall; all scans together can
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 from scipy.special import gammaincc
 
 from .geometry.poses import wrap
@@ -39,6 +39,18 @@ class FirmnessConfig:
 def are_clear(segments: Segments, config: FirmnessConfig = FirmnessConfig()) -> Bool[np.ndarray, " s"]:
     """Return which segments have enough beams and a clear direction."""
     return ~segments.is_tentative & (segments.cov[:, 0, 0] < config.heading_rad**2)
+
+
+def of_place_only(
+    cov: Float[np.ndarray, "m 2 2"], config: FirmnessConfig = FirmnessConfig()
+) -> Float[np.ndarray, "m 2 2"]:
+    """Return the covariance of (alpha, r) of lines whose direction is not to be believed, only where they were seen.
+
+    Turned about the point at which what is known of its place does not depend on its direction, a line has r change by
+    cov(alpha, r) / var(alpha) for every radian.
+    """
+    turn = cov[:, :, 0] / cov[:, :1, 0]
+    return cov + config.heading_rad**2 * turn[:, :, None] * turn[:, None]
 
 
 class Firmness:
