@@ -76,51 +76,54 @@ class Kinks:
 
     def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> Kink | None:
         """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
-        seen = [self._see(belief, scan, segments, *pair) for pair in pairs.tolist()]
-        return max((kink for kink in seen if kink is not None), key=lambda kink: kink.sigmas, default=None)
-
-    def _see(self, belief: Belief, scan: Scan, segments: Segments, segment: int, wall: int) -> Kink | None:
-        alpha, r = segments.lines[segment]
-        at = beams_of(segments.beams[segment], len(scan.bearings_rad))
-        off_normal = scan.bearings_rad[at] - alpha
-        across = scan.ranges_m[at] * np.cos(off_normal) - r
-        sigma = scan.sigma_m * np.cos(off_normal)
+        beams, of = beams_of(segments.beams[pairs[:, 0]], len(scan.bearings_rad))
+        alpha, r = segments.lines[pairs[:, 0]].T
+        off_normal = scan.bearings_rad[beams] - alpha[of]
+        cos = np.cos(off_normal)
+        across, sigma = scan.ranges_m[beams] * cos - r[of], scan.sigma_m * cos
         ours = np.abs(across) < self._config.gate_sigmas * sigma
-        if np.count_nonzero(ours) < self._config.least_beams:
+        ours &= (np.bincount(of, ours, len(pairs)) >= self._config.least_beams)[of]
+        if not ours.any():
             return None
         # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along the wall, too.
-        along = r * np.tan(off_normal[ours])
-        shift = self._shift(belief, wall, r * normals(alpha))
-        pitch = self._config.pitch_m
-        first, last = np.floor((along.min() + shift) / pitch) + 1, np.ceil((along.max() + shift) / pitch)
-        places = np.arange(int(first), int(last))
-        if not len(places):
+        foot = _along(belief, pairs[:, 1], to_world(r[:, None] * normals(alpha), belief.pose_world))
+        along = foot[of] + r[of] * np.tan(off_normal)
+        place, place_of = _places(along[ours], of[ours], len(pairs), self._config.pitch_m)
+        if not len(place):
             return None
-        terms = _turns(along, across[ours], sigma[ours], pitch * places - shift)
-        information, sums = self._add(wall, int(first), terms)
+        at = self._config.pitch_m * place
+        turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of)
+        information, sums = self._add(pairs[:, 1], place, place_of, turns)
         turn = -sums / np.maximum(information, 1e-9)
         sure = turn**2 * information * (np.abs(turn) > self._config.least_rad)
         best = int(np.argmax(sure))
         if sure[best] <= self._config.sigmas**2:
             return None
-        bearing = float(alpha + np.arctan((pitch * places[best] - shift) / r))
+        row = place_of[best]
+        bearing = float(alpha[row] + np.arctan((at[best] - foot[row]) / r[row]))
+        segment, wall = pairs[row].tolist()
         return Kink(wall, segment, bearing, float(turn[best]), float(information[best] ** -0.5))
 
-    @staticmethod
-    def _shift(belief: Belief, wall: int, foot_robot: Float[np.ndarray, "2"]) -> float:
-        """Return how far along a wall, from its anchor, the foot of the robot's perpendicular lies, m."""
-        row = belief.rows([wall])[0]
-        foot_world = to_world(foot_robot[None], belief.pose_world)[0]
-        return float(directions(belief.means[row, 0]) @ (foot_world - belief.anchors[row]))
+    def _add(
+        self, walls: Int[np.ndarray, " m"], place: Int[np.ndarray, " p"], place_of: Int[np.ndarray, " p"], terms: Sums
+    ) -> Sums:
+        """Add to the sums of walls at some places, which are given wall by wall; return what they are there now."""
+        bounds = np.searchsorted(place_of, np.arange(len(walls) + 1))
+        now = np.empty_like(terms)
+        for wall, start, stop in zip(walls.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+            if start < stop:
+                now[:, start:stop] = self._add_to(wall, int(place[start]), terms[:, start:stop])
+        return now
 
-    def _add(self, wall: int, first: int, terms: Sums) -> Sums:
+    def _add_to(self, wall: int, first: int, terms: Sums) -> Sums:
         """Add to a wall's sums from its place `first` on; return what they are there now."""
         begin, sums = self._sums.get(wall, (first, terms[:, :0]))
         before, after = max(begin - first, 0), max(first + terms.shape[1] - begin - sums.shape[1], 0)
-        begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
+        if before or after:
+            begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
+            self._sums[wall] = begin, sums
         now = sums[:, first - begin : first - begin + terms.shape[1]]
         now += terms
-        self._sums[wall] = begin, sums
         return now
 
     def split(self, wall: int) -> None:
@@ -138,20 +141,61 @@ class Kinks:
         self._cut = {(min(pair), max(pair)) for pair in renamed if pair[0] != pair[1]}
 
 
+def _along(
+    belief: Belief, walls: Int[np.ndarray, " m"], points_world: Float[np.ndarray, "m 2"]
+) -> Float[np.ndarray, " m"]:
+    """Return how far along walls, each from its anchor, points lie, m."""
+    rows = belief.rows(walls)
+    return np.vecdot(directions(belief.means[rows, 0]), points_world - belief.anchors[rows])
+
+
+def _places(
+    along: Float[np.ndarray, " k"], of: Int[np.ndarray, " k"], count: int, pitch_m: float
+) -> tuple[Int[np.ndarray, " p"], Int[np.ndarray, " p"]]:
+    """Return the places, in pitches, between the first and the last beam of each of so many walls, and whose they are.
+
+    The beams are given wall by wall, in the order in which they meet it.
+    """
+    bounds = np.searchsorted(of, np.arange(count + 1))
+    seen = np.flatnonzero(np.diff(bounds))
+    first = np.floor(along[bounds[seen]] / pitch_m).astype(np.int64) + 1
+    places = np.ceil(along[bounds[seen + 1] - 1] / pitch_m).astype(np.int64) - first
+    begin = np.cumsum(places) - places
+    return np.arange(places.sum()) + np.repeat(first - begin, places), np.repeat(seen, places)
+
+
 def _turns(
     along: Float[np.ndarray, " k"],
     across: Float[np.ndarray, " k"],
     sigma: Float[np.ndarray, " k"],
+    of: Int[np.ndarray, " k"],
     places: Float[np.ndarray, " p"],
+    place_of: Int[np.ndarray, " p"],
 ) -> Sums:
-    """Return the sums of beams at `along`, off a line by `across`, m, whatever the line: by how much more per metre the
-    wall leads away beyond each place.
+    """Return the sums of beams at `along`, off lines by `across`, m: by how much more per metre a wall leads away
+    beyond each place, whatever its line.
+
+    The model is across = a + b along + turn max(along - place, 0); a and b are eliminated. Beams, and places, are given
+    wall by wall in ascending order, so that what lies beyond a place is a difference of running sums.
     """
-    weight = 1.0 / np.square(sigma)
-    line = np.stack([np.ones_like(along), along - along.mean()], axis=-1)
-    turned = np.maximum(along[:, None] - places, 0.0)
-    turned -= line @ np.linalg.solve(line.T @ (weight[:, None] * line), line.T @ (weight[:, None] * turned))
-    return np.stack([weight @ np.square(turned), (weight * across) @ turned])
+    walls = np.arange(of[-1] + 1)
+    bounds = np.searchsorted(of, np.append(walls, len(walls)))
+    middle = np.zeros(len(walls))
+    seen = np.diff(bounds) > 0
+    middle[seen] = 0.5 * (along[bounds[:-1][seen]] + along[bounds[1:][seen] - 1])
+    x, s, weight = along - middle[of], places - middle[place_of], 1.0 / np.square(sigma)
+    running = np.zeros((5, len(x) + 1))
+    np.cumsum(weight * np.stack([np.ones_like(x), x, x * x, across, x * across]), axis=1, out=running[:, 1:])
+    end = bounds[place_of + 1]
+    # Walls lie in order, and so do the beams along each: one search for all, with each wall far from the next.
+    apart = 4.0 * (np.abs(x).max() + np.abs(s).max()) + 1.0
+    beyond = np.searchsorted(x + apart * of, s + apart * place_of, side="right")
+    w0, w1, w2, e0, e1 = running[:, end] - running[:, beyond]
+    t0, t1, t2, f0, f1 = running[:, end] - running[:, bounds[place_of]]
+    h0, h1, hh, he = w1 - s * w0, w2 - s * w1, w2 - 2.0 * s * w1 + s * s * w0, e1 - s * e0
+    det = t0 * t2 - t1 * t1
+    a, b = (t2 * h0 - t1 * h1) / det, (t0 * h1 - t1 * h0) / det
+    return np.stack([np.maximum(hh - a * h0 - b * h1, 0.0), he - a * f0 - b * f1])
 
 
 def sides_of(kink: Kink, segments: Segments, pieces: Segments, scan: Scan) -> tuple[int, int] | None:

@@ -20,20 +20,18 @@ class PiecesConfig:
     """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 
-def beams_of(run: Int[np.ndarray, "2"], beams: int) -> Int[np.ndarray, " m"]:
-    """Return the beams from the first to the last of a segment, in a scan of so many."""
-    first, last = run
-    return np.arange(first, last + 1 if first <= last else last + 1 + beams) % beams
+def beams_of(runs: Int[np.ndarray, "n 2"], beams: int) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Return the beams of segments, each from its first to its last, in a scan of so many, and whose each is."""
+    counts = np.mod(runs[:, 1] - runs[:, 0], beams) + 1
+    of = np.repeat(np.arange(len(runs)), counts)
+    return np.mod(np.arange(len(of)) + (runs[:, 0] - np.cumsum(counts) + counts)[of], beams), of
 
 
 def owners_of_beams(segments: Segments, owners: Int[np.ndarray, " s"], beams: int) -> Int[np.ndarray, " k"]:
     """Return for each beam of a scan the id of the wall that its segment belongs to, -1 for none."""
     owner = np.full(beams, -1, dtype=np.int64)
-    for (first, last), wall in zip(segments.beams.tolist(), owners.tolist(), strict=True):
-        if first <= last:
-            owner[first : last + 1] = wall
-        else:
-            owner[first:], owner[: last + 1] = wall, wall
+    beam, of = beams_of(segments.beams, beams)
+    owner[beam] = owners[of]
     return owner
 
 

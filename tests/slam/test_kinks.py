@@ -8,7 +8,7 @@ from slam.backend import Belief
 from slam.backends import BACKENDS
 from slam.extraction import extract
 from slam.geometry.poses import compose, inverse
-from slam.kinks import Kink, Kinks, KinksConfig, _turns, sides_of
+from slam.kinks import Kink, Kinks, KinksConfig, _places, _turns, sides_of
 from slam.mapper import Mapper, MapperConfig
 from slam.robot import Odometry, Scan
 
@@ -50,15 +50,26 @@ def random_poses(rng, count):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_turn_at_a_place_is_that_of_a_dense_least_squares(seed):
+    """Of three walls at once, the second of which was not seen; far from their anchors."""
     rng = np.random.default_rng(seed)
-    along, sigma = rng.uniform(-2, 2, 40), rng.uniform(0.005, 0.02, 40)
-    across, places = sigma * rng.standard_normal(40), np.array([-1.1, 0.0, 0.7])
-    information, sums = _turns(along, across, sigma, places)
+    of, place_of = np.repeat([0, 2], [40, 25]), np.repeat([0, 2], [3, 2])
+    along = np.concatenate([np.sort(rng.uniform(28, 32, 40)), np.sort(rng.uniform(-9, -7, 25))])
+    sigma = rng.uniform(0.005, 0.02, 65)
+    across, places = sigma * rng.standard_normal(65), np.array([28.9, 30.0, 30.7, -8.5, -7.4])
+    information, sums = _turns(along, across, sigma, of, places, place_of)
     for k, place in enumerate(places):
-        A = np.stack([np.ones(40), along, np.maximum(along - place, 0.0)], axis=-1) / sigma[:, None]
-        expected = np.linalg.lstsq(A, across / sigma, rcond=None)[0]
-        np.testing.assert_allclose(sums[k] / information[k], expected[2], rtol=1e-9)
-        np.testing.assert_allclose(1.0 / information[k], np.linalg.inv(A.T @ A)[2, 2], rtol=1e-9)
+        ours = of == place_of[k]
+        turned = np.maximum(along[ours] - place, 0.0)
+        A = np.stack([np.ones(len(turned)), along[ours], turned], axis=-1) / sigma[ours, None]
+        expected = np.linalg.lstsq(A, across[ours] / sigma[ours], rcond=None)[0]
+        np.testing.assert_allclose(sums[k] / information[k], expected[2], rtol=1e-6)
+        np.testing.assert_allclose(1.0 / information[k], np.linalg.inv(A.T @ A)[2, 2], rtol=1e-6)
+
+
+def test_places_lie_between_the_first_and_the_last_beam_of_each_wall():
+    place, of = _places(np.array([-0.6, 0.1, 0.55, 0.26, 0.3, 1.2, 1.25]), np.array([0, 0, 0, 2, 2, 5, 5]), 7, 0.25)
+    np.testing.assert_array_equal(of, [0, 0, 0, 0, 0])
+    np.testing.assert_array_equal(place, [-2, -1, 0, 1, 2])
 
 
 @pytest.mark.parametrize("turn_deg", [0.4, 0.7, -0.7])
@@ -152,7 +163,7 @@ def test_sums_of_what_exact_lines_say_do_not_depend_on_how_a_wall_was_grown_alon
     for first, count in ((3, 4), (-2, 3), (0, 12), (-4, 1)):
         terms = rng.uniform(size=(2, count))
         before = {place: kinks_at(kinks, place) for place in range(first, first + count)}
-        now = kinks._add(WALL, first, terms)
+        now = kinks._add_to(WALL, first, terms)
         for k, place in enumerate(range(first, first + count)):
             np.testing.assert_allclose(now[:, k], before[place] + terms[:, k])
             np.testing.assert_allclose(kinks_at(kinks, place), before[place] + terms[:, k])
