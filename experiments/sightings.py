@@ -13,7 +13,7 @@ from sim.chance import Channel, standard_normals
 from slam.backend import Backend, Joint, Observations
 from slam.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.extraction import extract
-from slam.firmness import Firmness
+from slam.firmness import Firmness, as_told
 from slam.mapper import seen_centres
 from slam.pieces import sure_pieces
 from slam.robot import Odometry, Scan
@@ -121,7 +121,8 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
         owned = known & ~segments.is_tentative
         owned[begun] = True
         firmness.see(segments, np.where(owned, walls, -1), float(run.true_poses_world[k, 2]))
-        again.append(_looks(segments, walls).take(seen))
+        looks = _looks(segments, walls).take(seen)
+        again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.firmness)))
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
     return Sightings(

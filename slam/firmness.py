@@ -41,16 +41,19 @@ def are_clear(segments: Segments, config: FirmnessConfig = FirmnessConfig()) -> 
     return ~segments.is_tentative & (segments.cov[:, 0, 0] < config.heading_rad**2)
 
 
-def of_place_only(
-    cov: Float[np.ndarray, "m 2 2"], config: FirmnessConfig = FirmnessConfig()
+def as_told(
+    cov: Float[np.ndarray, "m 2 2"], few: Bool[np.ndarray, " m"], config: FirmnessConfig = FirmnessConfig()
 ) -> Float[np.ndarray, "m 2 2"]:
-    """Return the covariance of (alpha, r) of lines whose direction is not to be believed, only where they were seen.
+    """Return the covariances of (alpha, r) of sightings that together move the estimate, of which `few` show few beams.
 
-    Turned about the point at which what is known of its place does not depend on its direction, a line has r change by
-    cov(alpha, r) / var(alpha) for every radian.
+    Beside a clear sighting one of few beams says where the robot stands, not how it is turned: such a line over the
+    corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
+    place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
-    turn = cov[:, :, 0] / cov[:, :1, 0]
-    return cov + config.heading_rad**2 * turn[:, :, None] * turn[:, None]
+    if few.all():
+        return cov
+    turn = np.where(few, config.heading_rad, 0.0)[:, None] * cov[:, :, 0] / cov[:, :1, 0]
+    return cov + turn[:, :, None] * turn[:, None]
 
 
 class Firmness:

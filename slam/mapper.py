@@ -13,7 +13,7 @@ from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
 from .faint import FaintConfig, FaintLines
-from .firmness import are_clear, of_place_only
+from .firmness import are_clear, as_told
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
 from .kinks import Kink, Kinks, KinksConfig, sides_of
@@ -163,15 +163,9 @@ class Mapper:
         return self._may_move(segments, matches.pairs[:, 0], matches.observations(segments))
 
     def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
-        """Return those of the observations, made by the segments of these rows, that may move the estimate.
-
-        Beside a clear segment one of three or four beams says where the robot stands, not how it is turned: such a
-        line over the corner of two faces of one wall passes every gate.
-        """
+        """Return those of the observations, made by the segments of these rows, that may move the estimate."""
         firm = self._walls.may_move(segments.take(rows), observed.ids)
-        cov, few = observed.cov[firm], segments.is_tentative[rows[firm]]
-        if not few.all():
-            cov[few] = of_place_only(cov[few], self.config.walls.firmness)
+        cov = as_told(observed.cov[firm], segments.is_tentative[rows[firm]], self.config.walls.firmness)
         return Observations(observed.ids[firm], observed.lines[firm], cov)
 
     def _nearby(self, scan: Scan, walls: StochasticMap) -> KnownWalls:

@@ -7,7 +7,7 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.extraction import extract
-from slam.firmness import Firmness, FirmnessConfig, are_clear, of_place_only
+from slam.firmness import Firmness, FirmnessConfig, are_clear, as_told
 from slam.geometry.poses import compose, inverse
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -178,13 +178,15 @@ def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
 
 
 @pytest.mark.parametrize("middle_m", [0.5, -1.0])
-def test_of_what_is_seen_of_place_only_the_distance_at_its_middle_is_as_well_known_as_before(middle_m):
+def test_beside_a_clear_sighting_few_beams_tell_their_distance_at_their_middle_and_no_direction(middle_m):
     """A line that beams met `middle_m` along it from the foot of the robot's perpendicular."""
     to_robot = np.array([[1.0, 0.0], [middle_m, 1.0]])  # (alpha, across at the middle) to (alpha, r)
     cov = to_robot @ np.diag([1e-6, 4e-6]) @ to_robot.T
-    (wide,) = of_place_only(cov[None])
+    wide, clear = as_told(np.stack([cov, cov]), np.array([True, False]))
     at_middle = np.linalg.inv(to_robot)
     np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + np.deg2rad(3.0) ** 2, 4e-6]), atol=1e-12)
+    np.testing.assert_array_equal(clear, cov)
+    np.testing.assert_array_equal(as_told(cov[None], np.array([True])), cov[None], "alone it is all that there is")
 
 
 def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():
