@@ -6,6 +6,7 @@ the robot by it. Where the residuals of a fit turn along the wall says nothing a
 tells the turn at a place to a degree, and what the scans tell adds up.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,9 +127,11 @@ class Kinks:
         now += terms
         return now
 
-    def split(self, wall: int) -> None:
-        """Forget a wall that gives way to its two sides."""
-        self._sums.pop(wall, None)
+    def forget(self, walls: Collection[int]) -> None:
+        """Take note that walls are no longer in the map."""
+        for wall in walls:
+            self._sums.pop(wall, None)
+        self._cut = {pair for pair in self._cut if not set(pair) & set(walls)}
 
     def keep_apart(self, one: int, other: int) -> None:
         """Take note that two walls are the sides of a bend."""

@@ -153,7 +153,7 @@ class Mapper:
             return segments, matches, NONE
         self.backend.remove([kink.wall])
         self._walls.drop(np.array([kink.wall]))
-        self._kinks.split(kink.wall)
+        self._kinks.forget([kink.wall])
         near = self._nearby(scan, self._walls.map(self.backend.belief))
         again = self._match(pieces, near, self.backend.belief.joint(near.ids), self.config.matching)
         return pieces, again, clear[list(sides)]
@@ -198,6 +198,7 @@ class Mapper:
         forgotten = self._walls.see(self.backend.belief, scan, segments, owners, believed_ids)
         if len(forgotten):
             self.backend.remove(forgotten.tolist())
+            self._kinks.forget(forgotten.tolist())
         return owners
 
     def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:

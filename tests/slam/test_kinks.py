@@ -119,7 +119,10 @@ def test_pairs_are_renamed_when_entries_are_merged():
     assert kinks.cut == {(4, 9)}
     kinks.merge(2, 9)
     assert kinks.cut == {(2, 4)}
-    kinks.merge(2, 4)
+    kinks.forget([4])
+    assert not kinks.cut
+    kinks.keep_apart(1, 2)
+    kinks.merge(1, 2)
     assert not kinks.cut
 
 
