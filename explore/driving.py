@@ -10,7 +10,7 @@ from slam.robot import MotionCommand, Scan
 
 from .free_space import FreeSpace
 from .paths import Path, Planner
-from .recent import returns
+from .recent import returns, steadied
 
 _NOTHING = np.zeros((0, 2))
 
@@ -48,7 +48,10 @@ class DrivingConfig:
     least_margin_m: float = 0.004
     """... down to this. Beside a lone return there is room: that much is below a range's noise."""
     fits_m: float = 0.425
-    """... and does not try where they leave less than this: returns tell the width to a centimetre or two."""
+    """... and does not try where they leave less than this: returns tell the width to a centimetre. Where it stands
+    between the two, it does fit: """
+    within_m: float = 0.05
+    """the line from one to the other passes so near to the robot's middle."""
     beside_m: float = 0.1
     """Beside the way are returns from this far behind the robot to this far beyond its aim."""
     obstructed_m: float = 0.17
@@ -108,37 +111,49 @@ class Pilot:
         `recent_robot` are returns of the last scans, in the robot's frame of now: they count where there is room. In
         a narrow place the noise of so many would leave none.
         """
-        points = returns(scan)
-        if self._at >= self._full_again_at:
-            self._lookahead_m = self._config.lookahead_m
-        while True:
-            aim = to_robot(self._aim(pose_world[:2])[None], pose_world)[0]
-            aim, narrow = _centred(aim, points, self._config)
-            near = points if narrow else np.concatenate([points, recent_robot])
-            command = _towards(aim, near, self._config, narrow)
-            if command is not None:
-                return self._careful(command, pose_world, free_space)
-            if narrow or self._lookahead_m <= self._config.least_lookahead_m:
-                break
-            # The straight way to the aim leaves the path where it bends round something: keep closer to the path.
-            self._lookahead_m *= 0.5
-            self._full_again_at = self._at + self._config.short_points
+        points, ahead = returns(scan), self._aim(pose_world, self._config.lookahead_m)
+        steady = steadied(points, recent_robot)
+        aim, gap_m, narrow = _centred(ahead, steady, self._config)
+        points = steady if narrow else np.concatenate([points, recent_robot])
+        if gap_m < self._config.narrow_m:
+            command = _towards(aim, points, self._config, narrow)
+        else:
+            command = self._clear_step(pose_world, points)
+        if command is not None:
+            return self._careful(command, pose_world, free_space)
         if narrow:
             back = MotionCommand(-self._config.careful_m, 0.0)
-            return back if _is_safe(back, near, self._config, narrow) else None
+            return back if _is_safe(back, points, self._config, narrow) else None
         turn = _turn_towards(aim, self._config)
-        return _away(near, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
+        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
-    def _aim(self, position_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-        """Return the farthest point of the path within the lookahead to which the straight way is clear."""
+    def _clear_step(
+        self, pose_world: Float[np.ndarray, "3"], points_robot: Float[np.ndarray, "m 2"]
+    ) -> MotionCommand | None:
+        """Return a safe step towards a point on the path, if need be a nearer one, or None where there is none.
+
+        The straight way to it leaves the path where that bends round something; the nearer the point, the closer the
+        robot keeps to the path.
+        """
+        lookahead_m = self._config.lookahead_m if self._at >= self._full_again_at else self._lookahead_m
+        while True:
+            aim = self._aim(pose_world, lookahead_m)
+            command = _towards(aim, points_robot, self._config, narrow=False)
+            if command is not None or lookahead_m <= self._config.least_lookahead_m:
+                return command
+            lookahead_m *= 0.5
+            self._lookahead_m, self._full_again_at = lookahead_m, self._at + self._config.short_points
+
+    def _aim(self, pose_world: Float[np.ndarray, "3"], lookahead_m: float) -> Float[np.ndarray, "2"]:
+        """Return the farthest point of the path within the lookahead to which the way is clear, robot frame, m."""
+        position_world = pose_world[:2]
         gaps = np.hypot(*(self._points[self._at : self._at + 40] - position_world).T)
         self._at += int(np.argmin(gaps))
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._points[self._at :], axis=0).T))])
-        last = int(np.searchsorted(along, self._lookahead_m, side="right")) - 1
-        for row in range(last, 0, -1):
-            if self._planner.clear_ahead(position_world, self._points[self._at + row]):
-                return self._points[self._at + row]
-        return self._points[min(self._at + 2, len(self._points) - 1)]
+        ahead = self._points[self._at :]
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ahead, axis=0).T))])
+        last = int(np.searchsorted(along, lookahead_m, side="right")) - 1
+        clear = (row for row in range(last, 0, -1) if self._planner.clear_ahead(position_world, ahead[row]))
+        return to_robot(ahead[next(clear, min(2, len(ahead) - 1))][None], pose_world)[0]
 
     def _careful(
         self, command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace
@@ -163,6 +178,9 @@ def _towards(
     aim_robot: Float[np.ndarray, "2"], points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, narrow: bool
 ) -> MotionCommand | None:
     """Return a safe step towards the aim, a turn on the spot where it lies far to one side; None where none is safe."""
+    way = 1.0
+    if narrow and aim_robot[0] < 0.0:  # each turn on the spot slips aside by a millimetre or two: it backs out
+        aim_robot, way = -aim_robot, -1.0
     error, distance = float(np.arctan2(aim_robot[1], aim_robot[0])), float(np.hypot(aim_robot[0], aim_robot[1]))
     turn = _turn_towards(aim_robot, config)
     if abs(error) > (config.narrow_spin_rad if narrow else config.spin_rad):
@@ -171,7 +189,7 @@ def _towards(
     if narrow:
         forward = min(forward, config.careful_m)
     for share in (1.0, 0.5, 0.25):
-        command = MotionCommand(share * forward, turn)
+        command = MotionCommand(way * share * forward, turn)
         if _is_safe(command, points_robot, config, narrow):
             return command
     return None
@@ -197,22 +215,26 @@ def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> Moti
 
 def _centred(
     aim_robot: Float[np.ndarray, "2"], points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig
-) -> tuple[Float[np.ndarray, "2"], bool]:
-    """Return the aim, moved to the middle between returns on both sides where these are near, and whether they are."""
+) -> tuple[Float[np.ndarray, "2"], float, bool]:
+    """Return the aim, the gap between the returns on both sides, m, and whether it is narrow and the body fits.
+
+    There the aim is moved to the middle. The gap is infinite where there are returns on one side at most.
+    """
     distance = float(np.hypot(aim_robot[0], aim_robot[1]))
     ahead = aim_robot / max(distance, 1e-9)
     along, sideways = points_robot @ ahead, points_robot @ (J @ ahead)
     beside = (along > -config.beside_m) & (along < distance + config.beside_m)
     left, right = points_robot[beside & (sideways > 0)], points_robot[beside & (sideways < 0)]
     if distance < 1e-9 or not len(left) or not len(right):
-        return aim_robot, False
+        return aim_robot, np.inf, False
     # The nearest two stand straight across the gap, however the way slants.
     gaps = np.hypot(*(left[:, None] - right).transpose(2, 0, 1))
     k, m = divmod(int(np.argmin(gaps)), len(right))
-    if not config.fits_m < gaps[k, m] < config.narrow_m:
-        return aim_robot, False
-    middle, through = 0.5 * (left[k] + right[m]), J.T @ (left[k] - right[m]) / gaps[k, m]
-    return middle + max(through @ (aim_robot - middle), config.beside_m - through @ middle) * through, True
+    gap = float(gaps[k, m])
+    middle, through = 0.5 * (left[k] + right[m]), J.T @ (left[k] - right[m]) / gap
+    if gap >= config.narrow_m or (gap <= config.fits_m and abs(through @ middle) > config.within_m):
+        return aim_robot, gap, False
+    return middle + max(through @ (aim_robot - middle), config.beside_m - through @ middle) * through, gap, True
 
 
 def _is_safe(
