@@ -112,8 +112,10 @@ class Pilot:
         a narrow place the noise of so many would leave none.
         """
         points, ahead = returns(scan), self._aim(pose_world, self._config.lookahead_m)
-        steady = steadied(points, recent_robot)
-        aim, gap_m, narrow = _centred(ahead, steady, self._config)
+        aim, gap_m, narrow = _centred(ahead, points, self._config)
+        if gap_m < self._config.narrow_m:
+            steady = steadied(points, recent_robot)
+            aim, gap_m, narrow = _centred(ahead, steady, self._config)
         points = steady if narrow else np.concatenate([points, recent_robot])
         if gap_m < self._config.narrow_m:
             command = _towards(aim, points, self._config, narrow)
