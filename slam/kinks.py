@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from .backend import Belief
 from .geometry.lines import directions, normals
-from .geometry.poses import to_world
+from .geometry.poses import to_world, wrap
 from .pieces import beams_of
 from .robot import Scan
 from .segments import Segments
@@ -35,10 +35,16 @@ class KinksConfig:
     thousands of times."""
     least_rad: float = float(np.deg2rad(0.2))
     """Smaller turns are none: over thousands of beams every real wall shows one."""
+    most_rad: float = float(np.deg2rad(10.0))
+    """A sharper bend is seen in every scan; what seems to be one are beams of a short face in the next corner."""
     gate_sigmas: float = 4.0
-    """Beams farther off the line belong to something else."""
-    least_beams: int = 6
-    """Fewer beams have nothing to say beside the line itself."""
+    """Beams farther off the line belong to something else ..."""
+    ends: int = 1
+    """... and so may, on either end of what a scan shows, so many."""
+    least_beams: int = 4
+    """A scan counts at a place where it has so many beams on either side."""
+    agrees_sigmas: float = 3.0
+    """The scan in which a wall is cut shows the same turn, up to so many of its own sigmas."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,9 @@ class Kinks:
         cos = np.cos(off_normal)
         across, sigma = scan.ranges_m[beams] * cos - r[of], scan.sigma_m * cos
         ours = np.abs(across) < self._config.gate_sigmas * sigma
-        ours &= (np.bincount(of, ours, len(pairs)) >= self._config.least_beams)[of]
+        number = np.arange(len(of))
+        from_end = np.minimum(number - np.searchsorted(of, of), np.searchsorted(of, of, side="right") - 1 - number)
+        ours &= from_end >= self._config.ends
         if not ours.any():
             return None
         # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along the wall, too.
@@ -93,10 +101,11 @@ class Kinks:
         if not len(place):
             return None
         at = self._config.pitch_m * place
-        turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of)
+        turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of, self._config.least_beams)
         information, sums = self._add(pairs[:, 1], place, place_of, turns)
         turn = -sums / np.maximum(information, 1e-9)
-        sure = turn**2 * information * (np.abs(turn) > self._config.least_rad)
+        is_bend = (np.abs(turn) > self._config.least_rad) & (np.abs(turn) < self._config.most_rad)
+        sure = turn**2 * information * is_bend * (turns[0] > 0.0)
         best = int(np.argmax(sure))
         if sure[best] <= self._config.sigmas**2:
             return None
@@ -104,6 +113,26 @@ class Kinks:
         bearing = float(alpha[row] + np.arctan((at[best] - foot[row]) / r[row]))
         segment, wall = pairs[row].tolist()
         return Kink(wall, segment, bearing, float(turn[best]), float(information[best] ** -0.5))
+
+    def sides_of(self, kink: Kink, segments: Segments, pieces: Segments, scan: Scan) -> tuple[int, int] | None:
+        """Return the neighbours among `pieces`, of the same scan cut at a bend, between which it lies.
+
+        None where there are no two, or where they do not show that turn.
+        """
+        beams, margin = len(scan.bearings_rad), 2
+        first, last = segments.beams[kink.segment] + [-margin, margin]  # a beam in doubt may have been left to either
+        run = np.mod(pieces.beams - first, beams)
+        ours = np.flatnonzero((run[:, 0] <= run[:, 1]) & (run[:, 1] <= np.mod(last - first, beams)))
+        if len(ours) < 2:
+            return None
+        ours = ours[np.argsort(run[ours, 0])]
+        step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (beams - 1)
+        bend = np.mod(np.mod(kink.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / step - first, beams)
+        nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
+        before, after = ours[nearest : nearest + 2].tolist()
+        off = wrap(pieces.lines[after, 0] - pieces.lines[before, 0]) - kink.turn_rad
+        variance = pieces.cov[before, 0, 0] + pieces.cov[after, 0, 0] + kink.sigma_rad**2
+        return (before, after) if off**2 < self._config.agrees_sigmas**2 * variance else None
 
     def _add(
         self, walls: Int[np.ndarray, " m"], place: Int[np.ndarray, " p"], place_of: Int[np.ndarray, " p"], terms: Sums
@@ -174,9 +203,10 @@ def _turns(
     of: Int[np.ndarray, " k"],
     places: Float[np.ndarray, " p"],
     place_of: Int[np.ndarray, " p"],
+    least_beams: int = 4,
 ) -> Sums:
     """Return the sums of beams at `along`, off lines by `across`, m: by how much more per metre a wall leads away
-    beyond each place, whatever its line.
+    beyond each place, whatever its line; nothing where fewer than so many beams lie on either side.
 
     The model is across = a + b along + turn max(along - place, 0); a and b are eliminated. Beams, and places, are given
     wall by wall in ascending order, so that what lies beyond a place is a difference of running sums.
@@ -198,19 +228,5 @@ def _turns(
     h0, h1, hh, he = w1 - s * w0, w2 - s * w1, w2 - 2.0 * s * w1 + s * s * w0, e1 - s * e0
     det = t0 * t2 - t1 * t1
     a, b = (t2 * h0 - t1 * h1) / det, (t0 * h1 - t1 * h0) / det
-    return np.stack([np.maximum(hh - a * h0 - b * h1, 0.0), he - a * f0 - b * f1])
-
-
-def sides_of(kink: Kink, segments: Segments, pieces: Segments, scan: Scan) -> tuple[int, int] | None:
-    """Return the neighbours among `pieces`, of the same scan cut at a bend, between which it lies; None without two."""
-    beams, margin = len(scan.bearings_rad), 2
-    first, last = segments.beams[kink.segment] + [-margin, margin]  # a beam in doubt may have been left to either
-    run = np.mod(pieces.beams - first, beams)
-    ours = np.flatnonzero((run[:, 0] <= run[:, 1]) & (run[:, 1] <= np.mod(last - first, beams)))
-    if len(ours) < 2:
-        return None
-    ours = ours[np.argsort(run[ours, 0])]
-    step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (beams - 1)
-    bend = np.mod(np.mod(kink.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / step - first, beams)
-    nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
-    return int(ours[nearest]), int(ours[nearest + 1])
+    enough = np.minimum(end - beyond, beyond - bounds[place_of]) >= least_beams
+    return np.where(enough, np.stack([np.maximum(hh - a * h0 - b * h1, 0.0), he - a * f0 - b * f1]), 0.0)

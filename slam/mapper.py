@@ -16,7 +16,7 @@ from .faint import FaintConfig, FaintLines
 from .firmness import are_clear, as_told
 from .gaps import Gaps, GapsConfig
 from .joint_sightings import relocate
-from .kinks import Kink, Kinks, KinksConfig, sides_of
+from .kinks import Kink, Kinks, KinksConfig
 from .matching import KnownWalls, Matches, MatchingConfig, match
 from .pieces import sure_pieces
 from .robot import Odometry, Scan
@@ -143,12 +143,12 @@ class Mapper:
         """Forget a wall that bends, so that its sides can take its place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
-        beside the bend; all as it was, and none, while the scan shows a side too poorly.
+        beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
         """
         bends = self._bends(segments, self._walls.map(self.backend.belief))
         pieces = self._pieces(scan, np.append(bends, kink.bearing_rad))
         clear = np.flatnonzero(are_clear(pieces, self.config.walls.firmness))
-        sides = sides_of(kink, segments, pieces.take(clear), scan)
+        sides = self._kinks.sides_of(kink, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
         self.backend.remove([kink.wall])

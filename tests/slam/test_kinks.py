@@ -1,5 +1,7 @@
 """What the beams of many scans say of a bend that none of them shows, and what the map makes of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from slam.backend import Belief
 from slam.backends import BACKENDS
 from slam.extraction import extract
 from slam.geometry.poses import compose, inverse
-from slam.kinks import Kink, Kinks, KinksConfig, _places, _turns, sides_of
+from slam.kinks import Kink, Kinks, KinksConfig, _places, _turns
 from slam.mapper import Mapper, MapperConfig
 from slam.robot import Odometry, Scan
 
@@ -106,11 +108,28 @@ def test_the_scan_cut_at_the_bend_has_a_side_before_and_one_after(heading):
     segments = extract(scan)
     bearing = np.arctan2(1.2, -0.2) - heading
     pieces = extract(scan, bends_rad=np.array([bearing]))
-    before, after = sides_of(Kink(WALL, 0, bearing, 0.01, 0.001), segments, pieces, scan)
+    kinks, kink = Kinks(), Kink(WALL, 0, bearing, np.deg2rad(0.2), np.deg2rad(0.03))
+    before, after = kinks.sides_of(kink, segments, pieces, scan)
     assert sorted([before, after]) == [0, 1] == list(range(len(pieces)))
     one, other = pieces.ends[[before, after]].mean(axis=1)
     assert one[0] * other[1] - one[1] * other[0] > 0, "counter-clockwise"
-    assert sides_of(Kink(WALL, 0, bearing, 0.01, 0.001), segments, pieces.take(np.array([0])), scan) is None
+    assert kinks.sides_of(kink, segments, pieces.take(np.array([0])), scan) is None
+    assert kinks.sides_of(replace(kink, turn_rad=np.deg2rad(8.0)), segments, pieces, scan) is None, "not that turn"
+
+
+@pytest.mark.parametrize(("rules", "is_bend"), [(KinksConfig(), False), (KinksConfig(ends=0, least_beams=1), True)])
+def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_bend):
+    """In cml_Vipiteno2 44 beams of a wall of 7 m and one of a face of 0.1 m made a turn of 19 degrees of six sigmas."""
+    kinks, found = Kinks(rules), False
+    poses = np.column_stack([np.linspace(1.0, 0.0, 60), np.full(60, -1.0), np.zeros(60)])
+    for pose, scan in zip(poses, scans(bent(0.0), poses, np.random.default_rng(5), 0.0), strict=True):
+        segments = extract(scan)
+        last = segments.beams[0, 1]
+        ranges = scan.ranges_m.copy()
+        ranges[last] += 0.03
+        taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
+        found |= kinks.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
+    assert found == is_bend
 
 
 def test_pairs_are_renamed_when_entries_are_merged():
