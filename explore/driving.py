@@ -120,7 +120,7 @@ class Pilot:
         if gap_m < self._config.narrow_m:
             command = _towards(aim, points, self._config, narrow)
         else:
-            command = self._clear_step(pose_world, points)
+            command = self._clear_step(ahead, pose_world, points)
         if command is not None:
             return self._careful(command, pose_world, free_space)
         if narrow:
@@ -130,21 +130,26 @@ class Pilot:
         return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
 
     def _clear_step(
-        self, pose_world: Float[np.ndarray, "3"], points_robot: Float[np.ndarray, "m 2"]
+        self,
+        ahead_robot: Float[np.ndarray, "2"],
+        pose_world: Float[np.ndarray, "3"],
+        points_robot: Float[np.ndarray, "m 2"],
     ) -> MotionCommand | None:
-        """Return a safe step towards a point on the path, if need be a nearer one, or None where there is none.
+        """Return a safe step towards the point ahead on the path, if need be a nearer one, or None where there is none.
 
         The straight way to it leaves the path where that bends round something; the nearer the point, the closer the
         robot keeps to the path.
         """
-        lookahead_m = self._config.lookahead_m if self._at >= self._full_again_at else self._lookahead_m
-        while True:
-            aim = self._aim(pose_world, lookahead_m)
-            command = _towards(aim, points_robot, self._config, narrow=False)
-            if command is not None or lookahead_m <= self._config.least_lookahead_m:
-                return command
+        lookahead_m, aim = self._config.lookahead_m, ahead_robot
+        if self._at < self._full_again_at:
+            lookahead_m, aim = self._lookahead_m, self._aim(pose_world, self._lookahead_m)
+        while (command := _towards(aim, points_robot, self._config, narrow=False)) is None:
+            if lookahead_m <= self._config.least_lookahead_m:
+                return None
             lookahead_m *= 0.5
+            aim = self._aim(pose_world, lookahead_m)
             self._lookahead_m, self._full_again_at = lookahead_m, self._at + self._config.short_points
+        return command
 
     def _aim(self, pose_world: Float[np.ndarray, "3"], lookahead_m: float) -> Float[np.ndarray, "2"]:
         """Return the farthest point of the path within the lookahead to which the way is clear, robot frame, m."""

@@ -6,7 +6,7 @@ the robot by it. Where the residuals of a fit turn along the wall says nothing a
 tells the turn at a place to a degree, and what the scans tell adds up.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from .backend import Belief
 from .geometry.lines import directions, normals
 from .geometry.poses import to_world, wrap
-from .pieces import beams_of
+from .pieces import beam_step, beams_of
 from .robot import Scan
 from .segments import Segments
 
@@ -77,9 +77,9 @@ class Kinks:
         self._cut: set[tuple[int, int]] = set()
 
     @property
-    def cut(self) -> frozenset[tuple[int, int]]:
+    def cut(self) -> Set[tuple[int, int]]:
         """Pairs of ids, the lower first, made of one bent wall: they are two, whatever their lines look like."""
-        return frozenset(self._cut)
+        return self._cut
 
     def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> Kink | None:
         """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
@@ -126,8 +126,8 @@ class Kinks:
         if len(ours) < 2:
             return None
         ours = ours[np.argsort(run[ours, 0])]
-        step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (beams - 1)
-        bend = np.mod(np.mod(kink.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / step - first, beams)
+        bend = np.mod(kink.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / beam_step(scan)
+        bend = np.mod(bend - first, beams)
         nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
         before, after = ours[nearest : nearest + 2].tolist()
         off = wrap(pieces.lines[after, 0] - pieces.lines[before, 0]) - kink.turn_rad
@@ -203,7 +203,7 @@ def _turns(
     of: Int[np.ndarray, " k"],
     places: Float[np.ndarray, " p"],
     place_of: Int[np.ndarray, " p"],
-    least_beams: int = 4,
+    least_beams: int,
 ) -> Sums:
     """Return the sums of beams at `along`, off lines by `across`, m: by how much more per metre a wall leads away
     beyond each place, whatever its line; nothing where fewer than so many beams lie on either side.

@@ -57,8 +57,8 @@ def test_the_turn_at_a_place_is_that_of_a_dense_least_squares(seed):
     of, place_of = np.repeat([0, 2], [40, 25]), np.repeat([0, 2], [3, 2])
     along = np.concatenate([np.sort(rng.uniform(28, 32, 40)), np.sort(rng.uniform(-9, -7, 25))])
     sigma = rng.uniform(0.005, 0.02, 65)
-    across, places = sigma * rng.standard_normal(65), np.array([28.9, 30.0, 30.7, -8.5, -7.9])
-    information, sums = _turns(along, across, sigma, of, places, place_of)
+    across, places = sigma * rng.standard_normal(65), np.array([28.9, 30.0, 30.7, -8.5, -7.4])
+    information, sums = _turns(along, across, sigma, of, places, place_of, 1)
     for k, place in enumerate(places):
         ours = of == place_of[k]
         turned = np.maximum(along[ours] - place, 0.0)
