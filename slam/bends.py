@@ -27,6 +27,11 @@ class BendsConfig:
     given to one of them, which then reaches past the bend."""
     largest_rad: float = float(np.deg2rad(10.0))
     """A sharper bend is seen in every scan."""
+    least_rad: float = float(np.deg2rad(0.2))
+    """Walls that overlap and turn less are not ended where their lines cross: they may be one wall entered twice ..."""
+    slight_rad: float = float(np.deg2rad(2.0))
+    """... nor those that turn more: which of them a beam met is plain, and one of them may be a line laid across a
+    step."""
     beside_m: float = 0.08
     """Distance across a segment within which a bend lies on it."""
     known: float = 0.9999
@@ -35,8 +40,11 @@ class BendsConfig:
     cut_reach_m: float = 0.5
     """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
     met either of them near the bend."""
+    across_m: float = 0.25
+    """A wall that reaches so far beyond a bend on both sides was laid across it."""
     past_m: float = 0.05
-    """A segment goes on at least so far on both sides of the bend: ends are known no better."""
+    """Ends are known no better: a segment goes on at least so far on both sides of a bend, and walls that overlap by
+    less do not."""
 
 
 def bends_within(
@@ -51,39 +59,88 @@ def bends_within(
     """
     if not len(segments):
         return np.zeros(0)
-    points, alpha, pairs, is_cut = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
+    bends = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
+    alpha_world = walls.belief.means[bends.rows[:, 0], 0]
+    points, alpha = to_robot(bends.points_world, walls.belief.pose_world), alpha_world - walls.belief.pose_world[2]
     offset = points[:, None] - segments.ends[None, :, 0]
     along = np.vecdot(offset, directions(segments.lines[:, 0]))
     across = np.vecdot(offset, normals(segments.lines[:, 0]))
     length = segments.lengths_m
     on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
     on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
-    passed = on.any(axis=1)
-    passed[~is_cut & passed] = _are_known(walls, pairs[~is_cut & passed], config)
-    found = points[passed]
+    found = points[_are_known(bends, on.any(axis=1), walls, config)]
     return np.arctan2(found[:, 1], found[:, 0])
 
 
-def _are_known(walls: StochasticMap, pairs: Int[np.ndarray, "b 2"], config: BendsConfig) -> Bool[np.ndarray, " b"]:
-    """Return which pairs of walls are surely not one straight wall."""
-    if not len(pairs):
-        return np.zeros(0, dtype=bool)
-    ids = np.unique(pairs)
-    joint = walls.belief.joint(ids)
-    return np.array([not same_line(joint.take(rows), config.known) for rows in np.searchsorted(ids, pairs)])
+def meetings(
+    walls: StochasticMap, range_m: float, config: BendsConfig = BendsConfig(), cut: Collection[tuple[int, int]] = ()
+) -> tuple[Int[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
+    """Return ids of walls that overlap, before and after a bend, and how far along each from its anchor they meet, m.
 
-
-def _bends(
-    walls: StochasticMap, range_m: float, config: BendsConfig, cut: Collection[tuple[int, int]]
-) -> tuple[Float[np.ndarray, "b 2"], Float[np.ndarray, " b"], Int[np.ndarray, "b 2"], Bool[np.ndarray, " b"]]:
-    """Return where bends may lie, m, the normals rad of the walls before them, robot frame, and both walls' ids.
-
-    And which of these pairs are known to be two walls.
-
-    Walls that begin beyond `range_m` have none that a scan of that range shows.
+    Within `range_m` of the robot; `cut` as above.
     """
-    pose, rows = walls.belief.pose_world, np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
-    alpha, ends = wrap(walls.belief.means[rows, 0] - pose[2]), to_robot(walls.ends_world[rows], pose)
+    bends = _bends(walls, range_m, config, cut)
+    slight = (bends.turn_rad > config.least_rad) & (bends.turn_rad < config.slight_rad)
+    asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
+    known = _are_known(bends, asked, walls, config)
+    rows = bends.rows[known]
+    from_anchor = bends.points_world[known][:, None] - walls.belief.anchors[rows]
+    along = np.vecdot(from_anchor, directions(walls.belief.means[rows, 0]))
+    # Where the lines cross a little outside the overlap, its end is near enough.
+    short, far = walls.extents[rows[:, 1], 0] - along[:, 1], along[:, 0] - walls.extents[rows[:, 0], 1]
+    return walls.ids[rows], along + (np.maximum(short, 0.0) - np.maximum(far, 0.0))[:, None]
+
+
+def laid_across(
+    walls: StochasticMap, wall: int, along_m: float, config: BendsConfig = BendsConfig()
+) -> Int[np.ndarray, " n"]:
+    """Return the ids of the walls laid, like `wall`, across the bend that lies so far along it from its anchor."""
+    (row,) = walls.belief.rows([wall])
+    (alpha, d), anchor = walls.belief.means[row], walls.belief.anchors[row]
+    bend = anchor + d * normals(alpha) + along_m * directions(alpha)
+    t, n = directions(walls.belief.means[:, 0]), normals(walls.belief.means[:, 0])
+    along, across = (np.vecdot(bend - walls.ends_world, axis[:, None]) for axis in (t, n))
+    found = (along[:, 0] > config.across_m) & (along[:, 1] < -config.across_m)
+    found &= np.abs(across[:, 0]) < config.beside_m
+    found &= np.abs(wrap(walls.belief.means[:, 0] - alpha)) < config.largest_rad
+    return walls.ids[found]
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """Where walls may make a bend."""
+
+    rows: Int[np.ndarray, "b 2"]
+    """Of the walls before and after it."""
+    points_world: Float[np.ndarray, "b 2"]
+    """Where it lies, m: where the lines cross, if both walls end or overlap there; else amid the two ends."""
+    turn_rad: Float[np.ndarray, " b"]
+    """From one normal to the other, without its sign."""
+    cross: Bool[np.ndarray, " b"]
+    """Whether it lies where the lines cross."""
+    overlap: Bool[np.ndarray, " b"]
+    """Whether the walls overlap, by more than ends are known to."""
+    is_cut: Bool[np.ndarray, " b"]
+    """Whether it is known that they are two."""
+
+
+def _are_known(
+    bends: _Bends, asked: Bool[np.ndarray, " b"], walls: StochasticMap, config: BendsConfig
+) -> Bool[np.ndarray, " b"]:
+    """Return which of the bends asked for lie between walls that are surely not one straight wall."""
+    known = asked & bends.is_cut
+    open_to_doubt = np.flatnonzero(asked & ~bends.is_cut)
+    if len(open_to_doubt):
+        used, places = np.unique(bends.rows[open_to_doubt], return_inverse=True)
+        joint = walls.belief.joint(walls.ids[used])
+        known[open_to_doubt] = [not same_line(joint.take(pair), config.known) for pair in places.reshape(-1, 2)]
+    return known
+
+
+def _bends(walls: StochasticMap, range_m: float, config: BendsConfig, cut: Collection[tuple[int, int]]) -> _Bends:
+    """Return where bends may lie; walls that begin beyond `range_m` have none that a scan of that range shows."""
+    rows = np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
+    alpha, ends = walls.belief.means[rows, 0], walls.ends_world[rows]
     turn = wrap(alpha - alpha[:, None])
     # Every other wall's ends as seen from the head of each: along it, and across.
     offset = ends[None] - ends[:, None, 1:]
@@ -97,13 +154,13 @@ def _bends(
     is_bend &= (np.abs(across) < config.beside_m) & (np.abs(turn) < config.largest_rad)
     before, after = np.nonzero(is_bend)
     gap, across, turn = gap[is_bend], across[is_bend], turn[is_bend]
-    # Where the lines cross, if that is where both walls end or overlap; else the middle.
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = gap + across / np.tan(turn)
-    low, high = np.minimum(gap, 0.0) - config.reach_m, np.maximum(gap, 0.0) + config.reach_m
-    at = np.where((crossing > low) & (crossing < high), crossing, 0.5 * gap)
-    pairs = walls.ids[rows][np.stack([before, after], axis=-1)]
-    return ends[before, 1] + at[:, None] * directions(alpha[before]), alpha[before], pairs, is_cut[is_bend]
+    cross = (crossing > np.minimum(gap, 0.0) - config.reach_m) & (crossing < np.maximum(gap, 0.0) + config.reach_m)
+    at = np.where(cross, crossing, 0.5 * gap)
+    points = ends[before, 1] + at[:, None] * directions(alpha[before])
+    pair = np.stack([rows[before], rows[after]], axis=-1)
+    return _Bends(pair, points, np.abs(turn), cross, gap < -config.past_m, is_cut[is_bend])
 
 
 def _are_pairs(ids: Int[np.ndarray, " n"], pairs: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n n"]:

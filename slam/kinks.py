@@ -57,6 +57,8 @@ class Kink:
     """The segment of the present scan that lies across the bend."""
     bearing_rad: float
     """Of the bend, robot frame."""
+    along_m: float
+    """Of the bend, along the wall from its anchor."""
     turn_rad: float
     """Of the normal, walking along the wall with the free side on the left."""
     sigma_rad: float
@@ -112,7 +114,7 @@ class Kinks:
         row = place_of[best]
         bearing = float(alpha[row] + np.arctan((at[best] - foot[row]) / r[row]))
         segment, wall = pairs[row].tolist()
-        return Kink(wall, segment, bearing, float(turn[best]), float(information[best] ** -0.5))
+        return Kink(wall, segment, bearing, float(at[best]), float(turn[best]), float(information[best] ** -0.5))
 
     def sides_of(self, kink: Kink, segments: Segments, pieces: Segments, scan: Scan) -> tuple[int, int] | None:
         """Return the neighbours among `pieces`, of the same scan cut at a bend, between which it lies.

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Backend, Observations
-from .bends import BendsConfig, bends_within
+from .bends import BendsConfig, bends_within, laid_across, meetings
 from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
@@ -140,20 +140,22 @@ class Mapper:
     def _cut(
         self, kink: Kink, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
-        """Forget a wall that bends, so that its sides can take its place.
+        """Forget a wall that bends, and others laid across the bend, so that its sides can take their place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
         """
-        bends = self._bends(segments, self._walls.map(self.backend.belief))
+        walls = self._walls.map(self.backend.belief)
+        bends = self._bends(segments, walls)
         pieces = self._pieces(scan, np.append(bends, kink.bearing_rad))
         clear = np.flatnonzero(are_clear(pieces, self.config.walls.firmness))
         sides = self._kinks.sides_of(kink, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
-        self.backend.remove([kink.wall])
-        self._walls.drop(np.array([kink.wall]))
-        self._kinks.forget([kink.wall])
+        bent = np.union1d(laid_across(walls, kink.wall, kink.along_m, self.config.bends), [kink.wall]).tolist()
+        self.backend.remove(bent)
+        self._walls.drop(np.array(bent))
+        self._kinks.forget(bent)
         near = self._nearby(scan, self._walls.map(self.backend.belief))
         again = self._match(pieces, near, self.backend.belief.joint(near.ids), self.config.matching)
         return pieces, again, clear[list(sides)]
@@ -199,6 +201,8 @@ class Mapper:
         if len(forgotten):
             self.backend.remove(forgotten.tolist())
             self._kinks.forget(forgotten.tolist())
+        walls = self._walls.map(self.backend.belief)
+        self._walls.meet(*meetings(walls, scan.range_max_m, self.config.bends, self._kinks.cut))
         return owners
 
     def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:

@@ -152,6 +152,12 @@ class Walls:
         self._last_seen[row] = max(self._last_seen[row], self._last_seen[other])
         self.drop(np.array([drop]))
 
+    def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
+        """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past."""
+        before, after = np.searchsorted(self._ids, pairs).T
+        np.minimum.at(self._extents[:, 1], before, along[:, 0])
+        np.maximum.at(self._extents[:, 0], after, along[:, 1])
+
     def _append(self, ids: Int[np.ndarray, " m"]) -> None:
         m = len(ids)
         self._ids = np.concatenate([self._ids, ids])

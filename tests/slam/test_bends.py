@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from slam.backend import Belief, Joint
-from slam.bends import bends_within
+from slam.bends import bends_within, laid_across, meetings
 from slam.geometry.lines import directions, through
-from slam.geometry.poses import to_robot
+from slam.geometry.poses import to_robot, to_world
 from slam.segments import Segments
 from slam.stochastic_map import StochasticMap
 
@@ -105,3 +105,53 @@ def test_where_walls_overlap_the_bend_is_where_their_lines_cross():
 @pytest.mark.parametrize(("sigma", "is_known"), [(0.004, True), (0.02, False)])
 def test_a_bend_that_may_be_a_straight_wall_is_not_known(sigma, is_known):
     assert len(bends_within(segment_of([1.0, 0.0], [3.0, -0.03]), map_of(bent(), sigma))) == is_known
+
+
+def test_walls_laid_across_a_bend_are_those_that_reach_past_it_on_both_sides():
+    """Not one that begins near it, lies aside, looks the other way or turns by more."""
+    ends = [
+        *([[0.0, 0.0], [4.0, -0.02]], [[1.0, 0.01], [2.5, -0.01]], [[1.9, 0.0], [4.0, 0.0]], [[0.0, 0.2], [4.0, 0.2]]),
+        *([[4.0, 0.0], [0.0, 0.0]], [[1.0, 0.5], [3.0, -0.5]]),
+    ]
+    walls = map_of(ends)
+    assert laid_across(walls, 0, 0.0).tolist() == [0, 1]
+    assert laid_across(walls, 0, 1.2).tolist() == [0, 2]
+
+
+@pytest.mark.parametrize("turned_rad", [0.0, 2.0, -2.0])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_the_sides_of_a_bend_that_overlap_meet_where_their_lines_cross(turned_rad, is_first):
+    """In any direction, and whichever of the two has the lower id."""
+    world = np.array([3.0, -1.0, turned_rad])
+    ends = to_world(np.array([[[0.0, 0.0], [3.2, 0.0]], [[1.5, 0.015], [4.0, -0.06]]]), world)
+    walls = map_of(ends if is_first else ends[::-1])
+    (pair,), (along,) = meetings(walls, 9.0)
+    assert pair.tolist() == ([0, 1] if is_first else [1, 0])
+    foot = walls.belief.anchors[pair] + along[:, None] * directions(walls.belief.means[pair, 0])
+    np.testing.assert_allclose(to_robot(foot, world), [[2.0, 0.0], [2.0, 0.0]], atol=3e-4)
+
+
+def test_the_sides_of_a_bend_meet_in_the_middle_where_their_lines_do_not_cross():
+    (pair,), (along,) = meetings(map_of([[[0.0, 0.0], [3.0, 0.0]], [[2.0, 0.01], [4.0, 0.01]]]), 9.0, cut={(0, 1)})
+    assert pair.tolist() == [0, 1]
+    np.testing.assert_allclose(along, [1.0, -0.5], atol=1e-9)
+
+
+def test_the_sides_of_a_bend_that_end_before_it_are_left_as_they_are():
+    assert not len(meetings(map_of(bent(gap=0.1)), 9.0, cut={(0, 1)})[0])
+    assert not len(meetings(map_of(bent(gap=-0.02)), 9.0)[0])
+
+
+@pytest.mark.parametrize(("slope", "sigma"), [(0.003, 1e-5), (0.03, 0.02), (0.04, 1e-5)])
+def test_walls_that_may_be_one_or_no_wall_do_not_end_where_their_lines_cross(slope, sigma):
+    """They turn too little, or so much that beams tell them apart, or it is not known that they turn."""
+    ends = [[[0.0, 0.0], [3.2, 0.0]], [[1.5, 0.5 * slope], [4.0, -2.0 * slope]]]
+    assert not len(meetings(map_of(ends, sigma), 9.0)[0])
+    assert len(meetings(map_of(ends, sigma), 9.0, cut={(0, 1)})[0])
+
+
+def test_where_lines_cross_just_outside_the_overlap_one_wall_is_left_as_it_is():
+    walls = map_of([[[0.0, 0.0], [3.0, 0.0]], [[2.05, -0.0015], [4.0, -0.06]]])
+    (pair,), (along,) = meetings(walls, 9.0)
+    foot = walls.belief.anchors[pair] + along[:, None] * directions(walls.belief.means[pair, 0])
+    np.testing.assert_allclose(foot[:, 0], [2.05, 2.05], atol=1e-3)

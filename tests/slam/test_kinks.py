@@ -108,7 +108,7 @@ def test_the_scan_cut_at_the_bend_has_a_side_before_and_one_after(heading):
     segments = extract(scan)
     bearing = np.arctan2(1.2, -0.2) - heading
     pieces = extract(scan, bends_rad=np.array([bearing]))
-    kinks, kink = Kinks(), Kink(WALL, 0, bearing, np.deg2rad(0.2), np.deg2rad(0.03))
+    kinks, kink = Kinks(), Kink(WALL, 0, bearing, 0.0, np.deg2rad(0.2), np.deg2rad(0.03))
     before, after = kinks.sides_of(kink, segments, pieces, scan)
     assert sorted([before, after]) == [0, 1] == list(range(len(pieces)))
     one, other = pieces.ends[[before, after]].mean(axis=1)
@@ -145,13 +145,13 @@ def test_pairs_are_renamed_when_entries_are_merged():
     assert not kinks.cut
 
 
-def drive(kinks, turn_rad, backend="full-ekf", steps=100):
-    """Drive along a bent wall and back, exact scans and wheels; return the update of each step."""
+def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0):
+    """Drive along a bent wall and back, exact wheels; return the update of each step."""
     way = np.concatenate([np.linspace(-4, 4, steps // 2), np.linspace(4, -4, steps - steps // 2)])
     poses = np.column_stack([way, np.full(steps, -1.0), np.zeros(steps)])
     mapper = Mapper(BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), MapperConfig(kinks=kinks))
     updates = []
-    for k, scan in enumerate(scans(bent(turn_rad), poses, np.random.default_rng(0), 0.0)):
+    for k, scan in enumerate(scans(bent(turn_rad), poses, np.random.default_rng(seed), sigma)):
         if k:
             motion = compose(inverse(poses[k - 1]), poses[k])
             mapper.predict(Odometry(motion, np.diag([0.01, 0.01, np.deg2rad(1.0)]) ** 2))
@@ -170,6 +170,16 @@ def test_a_wall_that_bends_becomes_two_and_stays_two(backend):
     alpha = walls.belief.means[:, 0]
     assert abs(alpha[0] - alpha[1]) == pytest.approx(turn, abs=np.deg2rad(0.1))
     assert max(update.map.belief.pose_world[2] for update in updates[first + 15 :]) < np.deg2rad(0.45)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_sides_of_a_bend_never_overlap(seed):
+    """Each fits, within the noise, a piece of the other."""
+    updates = drive(KinksConfig(), np.deg2rad(0.6), steps=300, sigma=0.01, seed=seed)
+    last = updates[-1].map
+    one, other = np.sort(last.ends_world[..., 0], axis=-1)[np.argsort(last.ends_world[..., 0].min(axis=-1))]
+    assert -0.5 < one[1] < 0.5
+    assert abs(other[0] - one[1]) < 0.06
 
 
 def test_a_straight_wall_stays_one_and_no_number_is_changed():
