@@ -19,15 +19,17 @@ from .segments import Segments
 class FaintConfig:
     """When a line of few beams is believed."""
 
-    looks: int = 3
+    looks: int = 2
     """Places from which it must have been seen ..."""
     apart_m: float = 0.07
     """... so far from one another: from one place the same beams make the same line again."""
+    spare_beams: int = 3
+    """All looks together saw so many beams more than the two apiece that any line goes through."""
     longest_m: float = 0.18
     """Longer ones are not believed: a face of that length shows five beams from near by, and what shows three or four
     is mostly a line from one wall's corner to the next wall."""
-    patience_steps: int = 30
-    """It is forgotten when it was not seen for so many scans."""
+    patience_steps: int = 1000
+    """It is forgotten when it was not seen for so many scans: the second look may be on the way back."""
     gate: float = 0.99
     """Probability level of the test whether two sightings are of one line."""
     slack_m: float = 0.01
@@ -66,6 +68,7 @@ class FaintLines:
         self._lines = _Sightings(np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
         self._places = np.zeros((0, 2))
         self._looks = np.zeros(0, dtype=np.int64)
+        self._spare_beams = np.zeros(0, dtype=np.int64)
         self._unseen = np.zeros(0, dtype=np.int64)
 
     def see(self, pose_world: Float[np.ndarray, "3"], segments: Segments) -> Int[np.ndarray, " m"]:
@@ -75,9 +78,11 @@ class FaintLines:
         """
         seen = _sightings(pose_world, segments)
         short = np.flatnonzero(2.0 * seen.half_m <= self._config.longest_m)
-        return short[self._see(pose_world, seen.take(short))]
+        return short[self._see(pose_world, seen.take(short), segments.beam_counts[short] - 2)]
 
-    def _see(self, pose_world: Float[np.ndarray, "3"], seen: _Sightings) -> Int[np.ndarray, " m"]:
+    def _see(
+        self, pose_world: Float[np.ndarray, "3"], seen: _Sightings, spare_beams: Int[np.ndarray, " s"]
+    ) -> Int[np.ndarray, " m"]:
         self._unseen += 1
         line_of = self._line_of(seen)
         again = np.flatnonzero(line_of >= 0)
@@ -85,13 +90,16 @@ class FaintLines:
         self._unseen[rows] = 0
         moved = np.hypot(*(pose_world[:2] - self._places[rows]).T) >= self._config.apart_m
         self._looks[rows[moved]] += 1
+        self._spare_beams[rows[moved]] += spare_beams[again[moved]]
         self._places[rows[moved]] = pose_world[:2]
-        believed = again[self._looks[rows] >= self._config.looks]
+        due = (self._looks >= self._config.looks) & (self._spare_beams >= self._config.spare_beams)
+        believed = again[due[rows]]
         better = again[seen.var_alpha[again] < self._lines.var_alpha[rows]]
         for kept, found in zip(vars(self._lines).values(), vars(seen).values(), strict=True):
             kept[line_of[better]] = found[better]
-        self._keep((self._looks < self._config.looks) & (self._unseen <= self._config.patience_steps))
-        self._append(seen.take(line_of < 0), pose_world[:2])
+        self._keep(~due & (self._unseen <= self._config.patience_steps))
+        fresh = line_of < 0
+        self._append(seen.take(fresh), spare_beams[fresh], pose_world[:2])
         return believed
 
     def _line_of(self, seen: _Sightings) -> Int[np.ndarray, " s"]:
@@ -117,12 +125,16 @@ class FaintLines:
     def _keep(self, kept: Bool[np.ndarray, " n"]) -> None:
         self._lines, self._places = self._lines.take(kept), self._places[kept]
         self._looks, self._unseen = self._looks[kept], self._unseen[kept]
+        self._spare_beams = self._spare_beams[kept]
 
-    def _append(self, fresh: _Sightings, place_world: Float[np.ndarray, "2"]) -> None:
+    def _append(
+        self, fresh: _Sightings, spare_beams: Int[np.ndarray, " m"], place_world: Float[np.ndarray, "2"]
+    ) -> None:
         m = len(fresh.alpha)
         self._lines = self._lines.join(fresh)
         self._places = np.concatenate([self._places, np.tile(place_world, (m, 1))])
         self._looks = np.concatenate([self._looks, np.ones(m, dtype=np.int64)])
+        self._spare_beams = np.concatenate([self._spare_beams, spare_beams])
         self._unseen = np.concatenate([self._unseen, np.zeros(m, dtype=np.int64)])
 
 
