@@ -193,7 +193,8 @@ def _places(
     bounds = np.searchsorted(of, np.arange(count + 1))
     seen = np.flatnonzero(np.diff(bounds))
     first = np.floor(along[bounds[seen]] / pitch_m).astype(np.int64) + 1
-    places = np.ceil(along[bounds[seen + 1] - 1] / pitch_m).astype(np.int64) - first
+    # A lone beam at a place itself would have one less than none.
+    places = np.maximum(np.ceil(along[bounds[seen + 1] - 1] / pitch_m).astype(np.int64) - first, 0)
     begin = np.cumsum(places) - places
     return np.arange(places.sum()) + np.repeat(first - begin, places), np.repeat(seen, places)
 

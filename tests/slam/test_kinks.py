@@ -74,6 +74,12 @@ def test_places_lie_between_the_first_and_the_last_beam_of_each_wall():
     np.testing.assert_array_equal(place, [-2, -1, 0, 1, 2])
 
 
+def test_a_lone_beam_at_a_place_itself_has_none():
+    place, of = _places(np.array([45.0, -0.1, 0.1]), np.array([0, 1, 1]), 2, 0.25)
+    np.testing.assert_array_equal(of, [1])
+    np.testing.assert_array_equal(place, [0])
+
+
 @pytest.mark.parametrize("turn_deg", [0.4, 0.7, -0.7])
 def test_a_bend_that_no_scan_shows_is_found_where_it_is(turn_deg):
     """Whatever the robot believes its heading to be, and whether the noise that is stated is there or not."""
