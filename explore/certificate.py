@@ -174,7 +174,7 @@ def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen,
         LeftUnseen(
             border,
             len(border) * cell,
-            _why_left(border, step.left_places, "no scan from there shows what lies behind")
+            _why_left(border, step.left_places, "what lies behind was not all seen from there")
             if sweep
             else "unseen floor was not to be visited",
         )

@@ -7,20 +7,11 @@ from .driving_field import DrivingField
 from .free_space import FreeSpace
 from .paths import sees
 from .trusted_walls import TrustedWalls
-from .unseen import in_groups
 
-TILE_M = 1.5
-"""A long border is looked at piece by piece."""
 DISTANCES = 6
 """From so many distances up to the farthest."""
 NEARLY_M = 0.3
 """Of the places that see a piece of border, those not farther from it than the nearest and this much."""
-
-
-def tiles(points_world: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:
-    """Return points in groups, each within a square of `TILE_M`."""
-    _, group = np.unique(np.floor(points_world / TILE_M), axis=0, return_inverse=True)
-    return in_groups(points_world, group.ravel())
 
 
 def look_outs_on_coast(
@@ -30,9 +21,15 @@ def look_outs_on_coast(
     reach_m: float,
     free_space: FreeSpace,
     field: DrivingField,
+    *,
+    only_near: bool = False,
 ) -> Float[np.ndarray, "m 2"]:
-    """Return where the robot can stand within `coast_m` of a wall to see a place from within `reach_m`, m."""
-    spots = field.stands_around(place_world[None], reach_m * np.arange(1, DISTANCES + 1) / DISTANCES)
+    """Return where the robot can stand within `coast_m` of a wall to see a place from within `reach_m`, m.
+
+    `only_near` as in `DrivingField.can_stay`.
+    """
+    rings = reach_m * np.arange(1, DISTANCES + 1) / DISTANCES
+    spots = field.stands_around(place_world[None], rings, only_near=only_near)
     spots = spots[walls.near(spots, coast_m)]
     spots = spots[sees(free_space, spots, place_world, short_m=0.0)]
     away = np.hypot(*(spots - place_world).T)

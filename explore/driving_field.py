@@ -56,27 +56,47 @@ class DrivingField:
             return metres
         return self._lookup(self._far, places_world)
 
-    def can_stay(self, cells: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
-        """Return in which cells (row, column of the grid) the robot's centre may stay, and can get to."""
-        at = tuple(cells.T)
+    def can_stay(self, cells: Int[np.ndarray, "n 2"], *, only_near: bool = False) -> Bool[np.ndarray, " n"]:
+        """Return in which cells (row, column of the grid) the robot's centre may stay, and can get to.
+
+        With `only_near`, by a way that leads through the near box only.
+        """
+        at, reach = tuple(cells.T), self._near if only_near else self._far
         free, clearance = self._free_space.evidence[at] < 0, self._free_space.clearance()[at]
-        block = cells // BLOCK - self._far.first_block + 1
-        return roomy(free, clearance, self._config) & np.isfinite(self._far.metres[tuple(block.T)])
+        block = np.clip(cells // BLOCK - reach.first_block, -1, np.array(reach.metres.shape) - 2) + 1
+        return roomy(free, clearance, self._config) & np.isfinite(reach.metres[tuple(block.T)])
+
+    @property
+    def near_box(self) -> tuple[slice, slice]:
+        """The part of the grid in which what is near is searched."""
+        return self._box_of_cells(self._near_blocks)
+
+    @property
+    def _near_blocks(self) -> int:
+        return int(np.ceil(NEAR_M / self._side_m)) + 1
+
+    def _box_of_cells(self, reach: int) -> tuple[slice, slice]:
+        """Return the cells of the blocks up to `reach` from the start in rows and columns."""
+        low, high = BLOCK * np.maximum(self._start - reach, 0), BLOCK * (self._start + reach + 1)
+        return slice(low[0], high[0]), slice(low[1], high[1])
 
     def stands_around(
-        self, places_world: Float[np.ndarray, "n 2"], metres: Float[np.ndarray, " k"]
+        self, places_world: Float[np.ndarray, "n 2"], metres: Float[np.ndarray, " k"], *, only_near: bool = False
     ) -> Float[np.ndarray, "m 2"]:
-        """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`."""
+        """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`.
+
+        `only_near` as above.
+        """
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         around = (metres[:, None, None] * normals(angle)).reshape(-1, 2)
         stands = (places_world[:, None] + around).reshape(-1, 2)
         cells = self._free_space.cells(stands)
         inside = self._free_space.inside(cells)
-        return stands[inside][self.can_stay(cells[inside])]
+        return stands[inside][self.can_stay(cells[inside], only_near=only_near)]
 
     @cached_property
     def _near(self) -> _Reach:
-        return self._search(int(np.ceil(NEAR_M / self._side_m)) + 1)
+        return self._search(self._near_blocks)
 
     @cached_property
     def _far(self) -> _Reach:
@@ -85,9 +105,7 @@ class DrivingField:
     def _search(self, reach: int) -> _Reach:
         """Search as far as `reach` blocks from the start in rows and columns."""
         first = np.maximum(self._start - reach, 0)
-        low, high = BLOCK * first, BLOCK * (self._start + reach + 1)
-        box = (slice(low[0], high[0]), slice(low[1], high[1]))
-        blocks = blocks_with_any(passable(self._free_space, box, self._config)[0])
+        blocks = blocks_with_any(passable(self._free_space, self._box_of_cells(reach), self._config)[0])
         start = self._start - first
         starts = start[None]
         if not blocks[tuple(start)]:

@@ -6,12 +6,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from .coast import look_outs_on_coast, tiles
+from .coast import look_outs_on_coast
+from .driving_field import NEAR_M
 from .goal import LeftPlace
 from .spots import Spots
 from .strategies import Choice, Place, Situation
 from .strategies.nearest import nearest_seen_from, nearest_unexplained, nearest_unseen
 from .trusted_walls import TrustedWalls
+from .unseen import pieces
 
 
 @dataclass(frozen=True)
@@ -63,23 +65,27 @@ class Sweep:
         if not self._is_on:
             return None
         why = "every chain is done, unseen floor is left"
-        unseen = nearest_seen_from(situation, self._beside_walls(situation), why) or nearest_unseen(situation, why)
+        unseen = (
+            nearest_seen_from(situation, self._beside_walls(situation, only_near=True), why, NEAR_M)
+            or nearest_seen_from(situation, self._beside_walls(situation, only_near=False), why)
+            or nearest_unseen(situation, why)
+        )
         return unseen or nearest_unexplained(situation, "every chain is done, things stand that are no wall of the map")
 
-    def _beside_walls(self, situation: Situation) -> dict[Place, Place]:
+    def _beside_walls(self, situation: Situation, *, only_near: bool) -> dict[Place, Place]:
         """Return where to go with walls in sight, each with the unseen floor that is seen from there."""
         floor, coast_m = situation.around.free_space, situation.paths.coast_m
         reach_m = self._config.reach * situation.around.scan.range_max_m
         walls, found = TrustedWalls(situation.map), {}
-        for place in situation.unseen:
+        for place in situation.unseen_near if only_near else situation.unseen:
             if np.all(walls.near(place.points_world, coast_m)):
                 found[place] = place
                 continue
-            for tile in tiles(place.points_world):
+            for tile in pieces(place.points_world):
                 middle = tile.mean(axis=0)
                 if self._looked_at.count(middle):
                     continue
-                spots = look_outs_on_coast(middle, walls, coast_m, reach_m, floor, situation.field)
+                spots = look_outs_on_coast(middle, walls, coast_m, reach_m, floor, situation.field, only_near=only_near)
                 if len(spots):
                     found[Place(spots, place.what, place.kind, middle)] = Place(tile, place.what)
         return found

@@ -10,21 +10,34 @@ from .driving_field import DrivingField
 from .free_space import FreeSpace
 from .paths import cells_within
 
+PIECE_M = 1.5
+"""Side of the squares that cut a border into pieces."""
 
-def unseen_borders(free_space: FreeSpace, field: DrivingField, least_cells: int = 4) -> list[Float[np.ndarray, "n 2"]]:
+
+def unseen_borders(
+    free_space: FreeSpace, field: DrivingField, least_cells: int = 4, *, only_near: bool = False
+) -> list[Float[np.ndarray, "n 2"]]:
     """Return the borders between reachable floor and unseen floor, each as the reachable cells' centres, m.
 
-    Borders of fewer than `least_cells` cells are left out.
+    Borders of fewer than `least_cells` cells are left out. With `only_near`, what of them lies near to the start of the
+    field: much cheaper.
     """
-    unknown = free_space.evidence == 0
+    box = field.near_box if only_near else (slice(0, None), slice(0, None))
+    unknown = free_space.evidence[box] == 0
     beside = np.zeros_like(unknown)
     beside[1:] |= unknown[:-1]
     beside[:-1] |= unknown[1:]
     beside[:, 1:] |= unknown[:, :-1]
     beside[:, :-1] |= unknown[:, 1:]
-    cells = np.argwhere(beside & (free_space.evidence < 0))
-    cells = cells[field.can_stay(cells)]
+    cells = np.argwhere(beside & free_space.is_free(box)) + np.array([box[0].start, box[1].start])
+    cells = cells[field.can_stay(cells, only_near=only_near)]
     return [free_space.points(border) for border in connected(cells, 1.5) if len(border) >= least_cells]
+
+
+def pieces(points_world: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:
+    """Return the points of a border in groups, each within a square of a fixed grid: a long one is many places."""
+    _, group = np.unique(np.floor(points_world / PIECE_M), axis=0, return_inverse=True)
+    return in_groups(points_world, group.ravel())
 
 
 def connected(cells: Int[np.ndarray, "n 2"], reach_cells: float) -> list[Int[np.ndarray, "m 2"]]:

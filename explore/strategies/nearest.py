@@ -26,15 +26,19 @@ def nearest_end(
     return int(rows[np.argmin(metres[rows])]) if len(rows) else None
 
 
-def nearest_place(situation: Situation, places: Sequence[Place]) -> tuple[Place, float] | None:
-    """Return the place that is the shortest drive away, and how far, m; None if no way leads to any."""
+def nearest_place(
+    situation: Situation, places: Sequence[Place], within_m: float = np.inf
+) -> tuple[Place, float] | None:
+    """Return the place that is the shortest drive away, and how far, m; None if no way so short leads to any."""
     if not places:
         return None
     sizes = [len(place.points_world) for place in places]
-    metres = situation.field.metres(np.concatenate([place.points_world for place in places]))
+    points = np.concatenate([place.points_world for place in places])
+    metres = situation.field.metres(points, beyond_nearest=within_m == np.inf)
     nearest = np.minimum.reduceat(metres, np.cumsum([0, *sizes[:-1]]))
     best = int(np.argmin(nearest))
-    return (places[best], float(nearest[best])) if np.isfinite(nearest[best]) else None
+    is_there = np.isfinite(nearest[best]) and nearest[best] <= within_m
+    return (places[best], float(nearest[best])) if is_there else None
 
 
 def nearest_unseen(situation: Situation, what: str) -> Choice | None:
@@ -42,10 +46,12 @@ def nearest_unseen(situation: Situation, what: str) -> Choice | None:
     return _nearest(situation, situation.unseen, f"{what}: nearest of {{}} borders of seen floor", _still_unseen)
 
 
-def nearest_seen_from(situation: Situation, seen: Mapping[Place, Place], what: str) -> Choice | None:
+def nearest_seen_from(
+    situation: Situation, seen: Mapping[Place, Place], what: str, within_m: float = np.inf
+) -> Choice | None:
     """Return the nearest place from which another is seen, as a goal while half of that borders on unseen floor."""
     words = f"{what}: in sight of walls, nearest of {{}}"
-    return _nearest(situation, list(seen), words, lambda stand: _still_unseen(seen[stand]))
+    return _nearest(situation, list(seen), words, lambda stand: _still_unseen(seen[stand]), within_m)
 
 
 def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
@@ -54,10 +60,14 @@ def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
 
 
 def _nearest(
-    situation: Situation, places: Sequence[Place], words: str, holds: Callable[[Place], Callable[[Surroundings], bool]]
+    situation: Situation,
+    places: Sequence[Place],
+    words: str,
+    holds: Callable[[Place], Callable[[Surroundings], bool]],
+    within_m: float = np.inf,
 ) -> Choice | None:
     """Return the nearest place as a choice, with the reason in `words`, which has a gap for how many there are."""
-    found = nearest_place(situation, places)
+    found = nearest_place(situation, places, within_m)
     if found is None:
         return None
     place, metres = found

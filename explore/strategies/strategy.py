@@ -18,7 +18,7 @@ from ..driving_field import DrivingField
 from ..looks import LooksConfig, ideal_places
 from ..paths import PathConfig
 from ..unexplained import look_outs, unexplained
-from ..unseen import unseen_borders
+from ..unseen import pieces, unseen_borders
 from ..wall_following import Surroundings
 
 
@@ -92,7 +92,15 @@ class Situation:
     @cached_property
     def unseen(self) -> tuple[Place, ...]:
         """The borders between floor that can be driven to and floor that was never seen, the useless ones left out."""
-        borders = unseen_borders(self.around.free_space, self.field)
+        return self._places(unseen_borders(self.around.free_space, self.field))
+
+    @cached_property
+    def unseen_near(self) -> tuple[Place, ...]:
+        """Pieces of those borders that lie near to the robot: a fraction of the cost in a large building."""
+        borders = unseen_borders(self.around.free_space, self.field, only_near=True)
+        return self._places([piece for border in borders for piece in pieces(border)])
+
+    def _places(self, borders: list[np.ndarray]) -> tuple[Place, ...]:
         places = (Place(border, "unseen floor is left") for border in borders)
         return tuple(place for place in places if not self.was_in_vain(place.centre_world))
 

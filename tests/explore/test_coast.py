@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from explore.coast import TILE_M, look_outs_on_coast, tiles
+from explore.coast import look_outs_on_coast
 from explore.driving_field import DrivingField
 from explore.mission import MissionConfig, explore_mission
 from explore.strategies import STRATEGIES
 from explore.sweep import Sweep, SweepConfig
 from explore.trusted_walls import TrustedWalls
-from explore.unseen import unseen_borders
+from explore.unseen import PIECE_M, pieces, unseen_borders
 from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
@@ -23,8 +23,8 @@ REACH_M = 3.2
 
 def test_a_border_is_cut_into_squares_and_nothing_is_lost():
     points = np.random.default_rng(1).uniform(-5.0, 5.0, (300, 2))
-    found = tiles(points)
-    assert np.all(np.ptp(np.array([[t.min(axis=0), t.max(axis=0)] for t in found]), axis=1) <= TILE_M)
+    found = pieces(points)
+    assert np.all(np.ptp(np.array([[t.min(axis=0), t.max(axis=0)] for t in found]), axis=1) <= PIECE_M)
     np.testing.assert_allclose(np.unique(np.concatenate(found), axis=0), np.unique(points, axis=0))
 
 
@@ -35,7 +35,7 @@ def test_the_places_have_walls_near_see_the_floor_and_can_be_driven_to(hall):
     count = 0
     for border in unseen_borders(hall.grid, field):
         assert not walls.near(border, COAST_M).any(), "from beside the walls all floor near them was seen"
-        for tile in tiles(border):
+        for tile in pieces(border):
             places = look_outs_on_coast(tile.mean(axis=0), walls, COAST_M, REACH_M, hall.grid, field)
             count += len(places)
             assert len(places), "every piece of this border shows from the coast"
