@@ -21,8 +21,6 @@ from .sweep import SweepConfig
 from .unexplained import unexplained
 from .unseen import unseen_borders
 
-LEAST_BORDER_CELLS = 4
-"""Narrower borders are not worth a visit: they are gaps between beams."""
 WALL_FRINGE_M = 0.1
 """Floor this near to a closed contour counts as seen: two cells, into which walls and their errors reach."""
 
@@ -168,7 +166,7 @@ def left_open(step: Step, outcome: Outcome) -> tuple[LeftOpen, ...]:
 def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen, ...]:
     """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
     field = DrivingField(step.free_space, step.pose_world[:2], paths)
-    borders = unseen_borders(step.free_space, field, LEAST_BORDER_CELLS)
+    borders = unseen_borders(step.free_space, field)
     cell = step.free_space.config.cell_m
     return tuple(
         LeftUnseen(

@@ -10,16 +10,18 @@ from .driving_field import DrivingField
 from .free_space import FreeSpace
 from .paths import cells_within
 
+LEAST_CELLS = 4
+"""Narrower borders are not worth a visit: they are gaps between beams."""
 PIECE_M = 1.5
 """Side of the squares that cut a border into pieces."""
 
 
 def unseen_borders(
-    free_space: FreeSpace, field: DrivingField, least_cells: int = 4, *, only_near: bool = False
+    free_space: FreeSpace, field: DrivingField, *, only_near: bool = False
 ) -> list[Float[np.ndarray, "n 2"]]:
     """Return the borders between reachable floor and unseen floor, each as the reachable cells' centres, m.
 
-    Borders of fewer than `least_cells` cells are left out. With `only_near`, what of them lies near to the start of the
+    Borders of fewer than `LEAST_CELLS` cells are left out. With `only_near`, what of them lies near to the start of the
     field: much cheaper.
     """
     box = field.near_box if only_near else (slice(0, None), slice(0, None))
@@ -31,7 +33,7 @@ def unseen_borders(
     beside[:, :-1] |= unknown[:, 1:]
     cells = np.argwhere(beside & free_space.is_free(box)) + np.array([box[0].start, box[1].start])
     cells = cells[field.can_stay(cells, only_near=only_near)]
-    return [free_space.points(border) for border in connected(cells, 1.5) if len(border) >= least_cells]
+    return [free_space.points(border) for border in connected(cells, 1.5) if len(border) >= LEAST_CELLS]
 
 
 def pieces(points_world: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:

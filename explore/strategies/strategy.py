@@ -18,7 +18,7 @@ from ..driving_field import DrivingField
 from ..looks import LooksConfig, ideal_places
 from ..paths import PathConfig
 from ..unexplained import look_outs, unexplained
-from ..unseen import pieces, unseen_borders
+from ..unseen import LEAST_CELLS, pieces, unseen_borders
 from ..wall_following import Surroundings
 
 
@@ -98,7 +98,7 @@ class Situation:
     def unseen_near(self) -> tuple[Place, ...]:
         """Pieces of those borders that lie near to the robot: a fraction of the cost in a large building."""
         borders = unseen_borders(self.around.free_space, self.field, only_near=True)
-        return self._places([piece for border in borders for piece in pieces(border)])
+        return self._places([piece for border in borders for piece in pieces(border) if len(piece) >= LEAST_CELLS])
 
     def _places(self, borders: list[np.ndarray]) -> tuple[Place, ...]:
         places = (Place(border, "unseen floor is left") for border in borders)
