@@ -11,6 +11,8 @@ from .furnishing import furnish
 
 START_CLEARANCE_M = 0.4
 """Least distance from the start to all walls."""
+LEAST_FACE_M = 0.0999
+"""No face is shorter than the thickness of a wall, 0.1 m, less what rounding takes."""
 OUTER_M = 0.3
 """Thickness of what surrounds the building."""
 
@@ -26,9 +28,7 @@ def read_seed(text: str) -> Drawing:
 def random_building(seed: int) -> Drawing:
     """Return a building drawn as one solid around its floor, turned by any angle, with a start pose somewhere on it."""
     chance = np.random.default_rng(seed)
-    style = STYLES[int(chance.integers(len(STYLES)))]
-    plan = floor_plan(style, chance)
-    floor = furnish(plan, style.furniture * chance.uniform(0.0, 2.0), chance)
+    floor = _floor(chance)
     start = _start(floor, chance)
     turn = chance.uniform(0.0, 2.0 * np.pi)
     rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
@@ -37,6 +37,20 @@ def random_building(seed: int) -> Drawing:
     solid = floor.exterior.convex_hull.buffer(OUTER_M, join_style="mitre").difference(floor)
     heading = chance.uniform(-np.pi, np.pi)
     return Drawing(solids=tuple(shapely.get_parts(solid)), start=np.array([0.0, 0.0, heading]))
+
+
+def _floor(chance: np.random.Generator) -> shapely.Polygon:
+    """Return a floor, drawn again where a door beside a slanted wall left a face shorter than any wall is thick."""
+    while True:
+        style = STYLES[int(chance.integers(len(STYLES)))]
+        floor = furnish(floor_plan(style, chance), style.furniture * chance.uniform(0.0, 2.0), chance)
+        if _shortest_face(floor) >= LEAST_FACE_M:
+            return floor
+
+
+def _shortest_face(floor: shapely.Polygon) -> float:
+    rings = [shapely.get_coordinates(ring) for ring in (floor.exterior, *floor.interiors)]
+    return float(min(np.hypot(*np.diff(ring, axis=0).T).min() for ring in rings))
 
 
 def _start(floor: shapely.Polygon, chance: np.random.Generator) -> Float[np.ndarray, "2"]:

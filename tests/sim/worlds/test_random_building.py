@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sim.worlds import World, WorldError, listing, load
@@ -41,6 +41,7 @@ def test_all_of_the_floor_is_one_valid_region_that_a_robot_passes_through(seed):
 
 
 @QUICK
+@example(66596)
 @given(SEEDS)
 def test_walls_are_solid_and_no_face_is_a_sliver(seed):
     world = load(f"random:{seed}")
