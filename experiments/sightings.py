@@ -120,7 +120,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
         begun = begun[~segments.is_tentative[begun]]
         owned = known & ~segments.is_tentative
         owned[begun] = True
-        firmness.see(segments, np.where(owned, walls, -1), float(run.true_poses_world[k, 2]))
+        firmness.see(segments, np.where(owned, walls, -1), run.true_poses_world[k])
         looks = _looks(segments, walls).take(seen)
         again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.firmness)))
         first.append(_looks(segments, walls).take(begun))

@@ -2,7 +2,8 @@
 
 Around a corner of short faces a line fits six beams of each scan well enough, and another line from every place. What
 makes the direction clear is then that it took in a beam of the next face: the sightings that are let through are the
-wrong ones. One scan cannot tell such a line from a wall; all scans together can.
+wrong ones. One scan cannot tell such a line from a wall; all scans together can. So they can where the robot, far
+from a wall that bends by a few degrees, sees of it now one side and then the other: each sighting is straight.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaincc
 
-from .geometry.poses import wrap
+from .geometry.lines import directions
+from .geometry.poses import to_world, wrap
 from .segments import Segments
 
 
@@ -32,8 +34,10 @@ class FirmnessConfig:
     excess: float = 1.2
     """Chi-square over degrees of freedom of all fits: misfits of 0.45 times the noise. Smaller ones any real wall shows
     over thousands of beams."""
+    bend_rad: float = float(np.deg2rad(0.5))
+    """Directions that differ along the wall by less, root mean square, may be the robot's own turn on its way there."""
     chance: float = 1e-5
-    """Straight walls are taken for crooked this rarely by each of the two tests."""
+    """Straight walls are taken for crooked this rarely by each of the three tests."""
 
 
 def are_clear(segments: Segments, config: FirmnessConfig = FirmnessConfig()) -> Bool[np.ndarray, " s"]:
@@ -62,23 +66,28 @@ class Firmness:
     def __init__(self, config: FirmnessConfig = FirmnessConfig()) -> None:
         self._config = config
         self._fits = np.zeros((0, 2))
-        self._first = np.zeros(0)
+        self._first = np.full((0, 3), np.nan)
         self._directions = np.zeros((0, 2, 2))
+        # Of the clear ones: information times how far along the wall, and that times the same, and times direction.
+        self._along = np.zeros((0, 3))
         self._crooked = np.zeros(0, dtype=bool)
 
-    def see(self, segments: Segments, owners: Int[np.ndarray, " s"], heading_rad: float) -> None:
-        """Add one scan, taken at a heading in the world; `owners` holds the wall of each segment, -1 for none."""
+    def see(self, segments: Segments, owners: Int[np.ndarray, " s"], pose_world: Float[np.ndarray, "3"]) -> None:
+        """Add one scan, taken at a pose in the world; `owners` holds the wall of each segment, -1 for none."""
         used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
         ids, seen = owners[used], segments.take(used)
-        alpha, information = wrap(seen.lines[:, 0] + heading_rad), 1.0 / seen.cov[:, 0, 0]
+        alpha, information = wrap(seen.lines[:, 0] + pose_world[2]), 1.0 / seen.cov[:, 0, 0]
+        middle = to_world(seen.ends.mean(axis=1), pose_world)
         self._make_room(int(ids.max(initial=-1)) + 1)
-        new = np.isnan(self._first[ids])
-        self._first[ids[new]] = alpha[new]
+        new = np.isnan(self._first[ids, 0])
+        self._first[ids[new]] = np.column_stack([alpha, middle])[new]
         np.add.at(self._fits, ids, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
-        off = wrap(alpha - self._first[ids])
-        clear = are_clear(seen, self._config).astype(int)
-        np.add.at(self._directions, (ids, clear), np.stack([information, information * off], axis=-1))
-        self._crooked[ids] = self._misfit(ids) | self._in_conflict(ids)
+        off = wrap(alpha - self._first[ids, 0])
+        along = np.vecdot(middle - self._first[ids, 1:], directions(self._first[ids, 0]))
+        clear = are_clear(seen, self._config)
+        np.add.at(self._directions, (ids, clear.astype(int)), np.stack([information, information * off], axis=-1))
+        np.add.at(self._along, ids, (information * clear * along * np.stack([np.ones_like(off), along, off])).T)
+        self._crooked[ids] = self._misfit(ids) | self._in_conflict(ids) | self._bends(ids)
 
     def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
         """Return which segments of one scan, each on the wall of that id, may move the estimate.
@@ -117,11 +126,23 @@ class Firmness:
         conflict[both] = gammaincc(0.5, 0.5 * apart) < self._config.chance
         return conflict
 
+    def _bends(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        """Return where the clear directions change along the wall: by a line through them, weighted."""
+        information, sums = self._directions[ids, 1].T
+        first, second, mixed = self._along[ids].T
+        middle = first / np.maximum(information, 1e-9)
+        spread, trend = second - middle * first, mixed - middle * sums
+        gain = trend**2 / np.maximum(spread, 1e-9)
+        bends = gain > self._config.bend_rad**2 * information
+        bends[bends] = gammaincc(0.5, 0.5 * gain[bends]) < self._config.chance
+        return bends
+
     def _make_room(self, count: int) -> None:
         missing = count - len(self._first)
         if missing <= 0:
             return
         self._fits = np.concatenate([self._fits, np.zeros((missing, 2))])
-        self._first = np.concatenate([self._first, np.full(missing, np.nan)])
+        self._first = np.concatenate([self._first, np.full((missing, 3), np.nan)])
         self._directions = np.concatenate([self._directions, np.zeros((missing, 2, 2))])
+        self._along = np.concatenate([self._along, np.zeros((missing, 3))])
         self._crooked = np.concatenate([self._crooked, np.zeros(missing, dtype=bool)])

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .backend import Backend, Observations
-from .bends import BendsConfig, bends_within, laid_across, meetings
+from .bends import BendsConfig, bends_within, laid_across, meetings, mistaken
 from .chains import Chain, ChainConfig, connect
 from .duplicates import DuplicatesConfig, duplicate_of
 from .extraction import NO_BENDS, extract
@@ -98,6 +98,7 @@ class Mapper:
         # 1. Extract features from the sensory input.
         walls = self._walls.map(self.backend.belief)
         segments = self._segments(scan, walls)
+        walls = self._without(mistaken(segments, walls, self.config.bends), walls)
         # 2. Match observed features to the best fitting equivalents in the map.
         near = self._nearby(scan, walls)
         joint = self.backend.belief.joint(near.ids)
@@ -119,7 +120,7 @@ class Mapper:
         if kink is not None:
             segments, matches, sides = self._cut(kink, scan, segments, matches)
         owners = self._store(scan, segments, matches, sides)
-        walls, merged = self._merge(owners)
+        walls, merged = self._merge(owners, self._ended(scan))
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._gaps.see(walls, scan)
         chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
@@ -152,13 +153,19 @@ class Mapper:
         sides = self._kinks.sides_of(kink, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
-        bent = np.union1d(laid_across(walls, kink.wall, kink.along_m, self.config.bends), [kink.wall]).tolist()
-        self.backend.remove(bent)
-        self._walls.drop(np.array(bent))
-        self._kinks.forget(bent)
-        near = self._nearby(scan, self._walls.map(self.backend.belief))
+        bent = np.union1d(laid_across(walls, kink.wall, kink.along_m, self.config.bends), [kink.wall])
+        near = self._nearby(scan, self._without(bent, walls))
         again = self._match(pieces, near, self.backend.belief.joint(near.ids), self.config.matching)
         return pieces, again, clear[list(sides)]
+
+    def _without(self, mistaken: Int[np.ndarray, " n"], walls: StochasticMap) -> StochasticMap:
+        """Forget walls of the map that are none, and return what is left of it."""
+        if not len(mistaken):
+            return walls
+        self.backend.remove(mistaken.tolist())
+        self._walls.drop(mistaken)
+        self._kinks.forget(mistaken.tolist())
+        return self._walls.map(self.backend.belief)
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
@@ -201,16 +208,24 @@ class Mapper:
         if len(forgotten):
             self.backend.remove(forgotten.tolist())
             self._kinks.forget(forgotten.tolist())
-        walls = self._walls.map(self.backend.belief)
-        self._walls.meet(*meetings(walls, scan.range_max_m, self.config.bends, self._kinks.cut))
         return owners
 
-    def _merge(self, owners: Int[np.ndarray, " s"]) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
-        """Make one of two walls that lie along each other, if the joint covariance agrees.
+    def _ended(self, scan: Scan) -> StochasticMap:
+        """Return the map, in which the sides of a bend end where they meet."""
+        walls = self._walls.map(self.backend.belief)
+        pairs, along = meetings(walls, scan.range_max_m, self.config.bends, self._kinks.cut)
+        if not len(pairs):
+            return walls
+        self._walls.meet(pairs, along)
+        return self._walls.map(self.backend.belief)
+
+    def _merge(
+        self, owners: Int[np.ndarray, " s"], walls: StochasticMap
+    ) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
+        """Make one of two walls of the map that lie along each other, if the joint covariance agrees.
 
         `owners` is brought up to date. Returns the map, and the ids (kept, dropped).
         """
-        walls = self._walls.map(self.backend.belief)
         if self.config.duplicates is None:
             return walls, ()
         merged: list[tuple[int, int]] = []

@@ -81,7 +81,7 @@ class Walls:
         `believed` are walls that were seen often before they became walls.
         """
         self._scans += 1
-        self._firmness.see(segments, owners, float(belief.pose_world[2]))
+        self._firmness.see(segments, owners, belief.pose_world)
         if len(belief.ids) > len(self._ids):
             self._append(belief.ids[len(self._ids) :])
         used = np.flatnonzero(owners >= 0)

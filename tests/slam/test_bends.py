@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slam.backend import Belief, Joint
-from slam.bends import bends_within, laid_across, meetings
+from slam.bends import bends_within, laid_across, meetings, mistaken
 from slam.geometry.lines import directions, through
 from slam.geometry.poses import to_robot, to_world
 from slam.segments import Segments
@@ -155,3 +155,44 @@ def test_where_lines_cross_just_outside_the_overlap_one_wall_is_left_as_it_is():
     (pair,), (along,) = meetings(walls, 9.0)
     foot = walls.belief.anchors[pair] + along[:, None] * directions(walls.belief.means[pair, 0])
     np.testing.assert_allclose(foot[:, 0], [2.05, 2.05], atol=1e-3)
+
+
+def scan_of(*ends, sigma_rad=0.002, beams=9):
+    """Return what the robot at POSE sees: segments with these ends, world frame, counter-clockwise."""
+    ends, n = to_robot(np.reshape(ends, (-1, 2, 2)).astype(float), POSE), len(ends)
+    nothing = np.zeros((n, 2), dtype=np.int64)
+    cov = np.tile(np.diag([sigma_rad**2, 1e-6]), (n, 1, 1))
+    return Segments(through(ends), cov, ends, nothing, np.full(n, beams), nothing, np.zeros(n))
+
+
+BENT = ([1.0, 0.0], [2.0, 0.0]), ([2.1, -0.005], [3.0, -0.055])
+"""Two sides of a bend of 3 degrees, 0.1 m apart."""
+
+
+@pytest.mark.parametrize("shift", [0, 1])
+def test_a_wall_laid_across_a_bend_that_the_scan_shows_was_none(shift):
+    """Whichever segment comes first; not one that ends at the bend, lies aside, or was seen often."""
+    ends = [
+        *([[1.0, 0.0], [3.0, -0.05]], [[0.0, 0.0], [2.2, 0.0]], [[2.0, 0.0], [4.0, -0.1]], [[0.0, 0.2], [4.0, 0.2]]),
+        [[0.0, 0.0], [4.0, -0.02]],
+    ]
+    walls = map_of(ends)
+    walls.sightings[4] = 50
+    others = ([4.0, -0.1], [4.0, 3.0]), ([4.0, 3.0], [0.0, 3.0])
+    assert mistaken(scan_of(*np.roll([*BENT, *others], shift, axis=0)), walls).tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    "scan",
+    [
+        scan_of(*BENT, sigma_rad=0.02),
+        scan_of(*BENT, beams=4),
+        scan_of(BENT[0], ([2.6, -0.03], [3.0, -0.05])),
+        scan_of(BENT[0], ([2.1, -0.005], [3.0, -0.3])),
+        scan_of(([0.0, 0.0], [4.0, 0.0])),
+        scan_of(),
+    ],
+)
+def test_where_the_scan_may_show_one_wall_or_two_with_a_gap_nothing_was_mistaken(scan):
+    """The turn is in doubt, by noise or by few beams; there is a gap, a real corner, or only one segment, or none."""
+    assert not len(mistaken(scan, map_of([[[1.0, 0.0], [3.0, -0.05]]])))

@@ -8,7 +8,7 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.extraction import extract
 from slam.firmness import Firmness, FirmnessConfig, are_clear, as_told
-from slam.geometry.poses import compose, inverse
+from slam.geometry.poses import compose, inverse, to_world
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 from slam.segments import Segments
@@ -47,6 +47,7 @@ def sighting(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
 
 
 OWNER = np.array([0])
+POSE = np.zeros(3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -67,7 +68,7 @@ def test_real_scans_of_straight_walls_make_no_wall_crooked(seed):
         runs = [hit[np.arange(a, b + 1 + beams * (b < a)) % beams] for a, b in segments.beams]
         pure = np.array([len(set(run)) == 1 for run in runs], dtype=bool)
         middle = (first + (last - first) % beams // 2) % beams
-        firmness.see(segments, np.where(pure & ~segments.is_tentative, hit[middle], -1), float(poses[k, 2]))
+        firmness.see(segments, np.where(pure & ~segments.is_tentative, hit[middle], -1), poses[k])
     assert not firmness.are_crooked(np.arange(len(faces))).any()
 
 
@@ -77,8 +78,8 @@ def test_a_clear_sighting_far_from_all_vague_ones_gives_the_wall_away():
     for off, crooked in ((np.deg2rad(-31.0), True), (np.deg2rad(-8.0), False)):
         firmness = Firmness()
         for _ in range(35):
-            firmness.see(sighting(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, 0.0)
-        firmness.see(sighting(off, np.deg2rad(2.8)), OWNER, 0.0)
+            firmness.see(sighting(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, POSE)
+        firmness.see(sighting(off, np.deg2rad(2.8)), OWNER, POSE)
         assert firmness.are_crooked(OWNER).tolist() == [crooked]
 
 
@@ -88,8 +89,12 @@ def test_directions_are_those_in_the_world_across_the_cut_at_half_a_turn():
     for _ in range(60):
         heading = rng.uniform(-np.pi, np.pi)
         vague, clear = np.deg2rad(8.0), np.deg2rad(2.0)
-        firmness.see(sighting(np.pi - heading + vague * rng.standard_normal(), vague), OWNER, heading)
-        firmness.see(sighting(np.pi - heading + clear * rng.standard_normal(), clear), OWNER, heading)
+        firmness.see(
+            sighting(np.pi - heading + vague * rng.standard_normal(), vague), OWNER, np.array([0.0, 0.0, heading])
+        )
+        firmness.see(
+            sighting(np.pi - heading + clear * rng.standard_normal(), clear), OWNER, np.array([0.0, 0.0, heading])
+        )
     assert not firmness.are_crooked(OWNER).any()
 
 
@@ -97,12 +102,12 @@ def test_fits_that_are_a_little_bad_every_time_tell_after_a_while():
     firmness = Firmness()
     told = []
     for _ in range(60):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=16.0), OWNER, 0.0)
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=16.0), OWNER, POSE)
         told.append(bool(firmness.are_crooked(OWNER)[0]))
     assert not told[2]
     assert told[-1]
     for _ in range(2000):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=11.0), np.array([1]), 0.0)
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=11.0), np.array([1]), POSE)
     assert not firmness.are_crooked(np.array([1]))[0], "a tenth too much is what real walls show"
 
 
@@ -148,17 +153,17 @@ def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction(
     firmness, few = Firmness(), sighting(0.0, 0.01, beams=3)
     assert not firmness.may_move(few, OWNER).any(), "of this wall nothing is known"
     for _ in range(200):
-        firmness.see(sighting(0.0, 0.12, beams=6), OWNER, 0.0)
+        firmness.see(sighting(0.0, 0.12, beams=6), OWNER, POSE)
     assert not firmness.may_move(few, OWNER).any(), "only vague sightings"
-    firmness.see(sighting(0.0, 0.02, beams=8), OWNER, 0.0)
+    firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
     assert not firmness.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
     assert firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).all()
     for _ in range(5):
-        firmness.see(sighting(0.0, 0.02, beams=8), OWNER, 0.0)
+        firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
     assert firmness.may_move(few, OWNER).all()
     assert not firmness.may_move(sighting(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
     for _ in range(300):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, 0.0)
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
     assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
     assert not firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).any()
 
@@ -167,8 +172,8 @@ def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
     """Refused, the only wall in sight cost 8 degrees of heading in 3.5 m; its bend is one."""
     firmness, straight = Firmness(), 1
     for _ in range(60):
-        firmness.see(sighting(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, 0.0)
-        firmness.see(sighting(0.0, 0.02, beams=8), np.array([straight]), 0.0)
+        firmness.see(sighting(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, POSE)
+        firmness.see(sighting(0.0, 0.02, beams=8), np.array([straight]), POSE)
     assert firmness.are_crooked(np.array([0, straight])).tolist() == [True, False]
     long, short = (sighting(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
     assert firmness.may_move(long, OWNER).tolist() == [True]
@@ -202,3 +207,37 @@ def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():
         update = mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.1 * k))
     assert 3 in update.segments.beam_counts[update.matches.pairs[:, 0]], "the line over two faces is matched"
     assert abs(update.map.belief.pose_world[2] - 1.0) < np.deg2rad(0.15)
+
+
+def seen_along(turn_rad, rng, drift_rad=0.0, sigma_rad=0.009):
+    """Return whether a wall is crooked that turns by so much at its middle and is seen piece by piece from 4 m.
+
+    The robot's heading drifts by so much on its way along it.
+    """
+    firmness = Firmness()
+    for share in np.linspace(0.0, 1.0, 40):
+        alpha = turn_rad * (share > 0.5) + drift_rad * share + sigma_rad * rng.standard_normal()
+        heading = rng.uniform(-np.pi, np.pi)
+        piece = sighting(alpha - heading, sigma_rad)
+        middle = np.array([1.0, 3.0 * share])  # the wall x = 1, walked along upwards
+        place = middle - to_world(piece.ends.mean(axis=1), np.array([0.0, 0.0, heading]))[0]
+        firmness.see(piece, OWNER, np.append(place, heading))
+    return bool(firmness.are_crooked(OWNER)[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sides_of_a_bend_seen_one_after_the_other_give_it_away(seed):
+    rng = np.random.default_rng(seed)
+    assert seen_along(np.deg2rad(2.4), rng)
+    assert seen_along(np.deg2rad(-2.4), rng)
+    assert not seen_along(0.0, rng)
+    assert not seen_along(0.0, rng, drift_rad=np.deg2rad(1.0), sigma_rad=np.deg2rad(0.05)), "so much the robot may turn"
+
+
+def test_a_wall_seen_turned_from_one_place_does_not_bend():
+    """Along the wall nothing changes: what differs is the robot's heading."""
+    firmness, rng = Firmness(), np.random.default_rng(7)
+    for k in range(200):
+        off = np.deg2rad(3.0) * (k > 100) + 0.01 * rng.standard_normal()
+        firmness.see(sighting(off, 0.01), OWNER, POSE)
+    assert not firmness.are_crooked(OWNER)[0]

@@ -215,3 +215,19 @@ def test_a_bend_that_the_map_knows_is_cut_where_the_scan_shows_one_line():
     for pose, update in zip(places, walk(room, places), strict=True):
         np.testing.assert_allclose(update.map.belief.pose_world[:2], pose[:2], atol=1e-4)
     assert len(update.map) == 5
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_a_line_laid_across_a_bend_from_afar_turns_nobody(backend):
+    """A wall that turns by 4.3 degrees, met head on: 14 beams of both sides, then two pieces. The one turned by 0.4."""
+    faces = np.array([[[3.0, 0.0], [-0.68, 0.0]], [[-0.68, 0.0], [-3.67, -0.223]]])
+    places = np.array([(0.0, y, 0.5 * np.pi) for y in np.arange(-3.87, -2.5, 0.15)])
+    finder, wheels = RangeFinder(faces, LidarConfig()), np.diag([0.01, 0.01, np.deg2rad(1.5)]) ** 2
+    mapper = Mapper(BACKENDS[backend].make(places[0], 1e-8 * np.eye(3)))
+    for k, place in enumerate(places):
+        if k:
+            mapper.predict(Odometry(compose(inverse(places[k - 1]), place), wheels))
+        update = mapper.step(Scan(finder.bearings_rad, finder.cast(place)[0], 0.01, 4.0, 0.1 * k))
+        assert k or len(update.map) == 1, "one line, at first"
+    assert len(update.map) == 2
+    assert abs(update.map.belief.pose_world[2] - 0.5 * np.pi) < np.deg2rad(0.05)
