@@ -45,6 +45,8 @@ class BendsConfig:
     """A wall that reaches so far beyond a bend on both sides was laid across it."""
     past_shown_m: float = 0.15
     """The same for a bend that a scan shows: a beam of the other side was taken in, at 4 m one in 0.13 m."""
+    sharpest_rad: float = float(np.deg2rad(30.0))
+    """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
     young_sightings: int = 10
     """A wall seen this often is not forgotten for a bend that one scan shows: all scans together tell (`kinks`)."""
     shown: float = 0.99
@@ -118,7 +120,7 @@ def mistaken(segments: Segments, walls: StochasticMap, config: BendsConfig = Ben
     turn = wrap(segments.lines[after, 0] - segments.lines[:, 0])
     variance = segments.cov[:, 0, 0] + segments.cov[after, 0, 0]
     between = segments.ends[after, 0] - segments.ends[:, 1]
-    shown = ~segments.is_tentative & ~segments.is_tentative[after] & (np.abs(turn) < config.largest_rad)
+    shown = ~segments.is_tentative & ~segments.is_tentative[after] & (np.abs(turn) < config.sharpest_rad)
     shown &= (turn**2 > gate_level(config.shown, 1) * variance) & (np.linalg.norm(between, axis=1) < config.cut_reach_m)
     before = np.flatnonzero(shown)
     pose = walls.belief.pose_world

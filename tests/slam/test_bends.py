@@ -188,7 +188,7 @@ def test_a_wall_laid_across_a_bend_that_the_scan_shows_was_none(shift):
         scan_of(*BENT, sigma_rad=0.02),
         scan_of(*BENT, beams=4),
         scan_of(BENT[0], ([2.6, -0.03], [3.0, -0.05])),
-        scan_of(BENT[0], ([2.1, -0.005], [3.0, -0.3])),
+        scan_of(BENT[0], ([2.1, -0.005], [3.0, -0.7])),
         scan_of(([0.0, 0.0], [4.0, 0.0])),
         scan_of(),
     ],
