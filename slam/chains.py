@@ -4,10 +4,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
-from .geometry.lines import intersect, normals
+from .geometry.lines import directions, intersect, normals
 from .stochastic_map import StochasticMap
 
 TAIL, HEAD = 0, 1
@@ -27,6 +27,14 @@ class ChainConfig:
     straight_reach_m: float = 0.07
     """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
     the wall between, as far apart as that is thick."""
+    overlap_m: float = 1.0
+    """Largest overlap of the two sides of a bend: within the noise each reaches past it ..."""
+    beside_m: float = 0.03
+    """... where it lies no farther than this from the other: three sigmas of a beam."""
+    bend_rad: tuple[float, float] = (float(np.deg2rad(1.0)), float(np.deg2rad(30.0)))
+    """What such a bend turns: less, and it may be one wall entered twice; more, and beams tell where it is."""
+    bend_sightings: int = 10
+    """Both sides were seen this often: a line laid across a bend joins neither for being near to both."""
     corner_reach_m: float = 0.3
     """A corner is the intersection of the two lines where that lies this near to both ends, else their middle."""
 
@@ -76,7 +84,8 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    successor = _links(ends, lines, ids, set_aside, passed, config)
+    often = walls.sightings[rows] >= config.bend_sightings
+    successor = _links(ends, lines, ids, often, set_aside, passed, config)
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
     corners = np.full((len(rows), 2), np.nan)
@@ -90,14 +99,14 @@ def _links(
     ends: Float[np.ndarray, "n 2 2"],
     lines: Float[np.ndarray, "n 2"],
     ids: Int[np.ndarray, " n"],
+    often: Bool[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
     passed: Collection[tuple[int, int]],
     config: ChainConfig,
 ) -> Int[np.ndarray, " n"]:
     """Return the row of each wall's successor, -1 for none: greedily, nearest ends first."""
-    near = cKDTree(ends[:, HEAD]).sparse_distance_matrix(
-        cKDTree(ends[:, TAIL]), max(config.reach_m, config.set_aside_reach_m), output_type="ndarray"
-    )
+    reach = max(config.reach_m, config.set_aside_reach_m, config.overlap_m)
+    near = cKDTree(ends[:, HEAD]).sparse_distance_matrix(cKDTree(ends[:, TAIL]), reach, output_type="ndarray")
     head, tail, gap = near["i"], near["j"], near["v"]
     aside = np.isin(2 * ids[:, None] + [TAIL, HEAD], [2 * wall + side for wall, side in set_aside])
     both_aside = aside[head, HEAD] & aside[tail, TAIL]
@@ -107,12 +116,36 @@ def _links(
     straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
     across = np.abs(np.vecdot(normals(lines[head, 0]), ends[tail, TAIL] - ends[head, HEAD]))
     allowed &= ~straight | (gap <= config.straight_reach_m) | (across > 0.5 * gap)
+    allowed |= (
+        (gap <= config.overlap_m)
+        & (often[head] & often[tail])
+        & _overlap_at_a_bend(ends[head], ends[tail], lines[head, 0], lines[tail, 0], config)
+    )
     order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
     successor, taken = [-1] * len(ids), [False] * len(ids)
     for before, after in zip(head[order].tolist(), tail[order].tolist(), strict=True):
         if successor[before] < 0 and not taken[after]:
             successor[before], taken[after] = after, True
     return np.array(successor)
+
+
+def _overlap_at_a_bend(
+    before: Float[np.ndarray, "k 2 2"],
+    after: Float[np.ndarray, "k 2 2"],
+    alpha_before: Float[np.ndarray, " k"],
+    alpha_after: Float[np.ndarray, " k"],
+    config: ChainConfig,
+) -> Bool[np.ndarray, " k"]:
+    """Return which walls, given by their ends, are the sides of a bend past which they reach, each along the other."""
+    t_before, t_after = directions(alpha_before), directions(alpha_after)
+    overlap = before[:, HEAD] - after[:, TAIL]
+    goes_on = np.vecdot(t_before, after[:, HEAD] - before[:, HEAD]) > 0.0
+    goes_on &= np.vecdot(t_after, after[:, TAIL] - before[:, TAIL]) > 0.0
+    least, most = np.cos(config.bend_rad)
+    turn = np.cos(alpha_after - alpha_before)
+    bends = goes_on & (np.vecdot(t_before, overlap) > 0.0) & (turn < least) & (turn > most)
+    bends &= np.abs(np.vecdot(normals(alpha_before), overlap)) <= config.beside_m
+    return bends & (np.abs(np.vecdot(normals(alpha_after), overlap)) <= config.beside_m)
 
 
 def _runs(successor: Int[np.ndarray, " n"]) -> list[tuple[list[int], bool]]:

@@ -13,9 +13,9 @@ from slam.backends import BACKENDS
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
 
-def explored(free, start):
+def explored(free, start, seed=1, errorless=True):
     world = World("drawn", shapely.orient_polygons(free), np.array(start), {})
-    robot = SimulatedRobot(world, 1, errorless=True)
+    robot = SimulatedRobot(world, seed, errorless=errorless)
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
     steps = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=1500))
     *_, last = steps
@@ -51,6 +51,19 @@ def test_a_wall_that_turns_by_a_few_degrees_is_two_walls_though_it_looks_straigh
     last, _ = explored(room, (3.0, 0.5, 0.3))
     assert [chain.is_closed for chain in last.chains] == [True]
     assert len(last.chains[0].walls) == 5
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+@pytest.mark.parametrize("depth_m", [0.05, 0.1])
+def test_with_noise_the_sides_of_every_bend_join_at_once(depth_m, seed):
+    """Walls that turn by 6 or 11 degrees every metre: each was mapped past the bend, and looked at again and again."""
+    across = np.arange(0.0, 5.1, 1.0)
+    below = np.column_stack([across, depth_m * (np.arange(6) % 2)])
+    room = shapely.Polygon(np.concatenate([below, [5.0, 3.5] - below]))
+    last, robot = explored(room, (2.0, 1.5, 0.3), seed, errorless=False)
+    assert [chain.is_closed for chain in last.chains] == [True]
+    assert len(last.chains[0].walls) == 12
+    assert len(robot.record.poses_world) < 350
 
 
 @pytest.mark.parametrize("start_x", [0.4, 0.6, 0.8])
