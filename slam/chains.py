@@ -29,8 +29,8 @@ class ChainConfig:
     the wall between, as far apart as that is thick."""
     overlap_m: float = 1.0
     """Largest overlap of the two sides of a bend: within the noise each reaches past it ..."""
-    beside_m: float = 0.03
-    """... where it lies no farther than this from the other: three sigmas of a beam."""
+    beside_m: float = 0.04
+    """... where it lies no farther than this from the other: four sigmas of a beam."""
     bend_rad: tuple[float, float] = (float(np.deg2rad(1.0)), float(np.deg2rad(30.0)))
     """What such a bend turns: less, and it may be one wall entered twice; more, and beams tell where it is."""
     bend_sightings: int = 10

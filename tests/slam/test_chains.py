@@ -230,12 +230,12 @@ def bent(turn_deg, overlap_m, aside_m=0.0):
 
 @pytest.mark.parametrize(("turn_deg", "overlap_m"), [(2.0, 0.9), (3.0, 0.6), (-6.0, 0.4), (11.0, 0.3), (-20.0, 0.15)])
 def test_the_sides_of_a_bend_join_though_each_reaches_past_it(turn_deg, overlap_m):
-    """What lies within the noise of the other: 3 cm."""
+    """What lies within the noise of the other: 4 cm."""
     walls = bent(turn_deg, overlap_m)
     for both in (walls, walls[::-1]):
         (chain,) = connect(map_of(both))
         assert len(chain.walls) == 2
-        np.testing.assert_allclose(chain.corners_world, [[2.0, 0.0]], atol=0.03)
+        np.testing.assert_allclose(chain.corners_world, [[2.0, 0.0]], atol=0.04)
 
 
 @pytest.mark.parametrize(
