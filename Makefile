@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test check bench docs smoke compare random strategies bias heading
+.PHONY: setup demo test test-long check bench docs smoke compare random strategies bias heading
 
 setup: .venv/made
 
@@ -17,7 +17,11 @@ demo: setup
 	$(BIN)/chainslam explore paper-fig9 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -n 2 --quiet tests
+	$(BIN)/python -m pytest -n 2 --quiet -m "not long" tests
+
+# What takes minutes or needs a browser (Debian: `apt-get install chromium`).
+test-long: setup
+	$(BIN)/python -m pytest -n 2 --quiet -m long tests
 
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .

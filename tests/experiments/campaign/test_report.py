@@ -1,4 +1,4 @@
-"""The report: one file that holds everything, opened in a real browser where there is one."""
+"""The report: one file that holds everything, opened in a real browser by the long tests."""
 
 import json
 import re
@@ -20,7 +20,6 @@ CAMPAIGN = Campaign(
     arms=("closed", "replay-true"), max_steps=6,
 )  # fmt: skip
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine: apt-get install chromium")
 WITNESS = """<meta http-equiv="Content-Security-Policy" content="default-src data: 'unsafe-inline'"><script>
 const wrong = [], fetched = [];
 addEventListener("error", e => wrong.push(String(e.message || e.target.src)), true);
@@ -111,7 +110,7 @@ def faults(told):
     )
 
 
-@needs_browser
+@pytest.mark.long
 @pytest.mark.parametrize("width", [390, 1000])
 def test_a_browser_shows_all_pictures_and_finds_no_error(folder, tmp_path, width):
     told, spoke = seen_in_a_browser((folder / "report.html").read_text(), tmp_path, width)
@@ -120,7 +119,7 @@ def test_a_browser_shows_all_pictures_and_finds_no_error(folder, tmp_path, width
     assert not spoke
 
 
-@needs_browser
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("fault", "body"),
     [
