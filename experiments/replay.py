@@ -11,7 +11,17 @@ from jaxtyping import Float, Int
 
 from explore.mission import ride_mission
 from explore.step import Step
-from sim.replay import RecordedRobot, Recording, RecordingError, read_log, recording_of
+from sim.replay import (
+    MOST_M,
+    TRUTH,
+    RecordedRobot,
+    Recording,
+    RecordingError,
+    are_covariances,
+    read_log,
+    recording_of,
+    within,
+)
 from sim.robot import TrueRecord
 from sim.worlds import World
 from slam.backends import BACKENDS
@@ -30,7 +40,6 @@ from .truth import truth_of
 
 Association = Literal["own", "true"]
 _NEVER = 10**9
-_TRUE_KEYS = ("start_pose", "start_cov", "true_poses", "true_face_of_beam", "true_faces")
 
 
 @dataclass(frozen=True)
@@ -84,13 +93,15 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
         recording = recording_of(arrays)
     except RecordingError as error:
         raise UsageError(str(error)) from error
-    missing = [name for name in _TRUE_KEYS if name not in arrays]
+    missing = [name for name in TRUTH if name not in arrays]
     if missing:
         raise UsageError(f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run")
-    return RecordedRun(
-        trial(), recording, arrays["start_pose"], arrays["start_cov"], arrays["true_poses"],
-        arrays["true_face_of_beam"],
-    )  # fmt: skip
+    poses, cov, faces = arrays["true_poses"], arrays["start_cov"], arrays["true_face_of_beam"]
+    numbers = (poses, cov, arrays["start_pose"], arrays["true_faces"])
+    known = faces.min(initial=-1) >= -1 and faces.max(initial=-1) < len(arrays["true_faces"])
+    if not known or not all(within(values, MOST_M) for values in numbers) or not are_covariances(cov):
+        raise UsageError("expected a log with its truth, found one that no simulated run leaves: record the run anew")
+    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces)
 
 
 class ReplayedRobot(RecordedRobot):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from sim.replay import FORMAT
 from slam.consistency import pose_errors
 from slam.geometry.poses import wrap
 from viz.floor_plan import floor_plan
@@ -115,6 +116,7 @@ def _commit() -> str | None:
 def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
     """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
     return {
+        "format": FORMAT,
         "time_s": log.time_s,
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,

@@ -1,6 +1,6 @@
 """A recorded robot: it senses what was sensed and reports what the wheels reported, whoever listens."""
 
-import zipfile
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +9,29 @@ from jaxtyping import Float
 
 from slam.robot import MotionCommand, Odometry, Scan
 
-KEYS = ("time_s", "bearings_rad", "ranges_m", "sigma_m", "range_max_m", "odometry", "odometry_cov")
+from .archive import ArchiveError, read_archive
+
+FORMAT = 1
+"""The number in every log; another one when a log of before can no longer be read."""
+NEEDED = {
+    "time_s": "float s",
+    "bearings_rad": "float k",
+    "ranges_m": "float s k",
+    "sigma_m": "float",
+    "range_max_m": "float",
+    "odometry": "float s 3",
+    "odometry_cov": "float s 3 3",
+}
+TRUTH = {
+    "start_pose": "float 3",
+    "start_cov": "float 3 3",
+    "true_poses": "float s 3",
+    "true_faces": "float f 2 2",
+    "true_face_of_beam": "int s k",
+}
+"""What a simulated run tells besides."""
+MOST_M = 1e6
+"""Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
 
 
 class RecordingError(ValueError):
@@ -53,33 +75,57 @@ class RecordedRobot:
         return Odometry(self._recording.odometry[self._at], self._recording.odometry_cov[self._at])
 
 
-def read_log(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a run's own log (`log.npz`), never unpickling; raises RecordingError."""
+def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
+    """Return the arrays of a run's own log (`log.npz`), and the truth where it is there; raises RecordingError."""
+    name = source.name if isinstance(source, Path) else "log.npz"
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        said = read_archive(source, {"format": "int"})["format"]
+        if said != FORMAT:
+            raise ArchiveError(f"format {said}, where this version reads {FORMAT}")
+        return read_archive(source, NEEDED, TRUTH)
     except FileNotFoundError as error:
-        raise RecordingError(f"expected a run's log.npz, found no file {path}: name a log that exists") from error
-    except (OSError, ValueError, AttributeError, zipfile.BadZipFile, EOFError) as error:
-        raise RecordingError(f"expected a run's log.npz, found {path.name}, which is none: name a run's log") from error
-    missing = [name for name in KEYS if name not in arrays]
-    if missing:
-        raise RecordingError(
-            f"expected a run's log.npz, found {path.name} without {', '.join(missing)}: name a run's own log"
-        )
-    return arrays
+        raise RecordingError(f"expected a run's log.npz, found no file {name} there: name a log that exists") from error
+    except ArchiveError as error:
+        raise RecordingError(f"expected a run's log.npz, found {name} with {error}: record the run anew") from error
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise RecordingError(f"expected a run's log.npz, found {name} ({reason}): name a run's log") from error
 
 
-def recording_of(arrays: dict[str, np.ndarray]) -> Recording:
-    """Return the recording in a log's arrays; raises RecordingError where their shapes or numbers make none."""
-    steps, beams = len(arrays["time_s"]), len(arrays["bearings_rad"])
-    shapes = {"ranges_m": (steps, beams), "odometry": (steps, 3), "odometry_cov": (steps, 3, 3)}
-    for name, shape in shapes.items():
-        if arrays[name].shape != shape:
-            raise RecordingError(f"expected {name} {shape}, found {arrays[name].shape}: record the run anew")
-    if not steps or beams < 2 or not all(np.all(np.isfinite(arrays[k])) for k in KEYS if k != "ranges_m"):
-        raise RecordingError("expected finite numbers and at least one scan, found none or NaN: record the run anew")
-    return Recording(
+def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
+    """Return the recording in a log's arrays; raises RecordingError where their numbers make none."""
+    recording = Recording(
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], float(arrays["sigma_m"]),
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"],
     )  # fmt: skip
+    for wrong, words in _faults(recording):
+        if wrong:
+            raise RecordingError(f"expected the log of a robot, found {words}: record the run anew")
+    return recording
+
+
+def _faults(r: Recording) -> Iterator[tuple[bool, str]]:
+    """Yield, in order, whether a recording is none in some way, and that way in words."""
+    yield len(r) < 1 or len(r.bearings_rad) < 2, f"{len(r)} scans of {len(r.bearings_rad)} beams"
+    for name in ("time_s", "bearings_rad", "sigma_m", "range_max_m", "odometry", "odometry_cov"):
+        yield not within(getattr(r, name), MOST_M), f"{name} with NaN or beyond {MOST_M:g}"
+    yield not r.sigma_m > 0 or not r.range_max_m > 0, f"sigma_m {r.sigma_m:g}, range_max_m {r.range_max_m:g}"
+    yield bool(np.any(np.diff(r.time_s) < 0)), "times that run backwards"
+    steps = np.diff(r.bearings_rad)
+    even = np.allclose(steps, steps.mean(), rtol=1e-3, atol=1e-6)
+    yield not even or not 0 < steps.sum() < 2 * np.pi, "bearings that are not evenly spread over a turn at most"
+    far = bool(np.any((r.ranges_m <= 0) | (r.ranges_m > r.range_max_m)))
+    yield far, f"ranges of 0 m or less or beyond {r.range_max_m:g} m"
+    yield not are_covariances(r.odometry_cov), "odometry_cov that is no covariance"
+
+
+def within(values: Float[np.ndarray, "..."] | float, most: float) -> bool:
+    """Whether all are finite and none is beyond `most`."""
+    return bool(np.all(np.abs(values) <= most))
+
+
+def are_covariances(covs: Float[np.ndarray, "*n d d"]) -> bool:
+    """Whether all are symmetric, and nowhere negative but for rounding."""
+    largest = np.abs(covs).max(initial=0.0)
+    symmetric = np.allclose(covs, np.swapaxes(covs, -1, -2), rtol=1e-6, atol=1e-9 * largest)
+    return symmetric and bool(np.linalg.eigvalsh(covs).min(initial=0.0) >= -1e-9 * largest)

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from sim.archive import read_archive
+from sim.replay import read_log
 from sim.worlds import World
 from slam.extraction import NO_BENDS, extract
 from slam.mapper import Extractor
@@ -117,11 +119,10 @@ def _world(name: str) -> World:
 @lru_cache(maxsize=2)
 def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
     """Return a recording; replays of one recording follow each other, so that it is mostly read once."""
-    with np.load(BytesIO(log), allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    if "reason" in arrays:
-        raise RuntimeError(f"nothing was recorded: {arrays['reason']}")
-    return run_of(arrays, lambda: config)
+    reason = read_archive(log, {}, {"reason": "text"}).get("reason")
+    if reason is not None:
+        raise RuntimeError(f"nothing was recorded: {reason}")
+    return run_of(read_log(log), lambda: config)
 
 
 @lru_cache(maxsize=2)
