@@ -34,8 +34,11 @@ STEP_COLUMNS = (
     *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
     *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
+    *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
     *("odometry_error_m", "reason", "step_ms"),
 )
+"""Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
+with the poses beside it, all that `pose_nees` is made of."""
 
 
 def write_results(result: TrialResult, folder: Path, replayed: dict[str, Any] | None = None) -> list[str]:
@@ -162,6 +165,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
 def steps_csv(log: Log) -> bytes:
     """Return a row for each step; the errors are the invariant ones that the NEES is made of."""
     sigmas = np.sqrt(np.diagonal(log.estimated_cov, axis1=1, axis2=2))
+    rows, columns_of_cov = np.triu_indices(3)
     wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)
     columns = [
         np.arange(len(log)),
@@ -178,6 +182,7 @@ def steps_csv(log: Log) -> bytes:
         *log.true_world.T,
         *pose_errors(log.estimated_world, log.true_world).T,
         *sigmas.T,
+        *log.estimated_cov[:, rows, columns_of_cov].T,
         wheels,
         log.reasons,
         1e3 * log.seconds,
