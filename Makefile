@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test test-long check bench docs smoke compare random strategies bias heading
+.PHONY: setup demo test test-long mutants check bench docs smoke compare random strategies bias heading
 
 setup: .venv/made
 
@@ -22,6 +22,10 @@ test: setup
 # What takes minutes or needs a browser (Debian: `apt-get install chromium`).
 test-long: setup
 	$(BIN)/python -m pytest -n 2 --quiet -m long tests
+
+# How many of the small faults put into the modules of tests/mutants.toml do their own tests notice? MODULE=... for one.
+mutants: setup
+	$(BIN)/python tests/mutants.py $(MODULE)
 
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
