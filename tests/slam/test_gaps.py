@@ -5,7 +5,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.chains import HEAD, TAIL, connect
 from slam.gaps import passing
+from slam.mapper import Mapper
 from slam.robot import Scan
 
 BEARINGS = np.deg2rad(np.arange(-180.0, 180.0, 2.0))
@@ -29,3 +33,17 @@ def test_passing_beams_are_those_that_shapely_sees_cross_the_middle_of_the_gap(s
             beam = shapely.LineString([pose[:2], pose[:2] + max(reach - beyond, 0.0) * ahead])
             if abs(beam.distance(middle)) < 1e-9 or beam.distance(middle) > 1e-6:
                 assert passes == beam.intersects(middle)
+
+
+def test_a_gap_that_beams_passed_stays_open_though_both_its_ends_were_set_aside() -> None:
+    """Two walls end 0.21 m from each other at a corner that beams go through."""
+    faces = np.array([[[0.0, 0.0], [3.0, 0.0]], [[3.15, 0.15], [3.15, 3.0]]])
+    finder, pose = RangeFinder(faces, LidarConfig()), np.array([2.5, 0.8, 0.0])
+    mapper = Mapper(BACKENDS["full-ekf"].make(pose.copy(), 1e-6 * np.eye(3)))
+    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+    for _ in range(3):
+        update = mapper.step(scan)
+    along, across = update.map.ids[np.argsort(update.map.belief.means[:, 0])].tolist()
+    aside = {(along, HEAD), (across, TAIL)}
+    assert len(connect(update.map, aside)) == 1
+    assert len(mapper.step(scan, aside).chains) == 2

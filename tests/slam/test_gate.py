@@ -1,0 +1,57 @@
+"""The gate itself, against numbers worked out by hand: two degrees of freedom, and what pose and line share."""
+
+import numpy as np
+import pytest
+
+from slam.backend import Joint
+from slam.consensus import agree
+from slam.joint_sightings import JointSightings, compatible
+from slam.matching import KnownWalls, match
+from slam.segments import Segments
+
+LEVEL = -2.0 * np.log(0.01)
+"""What chi-square with two degrees of freedom exceeds once in a hundred times: 9.21; with three it would be 11.34."""
+WALL = KnownWalls(np.array([5]), np.array([[-2.0, 2.0]]))
+
+
+def seen(turn_rad=0.0, nearer_m=0.0, sigma_rad=0.01, sigma_m=0.01):
+    """Return one segment of 1 m straight ahead, where a wall at 2 m would be seen, turned and nearer by so much."""
+    line = np.array([[turn_rad, 2.0 - nearer_m]])
+    n, t = np.array([np.cos(turn_rad), np.sin(turn_rad)]), np.array([-np.sin(turn_rad), np.cos(turn_rad)])
+    ends = (2.0 - nearer_m) * n + np.array([[-0.5], [0.5]]) * t
+    cov = np.diag([sigma_rad, sigma_m])[None] ** 2
+    return Segments(line, cov, ends[None], np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1))
+
+
+def known(pose_sigmas, line_sigmas, shared=0.0):
+    """Return a pose at the origin and a wall 2 m ahead; `shared` is the correlation of x with the wall's offset."""
+    sigmas = np.array([*pose_sigmas, *line_sigmas])
+    correlation = np.eye(5)
+    correlation[0, 4] = correlation[4, 0] = shared
+    return Joint(np.zeros(5), correlation * np.outer(sigmas, sigmas), np.array([[2.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("share", "is_matched"), [(0.98, True), (1.02, False), (1.2, False)])
+def test_a_segment_beyond_the_level_of_two_degrees_of_freedom_is_refused(share, is_matched):
+    joint = known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5])
+    for segment in (seen(turn_rad=0.01 * np.sqrt(share * LEVEL)), seen(nearer_m=0.01 * np.sqrt(share * LEVEL))):
+        assert len(match(segment, WALL, joint).pairs) == is_matched
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.98, 2), (1.02, 1), (1.2, 1)])
+def test_of_two_sightings_the_one_beyond_that_level_is_dropped(share, kept):
+    e = np.array([0.0, 0.0, np.sqrt(share * LEVEL), 0.0])
+    both = JointSightings(e, np.zeros((3, 4)), np.eye(4))
+    assert len(compatible(both, 0.99, 0.999999)) == kept
+    begins = np.array([True, False])
+    agreed = agree(np.array([0, 1]), np.array([0, 1]), both, begins, 0.99, 0.999999, 0.1)
+    assert len(agreed.pairs) == kept
+
+
+def test_what_pose_and_wall_share_makes_no_gate_wider():
+    """The robot does not know where the two of them stand to 0.3 m; how far apart they are it knows to a millimetre."""
+    joint = known([0.3, 1e-4, 1e-4], [1e-4, 0.3], shared=1.0 - 1e-5)
+    assert len(match(seen(), WALL, joint).pairs) == 1
+    assert not len(match(seen(nearer_m=0.1), WALL, joint).pairs)
+    apart = known([0.3, 1e-4, 1e-4], [1e-4, 0.3])
+    assert len(match(seen(nearer_m=0.1), WALL, apart).pairs) == 1
