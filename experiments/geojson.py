@@ -7,6 +7,7 @@ import shapely
 
 from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
 from explore.step import Step
+from sim.replay import FORMAT
 from slam.backend import Joint
 from slam.chains import Chain
 from slam.stochastic_map import StochasticMap
@@ -30,6 +31,7 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
     return {
         "type": "FeatureCollection",
         "name": "map",
+        "format": FORMAT,
         "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
         "coordinate_system": FRAME,
         "features": [

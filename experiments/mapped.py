@@ -1,6 +1,5 @@
 """A run's map as it stands on disk: corners, walls and closed chains, with the joint covariance of all walls."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from .map_files import read_features, read_map
 from .measurements import CornerPoints, Measured, area, corner_jacobian, corner_points, distance, perimeter
 from .scenario import UsageError
-
-NEEDED = ("ids", "lines", "anchors", "cov")
 
 
 @dataclass(frozen=True)
@@ -61,26 +59,14 @@ class MappedCorners:
 
 def read_corners(folder: Path) -> MappedCorners:
     """Read `map.npz` and `map.geojson` of a run; raises UsageError, in one line, where they are no map."""
-    try:
-        with np.load(folder / "map.npz", allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in NEEDED}
-        features: list[dict[str, Any]] = json.loads((folder / "map.geojson").read_text())["features"]
-        return _corners(arrays, features)
-    except UsageError:
-        raise
-    except Exception as error:  # whatever a foreign file holds, it is told in one line
-        raise UsageError(
-            f"expected a run's map.npz and map.geojson in {folder}, found none that fit ({type(error).__name__}):"
-            " name the folder of a run"
-        ) from error
-
-
-def _corners(arrays: dict[str, np.ndarray], features: list[dict[str, Any]]) -> MappedCorners:
+    arrays = read_map(folder)
+    features = read_features(folder, arrays["ids"])
     if not np.all(np.isfinite(arrays["cov"])):
         raise UsageError("expected a map with its joint covariance, found one that was lost: measure another run")
-    kinds = [feature["properties"]["kind"] for feature in features]
-    found = [f for f, kind in zip(features, kinds, strict=True) if kind == "corner"]
-    chains = [f for f, kind in zip(features, kinds, strict=True) if kind == "chain"]
+    return _corners(arrays, features["corner"], features["chain"])
+
+
+def _corners(arrays: dict[str, np.ndarray], found: list[dict[str, Any]], chains: list[dict[str, Any]]) -> MappedCorners:
     row_of = {int(wall): row for row, wall in enumerate(arrays["ids"])}
     positions = np.array([f["geometry"]["coordinates"] for f in found], dtype=np.float64).reshape(-1, 2)
     jacobians = np.zeros((len(found), 2, len(arrays["cov"])))
@@ -92,12 +78,13 @@ def _corners(arrays: dict[str, np.ndarray], features: list[dict[str, Any]]) -> M
             jacobians[k, :, 3 + 2 * row : 5 + 2 * row] += part
         sharp.append(crosses)
     names = [int(f["properties"]["chain"]) for f in found]
+    rooms = [_room(int(f["properties"]["chain"]), names, positions) for f in chains if f["properties"]["closed"]]
     return MappedCorners(
         corner_points(positions, jacobians, arrays["cov"]),
         tuple((int(a), int(b)) for a, b in (f["properties"]["walls"] for f in found)),
         tuple(names),
         tuple(sharp),
-        tuple(_room(int(f["properties"]["chain"]), names, positions) for f in chains if f["properties"]["closed"]),
+        tuple(room for room in rooms if room.corners),
     )
 
 

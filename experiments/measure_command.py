@@ -1,6 +1,5 @@
 """`chainslam measure`: distances, lengths and areas of a map, with error bars."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ from rich.table import Table
 from .console import plain_console
 from .mapped import MappedCorners, read_corners
 from .measurements import Measured
+from .saved import read_config
 from .scenario import UsageError
 
 
@@ -42,12 +42,13 @@ class Measure:
 
 
 def _corner(name: str, mapped: MappedCorners, folder: Path) -> int:
-    if not name.isdecimal() or int(name) >= len(mapped):
-        known = f"0 to {len(mapped) - 1}" if len(mapped) else "none"
+    corners = {str(k): k for k in range(len(mapped))}
+    if name not in corners:
+        known = f"0 to {len(mapped) - 1}" if corners else "none"
         raise UsageError(f"expected a corner out of {known}, found {name!r}: see `chainslam measure {folder}`")
-    if not mapped.sharp[int(name)]:
+    if not mapped.sharp[corners[name]]:
         raise UsageError(f"expected walls that cross, found those of corner {name} on one line: take another")
-    return int(name)
+    return corners[name]
 
 
 def _list(mapped: MappedCorners, folder: Path) -> None:
@@ -80,7 +81,5 @@ def _words(measured: Measured) -> str:
 
 def _estimator(folder: Path) -> str:
     """Return whose word the intervals are; nothing where the folder does not tell."""
-    try:
-        return f", as {json.loads((folder / 'config.json').read_text())['trial']['backend']} states it"
-    except (OSError, ValueError, KeyError, TypeError):
-        return ""
+    config = folder / "config.json"
+    return f", as {read_config(config).trial.backend} states it" if config.exists() else ""

@@ -4,6 +4,7 @@ Paths and NEES of several folders (replays of one log) come together; the map, t
 the first.
 """
 
+import csv
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ import tyro
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
+from sim.archive import regular
+from sim.replay import MOST_M, within
 from viz import palette
 from viz.figures import draw_map, saved
 from viz.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
@@ -22,8 +25,11 @@ from viz.shapes import hessian_cov
 
 from .explore_command import prepare
 from .files import write
+from .map_files import read_map
+from .reading import UnfitError, told
+from .replay import read_run
 from .results import LOG
-from .saved import read_trial
+from .saved import TODO, read_trial
 from .saved_map import saved_map
 from .scenario import TrialConfig, UsageError, load_world
 from .scores import wheels_path
@@ -70,17 +76,30 @@ class PicturedRun:
 def read_pictured(folder: Path) -> PicturedRun:
     """Read a run's folder; raises UsageError where it holds none."""
     trial = read_trial(folder / "config.json")
-    try:
-        with np.load(folder / LOG) as log, np.load(folder / "map.npz") as walls:
-            arrays, mapped = dict(log), dict(walls)
-        columns = ("x_m", "y_m", "heading_rad", "pose_nees")
-        with (folder / "steps.csv").open() as stream:
-            header = stream.readline().strip().split(",")
-            at = [header.index(name) for name in columns]
-            table = np.genfromtxt(stream, delimiter=",", usecols=at, ndmin=2)
-    except (OSError, ValueError, KeyError) as error:
-        raise UsageError(f"expected a run's results in {folder}, found {error}: name what `explore` left") from error
-    return PicturedRun(trial, arrays, mapped, table[:, :3], table[:, 3])
+    run = read_run(folder / LOG)
+    walls, steps = read_map(folder), read_steps(folder)
+    if len(steps) != len(run.recording):
+        raise UsageError(
+            f"expected a step for each of {len(run.recording)} scans, found {len(steps)} in {folder / 'steps.csv'}:"
+            " keep a run's files together"
+        )
+    arrays = {"true_poses": run.true_poses_world, "start_pose": run.start_pose, "odometry": run.recording.odometry}
+    return PicturedRun(trial, arrays, walls, steps[:, :3], steps[:, 3])
+
+
+def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
+    """Return the estimated poses (m, m, rad) and the pose's NEES from a run's `steps.csv`; raises UsageError."""
+    path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad", "pose_nees")
+    with told(path, TODO):
+        try:
+            with regular(path).open(newline="") as stream:
+                rows = [[float(row[name] or "nan") for name in columns] for row in csv.DictReader(stream)]
+        except (ValueError, KeyError, TypeError, csv.Error) as error:
+            raise UnfitError("another table, or one that was cut short") from error
+        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
+        if not within(steps[:, :3], MOST_M):
+            raise UnfitError(f"poses that are NaN or beyond {MOST_M:g} m")
+    return steps
 
 
 def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:

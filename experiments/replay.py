@@ -1,6 +1,5 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,8 +31,8 @@ from slam.robot import MotionCommand, Odometry, Scan
 from slam.walls import WallsConfig
 
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
-from .results import REPLAY
-from .saved import from_record, read_trial
+from .reading import fit, told
+from .saved import read_config, read_trial
 from .scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, UsageError, check, load_world
 from .trial import TrialResult, run_scenario
 from .truth import truth_of
@@ -77,13 +76,11 @@ def read_run(log: Path) -> RecordedRun:
 
 def read_options(config: Path) -> ReplayOptions:
     """Return the options of the replay that left a `config.json`, those by default for a run that drove."""
-    try:
-        options = from_record(ReplayOptions, json.loads(config.read_text()).get(REPLAY, {}))
-    except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise UsageError(
-            f"expected the options of a replay in {config}, found none that fit: keep a run's files together"
-        ) from error
-    assert isinstance(options, ReplayOptions)
+    said = read_config(config).replay
+    if said is None:
+        return ReplayOptions()
+    with told(config, "keep a run's files together, or make it anew"):
+        options: ReplayOptions = fit(ReplayOptions, said, "replay")
     return options
 
 

@@ -61,7 +61,7 @@ def _files(result: TrialResult, replayed: dict[str, Any]) -> dict[str, Callable[
     more = {REPLAY: replayed} if replayed else {}
     files: dict[str, Callable[[], bytes]] = {
         "config.json": lambda: json_bytes(config_record(result.scenario.config) | more),
-        "summary.json": lambda: json_bytes(result.summary),
+        "summary.json": lambda: json_bytes({"format": FORMAT} | result.summary),
     }
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()
@@ -98,7 +98,7 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"trial": asdict(config), "versions": versions, "commit": _commit()}
+    return {"format": FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
 
 
 def _commit() -> str | None:
@@ -148,6 +148,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
     walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
     size = 3 + 2 * len(walls)
     return {
+        "format": FORMAT,
         "pose": walls.belief.pose_world,
         "ids": walls.ids,
         "lines": walls.belief.means,

@@ -1,6 +1,5 @@
 """The report of a run, or of one log through several back ends: what was mapped, how well, and how honestly."""
 
-import json
 import shlex
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from .campaign.words import NONE, number, percent
 from .mapped import read_corners
 from .pictures import draw_all, read_pictured
 from .replay import ReplayOptions, read_options
-from .saved import read_trial
+from .saved import read_config, read_summary
 from .scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
 
 CAPTIONS = {
@@ -46,9 +45,9 @@ def is_run(folder: Path) -> bool:
 def run_page(folder: Path) -> Page:
     """Return the report of a run's folder; raises UsageError where its files do not belong to one run."""
     homes = _homes(folder)
-    summaries = [_summary(home) for home in homes]
-    trials = [read_trial(home / "config.json") for home in homes]
-    config: dict[str, Any] = json.loads((homes[0] / "config.json").read_text())
+    summaries = [read_summary(home) for home in homes]
+    configs = [read_config(home / "config.json") for home in homes]
+    trials = [config.trial for config in configs]
     names = [trial.backend for trial in trials]
     first = trials[0]
     options = read_options(homes[0] / "config.json")
@@ -74,7 +73,7 @@ def run_page(folder: Path) -> Page:
         " estimator know?",
         tuple(_answer(name, summary) for name, summary in zip(names, summaries, strict=True)),
         _command(first, names, options),
-        (*config["versions"].items(), ("commit", str(config["commit"])[:10])),
+        (*configs[0].versions.items(), ("commit", str(configs[0].commit)[:10])),
         (
             *filled(
                 Section("The map", pictures=tuple(maps)),
@@ -97,16 +96,6 @@ def _homes(folder: Path) -> list[Path]:
     if (folder / "summary.json").is_file():
         return [folder]
     return sorted(path.parent for path in folder.glob("*/summary.json"))
-
-
-def _summary(home: Path) -> dict[str, Any]:
-    try:
-        said: dict[str, Any] = json.loads((home / "summary.json").read_text())
-        return said
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"expected a run's summary.json in {home}, found none that can be read: run it again"
-        ) from error
 
 
 def _answer(name: str, summary: dict[str, Any]) -> str:

@@ -5,18 +5,36 @@ it stopped; that costs the time of the first part again, and leaves the bytes of
 robot reports on the way is held against the log, so that a world or a software that has changed since is noticed.
 """
 
-import json
-import types
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
 import numpy as np
 
 from explore.step import Step
 from sim.replay import Recording, RecordingError, read_log, recording_of
 
+from .reading import Each, Maybe, UnfitError, fit, read_json, told
 from .scenario import TrialConfig, UsageError
+
+TODO = "keep a run's files together, or make it anew"
+NUMBERS = (
+    *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
+    *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
+)
+COUNTS = (
+    *("open_ends", "lines", "contours_closed", "contours_reachable", "false_matches", "duplicate_lines", "collisions"),
+    "map_began_step",
+)
+SUMMARY = {
+    "status": str,
+    "reason": str,
+    "steps": int,
+    **{f"{name}?": float | None for name in NUMBERS},
+    **{f"{name}?": int | None for name in COUNTS},
+    "set_aside?": Maybe([{"wall": int, "side": int, "position_m": tuple[float, float], "why": str}]),
+}
+"""What pages and pictures take from a `summary.json`."""
 
 
 @dataclass(frozen=True)
@@ -47,38 +65,35 @@ def read_saved(folder: Path) -> SavedRun:
         raise UsageError(str(error)) from error
 
 
+@dataclass(frozen=True)
+class SavedConfig:
+    """A run's `config.json`: what was run, as a replay or not, and by which versions."""
+
+    trial: TrialConfig
+    replay: Any
+    """The options of a replay as they stand there; None for a run that drove."""
+    versions: dict[str, str]
+    commit: str | None
+
+
+CONFIG = {"trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "replay?": Any}
+
+
+def read_config(path: Path) -> SavedConfig:
+    """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
+    said = read_json(path, CONFIG, TODO)
+    with told(path, TODO):
+        for key in said.keys() - {"format", *(key.removesuffix("?") for key in CONFIG)}:
+            raise UnfitError(f"an unknown {key[:40]!r}")
+        trial: TrialConfig = fit(TrialConfig, said["trial"], "trial")
+    return SavedConfig(trial, said.get("replay"), said.get("versions", {}), said.get("commit"))
+
+
 def read_trial(path: Path) -> TrialConfig:
-    """Read the settings of a run from its `config.json`; those that it does not name are as they are by default."""
-    try:
-        trial = from_record(TrialConfig, json.loads(path.read_text())["trial"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UsageError(
-            f"expected the run's config.json in {path.parent}, found none that fits: keep a run's files together"
-        ) from error
-    assert isinstance(trial, TrialConfig)
-    return trial
+    """Read the settings of a run from its `config.json`; raises UsageError."""
+    return read_config(path).trial
 
 
-def from_record(kind: Any, value: Any) -> Any:
-    """Return plain JSON values as the (nested) dataclass `kind` that they were; unknown keys are left out.
-
-    Raises TypeError or ValueError where the values do not fit.
-    """
-    if is_dataclass(kind):
-        if not isinstance(value, dict):
-            raise TypeError(f"expected an object, found {value!r}")
-        hints = get_type_hints(kind)
-        named = [field.name for field in fields(kind) if field.name in value]
-        return kind(**{name: from_record(hints[name], value[name]) for name in named})  # type: ignore[operator]
-    if get_origin(kind) in (Union, types.UnionType):
-        options = [option for option in get_args(kind) if option is not type(None)]
-        return None if value is None else from_record(options[0], value)
-    if get_origin(kind) is tuple:
-        inner = get_args(kind)
-        kinds = [inner[0]] * len(value) if inner[-1] is ... else inner
-        return tuple(from_record(*pair) for pair in zip(kinds, value, strict=True))
-    if kind is float:
-        return float(value)
-    if kind in (int, str, bool) and type(value) is not kind:
-        raise TypeError(f"expected {kind.__name__}, found {value!r}")
-    return value
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Read a run's `summary.json`; raises UsageError."""
+    return read_json(folder / "summary.json", SUMMARY, TODO)

@@ -1,6 +1,5 @@
 """The picture of a map from the files that a run left, so that it can be drawn again as vectors."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,15 @@ from slam.chains import HEAD, TAIL, Chain, OpenEnd
 from slam.stochastic_map import StochasticMap
 from viz.figures import Picture
 
+from .map_files import read_features
 from .picture import over_truth
-from .scenario import TrialConfig, UsageError, load_world
+from .reading import fit, told
+from .saved import TODO, read_summary
+from .scenario import TrialConfig, load_world
+
+_TOLD = ("path_length_m", "coverage_own_frame", "pose_rmse_m", "odometry_rmse_m")
+_COUNTED = ("contours_closed", "contours_reachable", "map_began_step")
+"""What the picture tells of a run's summary."""
 
 
 def saved_map(
@@ -26,14 +32,13 @@ def saved_map(
     estimated_world: Float[np.ndarray, "s 3"],
 ) -> Picture:
     """Return the picture of a run's map from its folder and its arrays; raises UsageError where a file is missing."""
-    try:
-        features = json.loads((folder / "map.geojson").read_text())["features"]
-        summary = json.loads((folder / "summary.json").read_text())
-    except (OSError, ValueError, KeyError) as error:
-        raise UsageError(f"expected a run's results in {folder}, found {error}: name what `explore` left") from error
+    features = read_features(folder, walls["ids"])
+    summary = read_summary(folder)
+    with told(folder / "summary.json", TODO):
+        fit({**dict.fromkeys(_TOLD, float), **dict.fromkeys(_COUNTED, int)}, summary)
     covs = [
         (np.array(feature["geometry"]["coordinates"]), np.array(feature["properties"]["covariance_xy_m2"]))
-        for feature in _of_kind(features, "corner")
+        for feature in features["corner"]
         if feature["properties"]["covariance_xy_m2"] is not None
     ]
     aside = [
@@ -44,10 +49,10 @@ def saved_map(
         walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
     )
     marks = walls["sightings"], walls["tentative"], walls["crooked"]
+    world = load_world(trial.world, trial.start, trial.scale)
     return over_truth(
-        load_world(trial.world, trial.start, trial.scale), trial, summary,
-        StochasticMap(belief, walls["extents"], *marks), _chains(features), tuple(aside), covs, estimated_world,
-        log["true_poses"], log["start_pose"],
+        world, trial, summary, StochasticMap(belief, walls["extents"], *marks), _chains(features["chain"]),
+        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
     )  # fmt: skip
 
 
@@ -55,14 +60,10 @@ def _not_to_be_asked(ids: np.ndarray) -> Joint:
     raise StaleBeliefError("expected a back end at work, found its results on disk: read the joint covariance there")
 
 
-def _of_kind(features: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
-    return [feature for feature in features if feature["properties"]["kind"] == kind]
-
-
 def _chains(features: Sequence[Mapping[str, Any]]) -> tuple[Chain, ...]:
     """Return the chains in the order that they had; a file holds the closed ones first."""
     found: dict[int, Chain] = {}
-    for feature in _of_kind(features, "chain"):
+    for feature in features:
         says, way = feature["properties"], feature["geometry"]["coordinates"]
         members = tuple(says["walls"])
         if says["closed"]:

@@ -1,14 +1,17 @@
 """Two campaigns held against each other, trial by trial: which trials differ, and by how much on the whole."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+from sim.replay import FORMAT
+
 from ..files import csv_bytes, json_bytes, write
+from ..reading import read_json
 from ..scenario import UsageError
+from . import shapes
 from .comparison import MEASURES, Row, difference, select
 from .merge import agree, in_order, union
 from .plan import Trial, trials
@@ -44,6 +47,7 @@ def contrast(first: Path, second: Path, out: Path) -> None:
         if not agree(*records):
             different.append(_side_by_side(*pair))
     said = {
+        "format": FORMAT,
         "first": str(first),
         "second": str(second),
         "settings": _settings(first, second),
@@ -66,11 +70,7 @@ def contrast(first: Path, second: Path, out: Path) -> None:
 
 def read_contrast(folder: Path) -> dict[str, Any]:
     """Return what `contrast` left in a folder; raises UsageError."""
-    try:
-        said: dict[str, Any] = json.loads((folder / CONTRAST).read_text())
-        return said
-    except (OSError, ValueError) as error:
-        raise UsageError(f"expected a {CONTRAST} in {folder}, found none: run `compare --against` first") from error
+    return read_json(folder / CONTRAST, shapes.CONTRAST, "run `compare --against` anew")
 
 
 def _stores(folder: Path) -> dict[Trial, Store]:
@@ -80,7 +80,7 @@ def _stores(folder: Path) -> dict[Trial, Store]:
 
 
 def _same_worlds(first: Path, second: Path) -> None:
-    digests = [read_config(folder)["worlds_sha256"] for folder in (first, second)]
+    digests = [read_config(folder).worlds_sha256 for folder in (first, second)]
     for world in sorted(digests[0].keys() & digests[1].keys()):
         if digests[0][world] != digests[1][world]:
             raise UsageError(f"expected one world {world}, found two that differ: rename one and run it again")
@@ -94,10 +94,9 @@ def _settings(first: Path, second: Path) -> dict[str, list[Any]]:
 
 
 def _made_with(folder: Path) -> dict[str, Any]:
-    config, campaigns = read_config(folder), read_campaigns(folder)
-    made = config if "versions" in config else config["from"][0]
-    plain: dict[str, Any] = {name: asdict(campaigns[0])[name] for name in SETTINGS}
-    return plain | {"commit": made["commit"]} | made["versions"]
+    config = read_config(folder)
+    plain: dict[str, Any] = {name: asdict(config.campaigns[0])[name] for name in SETTINGS}
+    return plain | {"commit": config.commit} | config.versions
 
 
 def _side_by_side(first: Row, second: Row) -> Row:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sim.replay import FORMAT
+
 from ..files import json_bytes, write
 from ..scenario import UsageError
 from ..scores import TIMED
@@ -34,7 +36,7 @@ def merge(folders: Sequence[Path], out: Path) -> None:
             raise UsageError(f"expected campaigns of one {name}, found {sorted(map(str, values))}: merge others")
     digests: dict[str, Any] = {}
     for folder in folders:
-        for world, digest in read_config(folder)["worlds_sha256"].items():
+        for world, digest in read_config(folder).worlds_sha256.items():
             if digests.setdefault(world, digest) != digest:
                 raise UsageError(f"expected one world {world}, found two that differ: rename one and run it again")
     levels, found = union(campaigns), dict[Trial, Store]()
@@ -47,8 +49,8 @@ def merge(folders: Sequence[Path], out: Path) -> None:
             copy = merged.path(trial)
             copy.parent.mkdir(parents=True, exist_ok=True)
             write(copy, store.path(trial).read_bytes())
-        config = {MERGED: [plain(vars(campaign)) for campaign in campaigns], "worlds_sha256": digests}
-        write(out / CONFIG, json_bytes(config | {"from": [read_config(folder) for folder in folders]}))
+        config = {"format": FORMAT, MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
+        write(out / CONFIG, json_bytes(config | {"from": [read_config(folder).said for folder in folders]}))
         write_tables(out, levels, in_order(found, levels), merged.record)
 
 

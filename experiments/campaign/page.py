@@ -1,6 +1,5 @@
 """The report of a campaign: its tables and comparison as a page of words, tables and pictures."""
 
-import json
 from collections.abc import Sequence
 from math import pi
 from pathlib import Path
@@ -8,13 +7,14 @@ from typing import Any
 
 from viz.report import Page, PageTable, Section, filled
 
-from ..scenario import UsageError
+from ..reading import read_json
 from ..statistics import FEW_RUNS
 from .finding_words import finding_table
 from .merge import union
 from .pictures import curve_pictures, map_arm, map_pictures, ratio_pictures
 from .plan import CLOSED, Campaign
-from .store import read_campaigns, read_config
+from .shapes import COMPARISON
+from .store import read_config
 from .words import ARMS_SHORT, MEASURE_WORDS, NONE, command_of, interval, mean, number, percent, share, verdict
 
 ARM_WORDS = {
@@ -31,25 +31,16 @@ QUESTION = (
 
 def page_of(folder: Path) -> Page:
     """Return the report of a campaign's folder; raises UsageError where it is none, or not done."""
-    campaigns, config = read_campaigns(folder), read_config(folder)
+    config = read_config(folder)
+    campaigns = config.campaigns
     campaign = union(campaigns)
-    try:
-        said: dict[str, Any] = json.loads((folder / "comparison.json").read_text())
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"expected a campaign that is done, found {folder} without its comparison.json: run `compare` to its end"
-        ) from error
-    if "findings" not in said:
-        raise UsageError(
-            f"expected a comparison of this version, found an earlier one in {folder}: run `compare` again"
-        )
-    made = config if "versions" in config else config["from"][0]
+    said = read_json(folder / "comparison.json", COMPARISON, "run the same `compare` to its end")
     return Page(
         "What neglecting the cross-correlations costs",
         QUESTION,
         verdict(said["hypothesis"]),
         "; ".join(command_of(each) for each in campaigns),
-        (*made["versions"].items(), ("commit", str(made["commit"])[:10])),
+        (*config.versions.items(), ("commit", str(config.commit)[:10])),
         filled(
             Section("What it shows", _counts(said), (finding_table(campaign, said),)),
             *_estimators(campaign, said),

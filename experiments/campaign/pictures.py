@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import shapely
 from jaxtyping import Float
 
@@ -13,20 +12,27 @@ from viz.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_f
 from viz.figures import png
 from viz.report import PagePicture
 
+from ..reading import fit, told
 from ..scenario import UsageError, load_world
 from .comparison import BASELINE_STRATEGY
 from .plan import CLOSED, Campaign, Trial, trials, world_key
 from .store import Store
+from .tables import read_rows
 from .words import ARMS_SHORT
 
 MARGIN_M = 0.5
 RATIO_LABELS = {"pose_anees": "pose ANEES over that of full-ekf", "wall_rmse_m": "error of walls over that of full-ekf"}
 
+_NAMES = ("world", "strategy", "backend", "mode", "association")
+_CURVE = ("path_length_m", "pose_anees", "band_low", "band_high")
+
 
 def curve_pictures(folder: Path, campaign: Campaign) -> tuple[PagePicture, ...]:
     """Return the ANEES along the way, a picture for each world and arm, by the baseline strategy."""
-    columns = pq.read_table(folder / "steps.parquet").to_pydict()
-    arrays = {name: np.array(values) for name, values in columns.items()}
+    rows = read_rows(folder / "steps.parquet", (*_NAMES, *_CURVE))
+    with told(folder / "steps.parquet", "run the same `compare` to its end"):
+        fit([{**dict.fromkeys(_NAMES, str), **dict.fromkeys(_CURVE, float | None)}], rows, "rows")
+    arrays = {name: np.array([row[name] for row in rows]) for name in (*_NAMES, *_CURVE)}
     strategy = BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
     pictures = []
     for world in map(world_key, campaign.worlds):
@@ -43,8 +49,7 @@ def curve_pictures(folder: Path, campaign: Campaign) -> tuple[PagePicture, ...]:
 
 
 def _curve(name: str, arrays: dict[str, np.ndarray], rows: np.ndarray) -> Curve:
-    names = ("path_length_m", "pose_anees", "band_low", "band_high")
-    return Curve(name, *(arrays[column][rows].astype(np.float64) for column in names))
+    return Curve(name, *(arrays[column][rows].astype(np.float64) for column in _CURVE))
 
 
 def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:

@@ -9,15 +9,20 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sim.archive import regular
+from sim.replay import FORMAT
+
 from ..explore_command import prepare
 from ..files import json_bytes, write
+from ..reading import Each, UnfitError, fit, read_json, told
 from ..results import config_record
 from ..scenario import UsageError
-from .plan import Campaign, Trial, config_of, world_digests
+from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .score import Record
 from .work import Done, unpack
 
 CONFIG, LOCK = "config.json", ".lock"
+TODO = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
 
@@ -46,7 +51,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             # So that the recording is one that `chainslam replay` takes, too.
             config = config_of(self.campaign, done.trial.recording)
-            write(path.with_name(CONFIG), json_bytes({"trial": asdict(config)}))
+            write(path.with_name(CONFIG), json_bytes({"format": FORMAT, "trial": asdict(config)}))
             write(path, done.log)
         if done.trial.arm != "recording":
             path = self.path(done.trial)
@@ -56,10 +61,8 @@ class Store:
     def record(self, trial: Trial) -> Record:
         """Return what a trial left; raises UsageError where its file is none."""
         path = self.path(trial)
-        try:
-            return unpack(path.read_bytes())
-        except Exception as error:
-            raise UsageError(f"expected a trial's result, found {path} unreadable: delete it and run again") from error
+        with told(path, "delete it and run `compare` again"):
+            return unpack(regular(path).read_bytes(), trial)
 
 
 @contextmanager
@@ -96,32 +99,43 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
 
 
+@dataclass(frozen=True)
+class Settled:
+    """What a campaign's `config.json` says."""
+
+    campaigns: tuple[Campaign, ...]
+    """Several where it was merged."""
+    worlds_sha256: dict[str, str]
+    versions: dict[str, str]
+    """Of the first, where it was merged."""
+    commit: str | None
+    said: dict[str, Any]
+    """As it stands in the file."""
+
+
 def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
     """Return the campaigns whose results stand in a folder, several where it was merged; raises UsageError."""
-    try:
-        return tuple(_campaign(said) for said in read_config(folder)[MERGED])
-    except (KeyError, TypeError, AttributeError) as error:
-        raise _no_campaign(folder) from error
+    return read_config(folder).campaigns
 
 
-def read_config(folder: Path) -> dict[str, Any]:
+def read_config(folder: Path) -> Settled:
     """Return the config of a campaign's folder; raises UsageError where it has none."""
-    try:
-        said: dict[str, Any] = json.loads((folder / CONFIG).read_text())
-        return said if MERGED in said else said | {MERGED: [said["campaign"]]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _no_campaign(folder) from error
-
-
-def _campaign(said: dict[str, Any]) -> Campaign:
-    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in said.items()}
-    return Campaign(**values)
-
-
-def _no_campaign(folder: Path) -> UsageError:
-    return UsageError(
-        f"expected the folder of a campaign, found no {CONFIG} of one in {folder}: name what `compare --out` made"
-    )
+    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, TODO)
+    with told(folder / CONFIG, TODO):
+        if MERGED in said:
+            fit({MERGED: [dict], "from": [dict]}, said)
+        campaigns = tuple(fit(Campaign, each, "campaign") for each in said.get(MERGED, [said.get("campaign")]))
+        made = said
+        while "from" in made:
+            if not made["from"]:
+                raise UnfitError("a campaign merged from none")
+            made = made["from"][0]
+        fit({"versions": Each(str), "commit": str | None}, made)
+        if not campaigns:
+            raise UnfitError("no campaign")
+    for campaign in campaigns:
+        check_campaign(campaign)
+    return Settled(campaigns, said["worlds_sha256"], made["versions"], made["commit"], said)
 
 
 def _settle(folder: Path, campaign: Campaign) -> None:
@@ -131,7 +145,7 @@ def _settle(folder: Path, campaign: Campaign) -> None:
         digests = world_digests(campaign)
     except OSError as error:
         raise UsageError(f"expected readable worlds, found {error.filename} ({error.strerror})") from error
-    now = plain({"campaign": asdict(campaign), "worlds_sha256": digests})
+    now = plain({"format": FORMAT, "campaign": asdict(campaign), "worlds_sha256": digests})
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
     if not path.exists():
@@ -139,10 +153,7 @@ def _settle(folder: Path, campaign: Campaign) -> None:
             raise UsageError(f"expected an empty folder or a campaign's, found {folder} with other files: name another")
         write(path, json_bytes(now | made_with))
         return
-    try:
-        before: dict[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise UsageError(f"expected a campaign's {CONFIG}, found another in {folder}: name another folder") from error
+    before = read_config(folder).said
     different = [key for key in now["campaign"] if before.get("campaign", {}).get(key) != now["campaign"][key]]
     different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
     if different:

@@ -11,11 +11,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from jaxtyping import Float
 
+from sim.archive import regular
+from sim.replay import FORMAT
 from slam.consistency import chi2_band, pooled_band
 from slam.matching import MatchingConfig
 
 from ..files import csv_bytes, json_bytes, write
 from ..measurements import Z_95
+from ..reading import UnfitError, told
 from .comparison import compare
 from .findings import findings
 from .hypothesis import hypothesis
@@ -156,6 +159,20 @@ def write_table(path: Path, rows: Sequence[Row], first: Sequence[str] = ()) -> N
     write(path.with_suffix(".parquet"), parquet_bytes(rows, header))
 
 
+def read_rows(path: Path, columns: Sequence[str] = ()) -> list[Row]:
+    """Return the rows of a table that stands as Parquet; raises UsageError where it is none or lacks `columns`."""
+    with told(path, "run the same `compare` to its end"):
+        try:
+            table = pq.read_table(regular(path), partitioning=None)
+            missing = [name for name in columns if name not in table.column_names]
+            rows: list[Row] = [] if missing else table.to_pylist()
+        except (pa.ArrowException, ValueError, TypeError) as error:
+            raise UnfitError("no table, or one that was cut short") from error
+        if missing:
+            raise UnfitError(f"no column {missing[0]}")
+    return rows
+
+
 def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
     """Return what the steps of one cell say: how many lie outside their band, and the band of all steps together."""
     outside = [row["pose_anees"] < row["band_low"] or row["pose_anees"] > row["band_high"]
@@ -186,5 +203,5 @@ def write_tables(
     write_table(folder / "marks", marks)
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
-    said |= {"hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
+    said |= {"format": FORMAT, "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     write(folder / "comparison.json", json_bytes(said))

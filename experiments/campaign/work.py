@@ -1,18 +1,16 @@
 """One trial's work: a pure function of its job, wherever it runs."""
 
-import json
 import traceback
 from dataclasses import dataclass
 from functools import lru_cache
-from io import BytesIO
 from time import process_time
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from sim.archive import read_archive
-from sim.replay import read_log
+from sim.replay import FORMAT, read_log
 from sim.worlds import World
 from slam.extraction import NO_BENDS, extract
 from slam.mapper import Extractor
@@ -20,6 +18,7 @@ from slam.robot import Scan
 from slam.segments import Segments
 
 from ..files import json_bytes, npz_bytes
+from ..reading import Each, Maybe, UnfitError, parse_json
 from ..replay import RecordedRun, ReplayOptions, replay, run_of
 from ..results import log_arrays
 from ..scenario import TrialConfig, build, load_world
@@ -32,6 +31,44 @@ from .score import Record, record_of
 
 SUMMARY = "summary_json"
 """The name under which a trial's file holds its summary."""
+
+NUMBERS = (
+    *("path_length_m", "coverage", "swept", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band"),
+    *("map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "nis_mean", "nis_whiteness", "trace_least"),
+    *("trace_below", "bound_margin", "bound_first_m", "bound_worst_m"),
+)
+COUNTS = (
+    *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false", "merges"),
+    *("false_merges", "steps", "collisions"),
+)
+AT_A_MARK = (
+    *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),
+    *("path_length_m", "pose_nees", "joint_anees"),
+)
+SHAPE = {
+    **dict.fromkeys(("world", "backend", "strategy", "mode", "association", "reason"), str),
+    "seed": int,
+    "status": Literal["complete", "stopped", "failed"],
+    **{f"{name}?": float | None for name in NUMBERS},
+    **{f"{name}?": int | None for name in COUNTS},
+    "set_aside?": Maybe(list),
+    "step_ms?": Maybe(Each(float | None)),
+    "marks?": Maybe(Each({**{f"{name}?": float | None for name in AT_A_MARK}, "duplicate_lines?": int | None})),
+}
+"""Of a trial's summary, as the tables take it."""
+LAYOUTS = {
+    **dict.fromkeys(("path_length_m", "pose_nees", "pose_trace", "pose_error_m"), "float s"),
+    **dict.fromkeys(("heading_error_rad", "heading_sigma_rad"), "float s"),
+    "lines": "int s",
+    "map_ends": "float m 2 2",
+    **dict.fromkeys(("map_closed", "map_tentative"), "bool m"),
+    **dict.fromkeys(("path_estimated", "path_true"), "float s 2"),
+    **dict.fromkeys(("distance_m", "distance_sigma_m", "distance_true_m"), "float p"),
+    **dict.fromkeys(("coverage_path_m", "coverage"), "float c"),
+    "nis": "float q",
+    "nis_dof": "float q",
+}
+"""Of a trial's arrays; any of them may be missing."""
 
 
 @dataclass(frozen=True)
@@ -89,26 +126,36 @@ def failed(job: Job, reason: str, trace: str = "") -> Record:
 
 def pack(record: Record) -> bytes:
     """Return a record as the bytes of an archive without pickles."""
-    return npz_bytes({SUMMARY: json_bytes(record.summary).decode(), **record.arrays})
+    return npz_bytes({SUMMARY: json_bytes({"format": FORMAT} | record.summary).decode(), **record.arrays})
 
 
-def unpack(content: bytes) -> Record:
-    """Return the record in the bytes of an archive; raises ValueError or OSError for anything else."""
-    with np.load(BytesIO(content), allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    return Record(json.loads(str(arrays.pop(SUMMARY))), arrays)
+def unpack(content: bytes, trial: Trial) -> Record:
+    """Return the record in the bytes of a trial's file; raises ArchiveError or UnfitError for anything else."""
+    arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
+    summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), SHAPE)
+    arrays.pop("format", None)
+    for name, value in _names(trial).items():
+        if summary[name] != value:
+            raise UnfitError(f"the result of another {name}")
+    if summary["seed"] != trial.seed:
+        raise UnfitError("the result of another seed")
+    return Record({key: value for key, value in summary.items() if key != "format"}, arrays)
 
 
 def _named(trial: Trial, summary: dict[str, Any]) -> dict[str, Any]:
     """Return a summary under the trial's own names: a replay's strategy is that of its recording."""
-    names = {
+    names = _names(trial)
+    return names | {key: value for key, value in summary.items() if key not in names}
+
+
+def _names(trial: Trial) -> dict[str, str]:
+    return {
         "world": world_key(trial.world),
         "backend": trial.backend,
         "strategy": trial.strategy,
         "mode": "closed" if trial.association is None else "replay",
         "association": trial.association or "own",
     }
-    return names | {key: value for key, value in summary.items() if key not in names}
 
 
 @lru_cache(maxsize=2)

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +17,13 @@ import pytest
 from experiments.cli import main
 from experiments.files import json_bytes
 from experiments.interrupts import first_interrupt_waits, nothing_half_built_speaks
-from experiments.saved import from_record, read_trial
+from experiments.results import config_record
+from experiments.saved import read_trial
 from experiments.scenario import TrialConfig, UsageError
 from experiments.scores import TIMED
 from explore.explorer import ExplorerConfig
 from explore.mission import MissionConfig
+from sim.replay import FORMAT
 
 ROOT = Path(__file__).parents[2]
 
@@ -85,7 +86,7 @@ def test_a_run_that_cannot_be_driven_again_is_told(tmp_path, capsys):
 )
 def test_bad_limits_and_bad_resumes_end_in_two_and_one_line(arguments, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "config.json").write_bytes(json_bytes({"trial": asdict(TrialConfig("paper-fig8"))}))
+    (tmp_path / "config.json").write_bytes(json_bytes(config_record(TrialConfig("paper-fig8"))))
     assert main(["explore", *arguments]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -100,15 +101,27 @@ def test_settings_are_read_as_they_were_written(tmp_path):
         mission=MissionConfig(explorer=ExplorerConfig(sweep=False), return_to_start=True),
     )  # fmt: skip
     path = tmp_path / "config.json"
-    path.write_bytes(json_bytes({"trial": asdict(config)}))
+    said = config_record(config)
+    path.write_bytes(json_bytes(said))
     assert read_trial(path) == config
-    said = json.loads(path.read_text())["trial"]
-    # A file of an older version lacks some settings, one of a newer version has more.
-    assert from_record(TrialConfig, {"world": "rooms", "more": 1}) == TrialConfig("rooms")
-    assert replace(from_record(TrialConfig, said), seed=1) != config
-    for wrong in ({"trial": {**said, "seed": "one"}}, {"trial": []}, {}, {"trial": {**said, "robot": 3}}):
-        path.write_bytes(json_bytes(wrong))
-        with pytest.raises(UsageError, match=r"^expected .* found none that fits: .*$"):
+    said = json.loads(path.read_text())
+    trial = said["trial"]
+    wrong = {
+        "trial should be an object": {**said, "trial": []},
+        "no trial": {"format": FORMAT},
+        "no format": {"trial": trial},
+        "format 0": {**said, "format": 0},
+        "trial.seed should be a whole number": {**said, "trial": {**trial, "seed": "one"}},
+        "trial.errorless should be true or false": {**said, "trial": {**trial, "errorless": 1}},
+        "trial.robot should be an object": {**said, "trial": {**trial, "robot": 3}},
+        "an unknown 'trial.more'": {**said, "trial": {**trial, "more": 1}},
+        "no trial.world": {**said, "trial": {key: value for key, value in trial.items() if key != "world"}},
+        "an unknown 'more'": {**said, "more": 1},
+        "p0 should be one of zero": {**said, "trial": {**trial, "p0": "huge"}},
+    }
+    for found, content in wrong.items():
+        path.write_bytes(json_bytes(content))
+        with pytest.raises(UsageError, match=rf"^expected .*, found .*{found}.*: .*$"):
             read_trial(path)
 
 

@@ -37,7 +37,7 @@ def test_a_folder_without_a_map_is_one_line(runs, tmp_path, monkeypatch, capsys)
     monkeypatch.setattr(sys, "argv", ["pictures", str(home), "--out", str(tmp_path / "out")])
     assert draw() == 2
     (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith(f"pictures: expected a run's results in {home}, found ")
+    assert said.startswith(f"pictures: expected map.geojson as this version writes it in {home}, found none: ")
 
 
 def test_the_title_says_replayed_and_holds_one_error_against_the_other_in_one_unit(tmp_path):
