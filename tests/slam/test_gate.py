@@ -55,3 +55,32 @@ def test_what_pose_and_wall_share_makes_no_gate_wider():
     assert not len(match(seen(nearer_m=0.1), WALL, joint).pairs)
     apart = known([0.3, 1e-4, 1e-4], [1e-4, 0.3])
     assert len(match(seen(nearer_m=0.1), WALL, apart).pairs) == 1
+
+
+def short(turn_rad, across_m, along_m, length_m):
+    """Return a short segment beside the wall 2 m ahead, turned far beyond what its sigma of 0.02 rad allows."""
+    n, t = np.array([np.cos(turn_rad), np.sin(turn_rad)]), np.array([-np.sin(turn_rad), np.cos(turn_rad)])
+    centre = np.array([2.0 - across_m, along_m])
+    ends = centre + np.array([[-0.5], [0.5]]) * length_m * t
+    cov = np.array([[1.0, t @ centre], [t @ centre, (t @ centre) ** 2]]) * 0.02**2 + np.diag([0.0, 0.005**2])
+    line = np.array([[turn_rad, n @ centre]])
+    return Segments(line, cov[None], ends[None], np.array([[0, 5]]), np.array([6]), np.zeros((1, 2), int), np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ("segment", "is_doubtful"),
+    [
+        (short(0.3, 0.02, 0.5, 0.2), True),
+        (short(-0.3, 0.02, 0.5, 0.2), True),
+        (short(0.3, 0.02, 0.5, 0.4), False),
+        (short(0.3, 0.12, 0.5, 0.2), False),
+        (short(0.6, 0.02, 0.5, 0.2), False),
+        (short(0.3, 0.02, 2.05, 0.2), False),
+    ],
+    ids=["along it", "turned the other way", "long", "before it", "turned too far", "past its end"],
+)
+def test_a_short_segment_that_lies_on_a_wall_is_no_new_one_however_it_is_turned(segment, is_doubtful):
+    """A beam of the next face turns three or four others by any angle: not the wall's line, and yet no other wall."""
+    matches = match(segment, WALL, known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5]))
+    assert matches.unmatched.tolist() == [0]
+    assert matches.doubtful.tolist() == [0] * is_doubtful
