@@ -257,3 +257,12 @@ def test_walls_that_lie_beside_each_other_are_no_bend(walls):
 
 def test_a_wall_seen_a_few_times_joins_no_side_of_a_bend_that_it_may_lie_across():
     assert len(connect(map_of(bent(6.0, 0.4), seen=5))) == 2
+
+
+@pytest.mark.parametrize(
+    ("gap", "are_one"), [((0.06, 0.0), True), ((0.09, 0.0), False), ((0.09, 0.01), False), ((0.04, 0.08), True)]
+)
+def test_walls_on_one_line_join_only_where_no_wall_fits_between_them_or_beside_each_other(gap, are_one):
+    """Two rooms' walls on one line face each other across the end of the wall between, 0.1 m thick, mapped thinner."""
+    walls = np.array([[[0.0, 0.0], [1.0, 0.0]], np.array([1.0, 0.0]) + gap + np.array([[0.0, 0.0], [1.0, 0.02]])])
+    assert len(connect(map_of(walls))) == 2 - are_one

@@ -26,7 +26,7 @@ def belief_of(faces, pose):
 
 
 def scan_of(faces, pose):
-    finder = RangeFinder(np.asarray(faces, dtype=float), LidarConfig())
+    finder = RangeFinder(np.asarray(faces, dtype=float).reshape(-1, 2, 2), LidarConfig())
     return Scan(finder.bearings_rad, finder.cast(np.asarray(pose))[0], 0.01, 4.0, 0.0)
 
 
@@ -35,7 +35,9 @@ def see(walls, known, shown, owners, pose):
     scan = scan_of(shown, pose)
     segments = extract(scan)
     assert len(segments) == len(owners)
-    forgotten = walls.see(belief_of(known, pose), scan, segments, np.array(owners), np.zeros(0, dtype=np.int64))
+    forgotten = walls.see(
+        belief_of(known, pose), scan, segments, np.array(owners, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    )
     return forgotten.tolist()
 
 
@@ -95,3 +97,70 @@ def test_a_wall_seen_in_between_is_not_claimed():
         assert see(walls, [WALL, BEHIND], [BEHIND], [1], pose) == []
         for _ in range(CONFIG.claims - 1):
             assert see(walls, [WALL, BEHIND], [WALL], [0], pose) == []
+
+
+FRONT = [[1.0, -1.0], [1.0, 1.0]]
+"""Seen from the origin by a beam every 3.5 to 7 cm."""
+ELSEWHERE = [[-4.0, -1.0], [-2.0, -1.0]]
+ORIGIN, AWAY = [0.0, 0.0, 0.0], [-3.5, 0.0, 0.0]
+"""From `AWAY` the wall in front is out of range."""
+
+
+def extent_of(walls, known, pose=ORIGIN):
+    """Return from where to where along y the first wall reaches, m."""
+    return walls.map(belief_of(known, pose)).ends_world[0, :, 1].tolist()
+
+
+@pytest.mark.parametrize("sightings", [1, 2])
+def test_a_wall_seen_once_is_tentative_and_forgotten_when_it_is_not_seen_again(sightings):
+    walls = Walls()
+    for _ in range(sightings):
+        see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    assert walls.map(belief_of([FRONT], ORIGIN)).tentative.tolist() == [sightings < 2]
+    forgotten = [see(walls, [FRONT, ELSEWHERE], [ELSEWHERE], [1], AWAY) for _ in range(CONFIG.patience_steps + 1)]
+    assert forgotten == [[]] * CONFIG.patience_steps + [[0] if sightings < 2 else []]
+
+
+def with_a_hole(low, high):
+    """Return the wall in front with a hole from `low` to `high` along it, m."""
+    return [[[1.0, -1.0], [1.0, low]], [[1.0, high], [1.0, 1.0]]]
+
+
+def test_a_wall_is_cut_back_to_its_last_hit_once_two_scans_in_turn_show_beams_behind_it():
+    walls = Walls()
+    see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    whole = extent_of(walls, [FRONT])
+    for _ in range(2):  # what one scan shows, and the next does not, is a fault of it
+        see(walls, [FRONT], with_a_hole(0.3, 0.9), [0], ORIGIN)
+        assert extent_of(walls, [FRONT]) == whole
+        see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    for _ in range(2):
+        see(walls, [FRONT], with_a_hole(0.3, 0.9), [0], ORIGIN)
+    low, high = extent_of(walls, [FRONT])
+    assert low == whole[0]
+    assert 0.25 < high <= 0.3
+
+
+@pytest.mark.parametrize(
+    "shown", [with_a_hole(0.02, 0.05), [[[1.0, -1.0], [1.0, 0.86]]]], ids=["one beam through it", "its end is nearer"]
+)
+def test_a_lone_beam_or_some_beside_its_end_cut_no_wall(shown):
+    """Two beams pass within 0.1 m of the end: ends and corners are known no better."""
+    walls, pose = Walls(), [0.0, 0.8, 0.0]
+    see(walls, [FRONT], [FRONT], [0], pose)
+    whole = extent_of(walls, [FRONT], pose)
+    for _ in range(4):
+        see(walls, [FRONT], shown, [0], pose)
+    assert extent_of(walls, [FRONT], pose) == whole
+
+
+def test_a_corner_seen_more_sharply_moves_the_end_back():
+    """From 2 m, at a grazing angle, beams stand 0.2 m apart on the wall: its corner is known no better."""
+    walls, far, near = Walls(), [0.1, 0.5, 0.0], [1.6, 0.5, 0.0]
+    side = [[2.0, 0.0], [2.0, 1.5]]
+    see(walls, [BEFORE_BEND], [[[0.0, 0.0], [2.05, 0.0]], [[2.05, 0.0], [2.05, 1.5]]], [0, -1], far)
+    assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.05, abs=1e-3)
+    see(walls, [BEFORE_BEND], [BEFORE_BEND, side], [0, -1], near)
+    assert walls.map(belief_of([BEFORE_BEND], near)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
+    see(walls, [BEFORE_BEND], [[[0.0, 0.0], [1.95, 0.0]], [[1.95, 0.0], [1.95, 1.5]]], [0, -1], far)
+    assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
