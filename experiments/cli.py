@@ -1,7 +1,6 @@
 """The command `chainslam`: one class for each subcommand, and one line in the registry."""
 
 import io
-import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
@@ -18,9 +17,10 @@ from .replay_command import Replay
 from .report_command import Report
 from .reproduce_command import Reproduce
 from .scenario import UsageError, choose
+from .streams import Lasting, is_full, lasting_streams, one_line
 from .view_command import View
 
-BAD_USAGE, INTERRUPTED = 2, 130
+FAILED, BAD_USAGE, INTERRUPTED = 1, 2, 130
 
 
 @runtime_checkable
@@ -48,21 +48,50 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 
 @nothing_half_built_speaks()
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0 done, 1 failed, 2 bad usage or input, 130 Ctrl-C."""
+    """Run one command and return its exit status: 0 done, 1 failed, 2 bad usage or input, 130 Ctrl-C.
+
+    A reader of its output that has left changes nothing; output that found no room is a failure.
+    """
+    with lasting_streams() as out:
+        try:
+            status = _run(arguments)
+        except SystemExit as leaving:
+            # The help; any other end of the parser is told as bad usage.
+            if not _is_lost(out):
+                raise leaving
+            status = 0
+        if out is not None and _is_lost(out):
+            _tell(f"expected room on standard output, found {out.problem}: files were written all the same")
+            return status or FAILED
+    return status
+
+
+def _is_lost(out: Lasting | None) -> bool:
+    """Whether output found no place, though somebody waits for it."""
+    sys.stdout.flush()
+    return out is not None and out.problem is not None and not isinstance(out.problem, BrokenPipeError)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
-        status = _parse(arguments).run()
-        sys.stdout.flush()
-        return status
+        return _parse(arguments).run()
     except UsageError as error:
-        print(f"chainslam: {error}", file=sys.stderr)
+        _tell(error)
         return BAD_USAGE
+    except OSError as error:
+        place = "" if error.filename is None else f" at {error.filename}"
+        _tell(f"expected files that can be read and written, found {error.strerror or error}{place}: check that place")
+        return FAILED if is_full(error) else BAD_USAGE
+    except MemoryError:
+        _tell("expected an input that fits into memory, found one that does not: take a smaller one")
+        return FAILED
     except KeyboardInterrupt:
-        print("chainslam: interrupted; files that were written are whole", file=sys.stderr)
+        _tell("interrupted; files that were written are whole")
         return INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read the output has left; Python would complain once more while closing it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+
+
+def _tell(message: object) -> None:
+    print(f"chainslam: {one_line(message)}", file=sys.stderr)
 
 
 def _parse(arguments: Sequence[str] | None) -> Command:

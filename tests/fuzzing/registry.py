@@ -1,7 +1,7 @@
 """The mutators: each makes one broken input in a folder and returns the commands that read it.
 
-A mutator is a function (rng, folder) -> commands, each a list of words for `chainslam`; the folder is empty and its
-own. All chance comes from `rng`, so that seed and number make the same input again.
+A mutator is a function (rng, folder) -> commands, each a list of words for `chainslam`, which is run inside `folder`;
+the folder is empty and its own. All chance comes from `rng`, so that seed and number make the same input again.
 """
 
 from collections.abc import Callable
@@ -9,5 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from . import results, words
+
 Mutator = Callable[[np.random.Generator, Path], list[list[str]]]
-MUTATORS: dict[str, Mutator] = {}
+MUTATORS: dict[str, Mutator] = {
+    "logs": results.logs,
+    "runs": results.runs,
+    "replays": results.replays,
+    "campaigns": results.campaigns,
+    "contrasts": results.contrasts,
+    "merged": results.merged,
+    "words": words.words,
+}
