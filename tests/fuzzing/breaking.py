@@ -71,7 +71,7 @@ def _bytes(rng: Rng, path: Path) -> None:
     if content:
         at = int(rng.integers(len(content)))
         ways += [
-            lambda: content.__setitem__(at, content[at] ^ (1 << int(rng.integers(8)))),
+            lambda: content.__setitem__(slice(at, at + 1), bytes([int(rng.integers(256))])),
             lambda: content.__delitem__(slice(at, at + int(rng.integers(1, 100)))),
             lambda: content.__setitem__(slice(at, at + 40), rng.bytes(40)),
             lambda: content.__setitem__(slice(at, at), content[at : at + 200]),
