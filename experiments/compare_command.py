@@ -1,22 +1,26 @@
 """`chainslam compare`: a campaign of many trials, and the comparison that comes of it."""
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from .campaign.cluster import ClusterError, on_dask
 from .campaign.contrast import contrast, read_contrast
 from .campaign.contrast_page import verdict
 from .campaign.film import record_campaign
 from .campaign.merge import merge
 from .campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_campaign, trials
-from .campaign.runner import on_cores, on_dask, run_campaign
+from .campaign.runner import on_cores, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
 from .replay import Association
 from .scenario import P0, UsageError, load_world
 
-INTERRUPTED = 130
+FAILED, INTERRUPTED = 1, 130
+JOBS_A_CORE = 8
+"""Processes beyond this for each core only take memory from one another."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +90,11 @@ class Compare:
             return self._of_others()
         campaign = self.campaign
         check_campaign(campaign)
-        if self.jobs is not None and self.jobs < 1:
-            raise UsageError(f"expected at least 1 process, found --jobs {self.jobs}: raise it")
+        most = JOBS_A_CORE * len(os.sched_getaffinity(0))
+        if self.jobs is not None and not 1 <= self.jobs <= most:
+            raise UsageError(
+                f"expected 1 to {most} processes on this machine, found --jobs {self.jobs}: choose another"
+            )
         for world in campaign.worlds:
             load_world(world)
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
@@ -98,6 +105,10 @@ class Compare:
                 print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
                       file=sys.stderr)  # fmt: skip
                 return INTERRUPTED
+            except ClusterError as error:
+                print(f"chainslam: {error}; what is done is kept in {self.out}, the same command goes on",
+                      file=sys.stderr)  # fmt: skip
+                return FAILED
             write_tables(self.out, campaign, trials(campaign), store.record)
         print(tally.words())
         print(f"results in {self.out}")

@@ -127,8 +127,8 @@ def check(config: TrialConfig) -> None:
     if config.max_steps < 1:
         raise UsageError(f"expected at least 1 step, found --max-steps {config.max_steps}: raise it")
     for option, limit in (("--max-path", config.max_path_m), ("--time-limit", config.time_limit_s)):
-        if limit is not None and not limit > 0:
-            raise UsageError(f"expected a limit above 0, found {option} {limit:g}: raise it")
+        if limit is not None and not 0 < limit < float("inf"):
+            raise UsageError(f"expected a limit above 0 and finite, found {option} {limit:g}: choose another")
 
 
 def build(config: TrialConfig, world: World | None = None) -> Scenario:

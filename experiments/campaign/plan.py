@@ -18,6 +18,8 @@ ARMS = (CLOSED, "replay-own", "replay-true")
 """Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
 Replay with the true association: the algebra alone."""
 MAX_STEPS = 5000
+MOST_TRIALS = 1_000_000
+"""A campaign of more does not begin: its list of trials alone would take the memory of a small machine."""
 PAPER_BACKENDS = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf", "graph")
 PAPER_STRATEGIES = ("nearest-robot", "same-chain", "nearest-start")
 
@@ -148,6 +150,12 @@ def check_campaign(campaign: Campaign) -> None:
         raise UsageError(f"expected worlds of different names, found {', '.join(keys)}: rename a file")
     if campaign.trials < 1:
         raise UsageError(f"expected at least 1 trial, found --trials {campaign.trials}: raise it")
+    cells = len(campaign.worlds) * len(campaign.strategies) * len(campaign.backends) * len(campaign.arms)
+    if cells * campaign.trials > MOST_TRIALS:
+        raise UsageError(
+            f"expected at most {MOST_TRIALS:,} trials in a campaign, found {cells} cells of {campaign.trials:,}: run"
+            " several with other --first-seed and put them together with --merge"
+        )
     choose("back end (--driver)", campaign.driver, BACKENDS)
     for world, strategy, backend in product(campaign.worlds, campaign.strategies, campaign.backends):
         choose("strategy", strategy, STRATEGIES)

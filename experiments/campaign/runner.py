@@ -3,16 +3,13 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 from time import monotonic
-from typing import Any
 
 from joblib import Parallel, delayed
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ..console import plain_console
-from ..scenario import UsageError
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform
@@ -122,36 +119,3 @@ def on_cores(count: int | None) -> Executor:
 def lost(job: Job, reason: str) -> Done:
     """Return what stands for a trial of which nothing came back."""
     return Done(job.trial, pack(failed(job, reason)))
-
-
-def on_dask(address: str) -> Executor:
-    """Return an executor over the workers of a Dask scheduler; raises UsageError where there is none."""
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError as error:
-        raise UsageError("expected the package distributed, found none: pip install chainslam[dask]") from error
-    try:
-        client = Client(address, timeout=5, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise UsageError(f"expected a Dask scheduler at {address}, found none: start `dask scheduler` first") from error
-
-    def execute(jobs: Iterable[Job]) -> Iterator[Done]:
-        waiting, sent = iter(jobs), dict[Any, Job]()
-
-        def send(count: int) -> list[Any]:
-            new = {client.submit(perform, job, pure=False): job for job in islice(waiting, count)}
-            sent.update(new)
-            return list(new)
-
-        room = as_completed(send(2 * max(sum(client.nthreads().values()), 1)), loop=client.loop)
-        for future in room:
-            job = sent.pop(future)
-            try:
-                done = future.result()
-            except KilledWorker as error:
-                done = lost(job, f"its worker died: {error}")
-            for more in send(1):
-                room.add(more)
-            yield done
-
-    return execute

@@ -28,9 +28,13 @@ def test_listings_start_each_line_with_a_name(listing, capsys):
         ["explore", "paper-fig8", "--seed", "-1"],
         ["explore", "paper-fig8", "--max-steps", "0"],
         ["explore", "paper-fig8", "--wings"],
+        *(["explore", "paper-fig8", option, value]
+          for option in ("--max-path", "--time-limit", "--scale") for value in ("nan", "inf", "0", "1e400")),
+        *(["explore", "paper-fig8", "--start", *pose] for pose in (("nan", "1"), ("1", "inf"), ("1",), ("1",) * 4)),
+        *(["explore", "paper-fig8", option, "9" * 5000] for option in ("--seed", "--max-steps", "--backend")),
     ],
-    ids=" ".join,
-)
+    ids=lambda words: " ".join(words)[:60],
+)  # fmt: skip
 def test_bad_usage_ends_in_two_and_one_line(arguments, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2

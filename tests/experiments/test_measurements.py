@@ -110,10 +110,15 @@ def test_measure_prints_a_distance_with_its_interval_or_lists_the_corners(run, c
     assert "corners of" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("names", [["0"], ["0", "999"], ["0", "A"], ["0", "-1"], ["0", "1", "2"]], ids="-".join)
+@pytest.mark.parametrize(
+    "names",
+    [["0"], ["0", "9" * 5000], ["0", "٣"], ["0", "999"], ["0", "A"], ["0", "-1"], ["0", "1", "2"]],
+    ids=lambda names: "-".join(names)[:9],
+)
 def test_names_that_are_no_corners_get_one_line_and_status_2(run, names, capsys):
     assert main(["measure", str(run[1]), *names]) == 2
-    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert len(line) < 1000
 
 
 def test_a_folder_without_a_map_gets_one_line_and_status_2(tmp_path, capsys):

@@ -1,16 +1,23 @@
 """A real scheduler and two worker processes on the loopback: the same table, also when a worker is killed."""
 
+import json
 import os
 import signal
+import subprocess
+import sys
+import time
 from itertools import count
 
 import distributed
 import pytest
 
+from experiments.campaign import cluster as of_dask
+from experiments.campaign.cluster import on_dask
 from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.runner import on_cores, on_dask, run_campaign
-from experiments.campaign.store import opened
+from experiments.campaign.runner import on_cores, run_campaign
+from experiments.campaign.store import Store, opened
 from experiments.campaign.tables import TIMINGS, trial_row
+from experiments.cli import main
 
 CAMPAIGN = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, max_steps=15)
 
@@ -43,3 +50,88 @@ def test_a_cluster_gives_the_same_rows_and_so_does_one_that_loses_a_worker(clust
     expected = rows(tmp_path / "cores", on_cores(1))
     assert rows(tmp_path / "dask", unlucky) == expected
     assert next(killed) > 1
+
+
+WITHOUT_PACKAGE = """
+import sys
+class Blind:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] == "experiments":
+            raise ModuleNotFoundError("No module named 'experiments'")
+sys.meta_path.insert(0, Blind())
+"""
+
+
+@pytest.fixture
+def started(tmp_path):
+    """Start a scheduler, and return its address, its process and what starts a worker."""
+    file, processes = tmp_path / "scheduler.json", []
+
+    def start(kind, *words, **more):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *words, "--no-dashboard"]
+        environment = os.environ | more
+        processes.append(
+            subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
+        )
+        return processes[-1]
+
+    scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
+    while not file.exists():
+        assert scheduler.poll() is None
+        time.sleep(0.1)
+    address = json.loads(file.read_text())["address"]
+    yield address, scheduler, lambda **more: start("worker", address, "--nthreads", "1", "--no-nanny", **more)
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def compared(address, folder, trials=1):
+    words = ["--worlds", "paper-fig4", "--backends", "full-ekf", "--strategies", "nearest-robot", "--modes", "closed"]
+    more = ["--trials", str(trials), "--max-steps", "25", "--dask", address, "--out", str(folder)]
+    return main(["compare", *words, *more])
+
+
+def told_in_one_line(capsys, found):
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("chainslam: expected ")
+    assert found in line
+    assert "what is done is kept" in line
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")
+def test_a_scheduler_without_a_worker_is_told(started, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(of_dask, "WAIT_S", 1.0)
+    assert compared(started[0], tmp_path / "out") == 1
+    told_in_one_line(capsys, "found none in 1 s")
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")
+def test_a_worker_without_this_package_is_told(started, tmp_path, capsys):
+    address, _, worker = started
+    (tmp_path / "blind").mkdir()
+    (tmp_path / "blind" / "sitecustomize.py").write_text(WITHOUT_PACKAGE)
+    worker(PYTHONPATH=str(tmp_path / "blind"))
+    assert compared(address, tmp_path / "out") == 1
+    told_in_one_line(capsys, "No module named 'experiments'")
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("killed", ["scheduler", "worker"])
+def test_what_is_finished_is_kept_when_the_cluster_dies(started, tmp_path, capsys, monkeypatch, killed):
+    monkeypatch.setattr(of_dask, "WAIT_S", 3.0)
+    address, scheduler, worker = started
+    victim = {"worker": worker(), "scheduler": scheduler}[killed]
+    save = Store.save
+
+    def killing(store, done):
+        save(store, done)
+        victim.kill()
+
+    monkeypatch.setattr(Store, "save", killing)
+    assert compared(address, tmp_path / "out", 6) == 1
+    told_in_one_line(capsys, "found it gone" if killed == "scheduler" else "found none in 3 s")
+    assert len(list((tmp_path / "out" / "trials").rglob("*.npz"))) >= 1

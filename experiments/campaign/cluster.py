@@ -1,0 +1,129 @@
+"""Trials on the workers of a Dask scheduler; whatever becomes of the cluster is told in one line."""
+
+import logging
+from collections.abc import Iterable, Iterator
+from concurrent.futures import CancelledError
+from importlib.metadata import version
+from itertools import islice
+from time import monotonic
+from typing import Any
+
+from ..scenario import UsageError
+from .runner import Executor, lost
+from .work import Done, Job, perform
+
+WAIT_S = 30.0
+"""How long a scheduler may be without a worker."""
+LOOK_S = 2.0
+"""How often it is asked whether it has one."""
+AT_ONCE = 2
+"""Jobs that a thread of a worker has at hand, so that it need not wait for the next."""
+
+
+class ClusterError(RuntimeError):
+    """A cluster that cannot go on: what was expected, what was found, what to do."""
+
+
+def on_dask(address: str) -> Executor:
+    """Return an executor over the workers of a Dask scheduler; raises UsageError where there is none.
+
+    The executor raises ClusterError where the scheduler goes, no worker comes, or one cannot run a trial.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        raise UsageError("expected the package distributed, found none: pip install chainslam[dask]") from error
+    for name in ("distributed", *(name for name in logging.root.manager.loggerDict if name.startswith("distributed"))):
+        # What they tell of a lost connection is told here in a line.
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        client = distributed.Client(address, timeout=5, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise UsageError(f"expected a Dask scheduler at {address}, found none: start `dask scheduler` first") from error
+    return lambda jobs: _guarded(client, address, _perform_all(client, address, jobs))
+
+
+def program() -> str:
+    """Return the version of this package; a worker that can tell has it."""
+    return version("chainslam")
+
+
+def _guarded(client: Any, address: str, performed: Iterator[Done]) -> Iterator[Done]:
+    """Go through the jobs, with a ClusterError in place of whatever a cluster that breaks down raises."""
+    try:
+        yield from performed
+    except (CancelledError, OSError, RuntimeError) as error:
+        if isinstance(error, ClusterError) or client.status == "running":
+            raise
+        raise ClusterError(
+            f"expected the Dask scheduler at {address} to stay, found it gone: start it and its workers again"
+        ) from error
+
+
+def _perform_all(client: Any, address: str, jobs: Iterable[Job]) -> Iterator[Done]:
+    from distributed import KilledWorker
+
+    _check(client, address)
+    waiting, sent = iter(jobs), dict[Any, Job]()
+
+    def send(count: int) -> None:
+        sent.update({client.submit(perform, job, pure=False): job for job in islice(waiting, count)})
+
+    send(AT_ONCE * max(sum(client.nthreads().values()), 1))
+    while sent:
+        for future in _some_done(client, address, list(sent)):
+            job = sent.pop(future)
+            try:
+                done = future.result()
+            except KilledWorker as error:
+                done = lost(job, f"its worker died: {error}")
+            except CancelledError:
+                raise
+            except Exception as error:  # a trial's own troubles are in its record
+                raise _unable(address, error) from error
+            send(1)
+            yield done
+
+
+def _check(client: Any, address: str) -> None:
+    """Raise ClusterError where no worker comes, or one lacks this package."""
+    try:
+        client.wait_for_workers(1, timeout=WAIT_S)
+    except TimeoutError as error:
+        raise _alone(address) from error
+    try:
+        found = set(client.run(program).values())
+    except Exception as error:  # a worker's ImportError comes as a plain Exception
+        raise _unable(address, error) from error
+    if found != {program()}:
+        raise _unable(address, f"version {', '.join(sorted(found))}, not {program()}")
+
+
+def _some_done(client: Any, address: str, futures: list[Any]) -> list[Any]:
+    """Return the jobs that are done, waiting for one; raises ClusterError once there is no worker for `WAIT_S`."""
+    from distributed import wait
+
+    alone_since = None
+    while True:
+        try:
+            with client.as_current():
+                return list(wait(futures, timeout=LOOK_S, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            if client.nthreads():
+                alone_since = None
+                continue
+            alone_since = alone_since or monotonic()
+            if monotonic() - alone_since > WAIT_S:
+                raise _alone(address) from None
+
+
+def _alone(address: str) -> ClusterError:
+    return ClusterError(
+        f"expected a worker at the Dask scheduler {address}, found none in {WAIT_S:g} s: start `dask worker {address}`"
+    )
+
+
+def _unable(address: str, why: object) -> ClusterError:
+    return ClusterError(
+        f"expected workers and a scheduler at {address} with this package, found {why}: install it there"
+    )
