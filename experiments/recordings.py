@@ -17,7 +17,14 @@ def recorded(made: TrialResult) -> RecordedRun:
     if log is None:
         raise UsageError(f"expected a run of at least one step, found none: {made.ending.reason}")
     recording = Recording(
-        log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov
+        log.time_s,
+        log.bearings_rad,
+        log.ranges_m,
+        log.sigma_m,
+        log.range_max_m,
+        log.odometry,
+        log.odometry_cov,
+        log.touched,
     )
     return RecordedRun(
         scenario.config, recording, scenario.start_estimate, scenario.start_cov, log.true_world, log.face_of_beam

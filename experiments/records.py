@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from explore.step import Step
 from slam.backend import Joint
@@ -24,6 +24,8 @@ class Log:
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each step, robot frame before the motion, m m rad."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
+    touched: Bool[np.ndarray, " s"]
+    """Whether the body met something on the way to each step."""
     estimated_world: Float[np.ndarray, "s 3"]
     """The estimate available at that step."""
     estimated_cov: Float[np.ndarray, "s 3 3"]
@@ -79,6 +81,7 @@ class Recorder:
                 "ranges_m": step.scan.ranges_m,
                 "odometry": step.odometry.motion,
                 "odometry_cov": step.odometry.cov,
+                "touched": step.odometry.touched,
                 "estimated_world": belief.pose_world.copy(),
                 "estimated_cov": belief.pose_cov.copy(),
                 "true_world": record.poses_world[-1],

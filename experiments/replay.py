@@ -125,6 +125,7 @@ class ReplayedRobot(RecordedRobot):
         """Go on to the next scan."""
         odometry = super().drive(command)
         self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
+        self._record.collisions += odometry.touched
         return odometry
 
 

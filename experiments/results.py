@@ -35,7 +35,7 @@ STEP_COLUMNS = (
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
     *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
     *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
-    *("odometry_error_m", "reason", "step_ms"),
+    *("odometry_error_m", "collisions", "reason", "step_ms"),
 )
 """Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
 with the poses beside it, all that `pose_nees` is made of."""
@@ -127,6 +127,7 @@ def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
         "range_max_m": log.range_max_m,
         "odometry": log.odometry,
         "odometry_cov": log.odometry_cov,
+        "touched": log.touched,
         "start_pose": result.scenario.start_estimate,
         "start_cov": result.scenario.start_cov,
         "true_poses": log.true_world,
@@ -185,6 +186,7 @@ def steps_csv(log: Log) -> bytes:
         *sigmas.T,
         *log.estimated_cov[:, rows, columns_of_cov].T,
         wheels,
+        np.cumsum(log.touched),
         log.reasons,
         1e3 * log.seconds,
     ]

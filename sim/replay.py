@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from slam.robot import MotionCommand, Odometry, Scan
 
@@ -30,6 +30,8 @@ TRUTH = {
     "true_face_of_beam": "int s k",
 }
 """What a simulated run tells besides."""
+LATER = {"touched": "bool s"}
+"""What older logs do not hold."""
 MOST_M = 1e6
 """Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
 
@@ -50,6 +52,8 @@ class Recording:
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each scan, robot frame before the motion, m m rad; zero for the first."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
+    touched: Bool[np.ndarray, " s"] | None = None
+    """Whether the body met something on the way to each scan; None where nobody kept it."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -72,7 +76,9 @@ class RecordedRobot:
         if self._at + 1 >= len(self._recording):
             raise EOFError(f"expected at most {len(self._recording)} scans, found the end of the recording")
         self._at += 1
-        return Odometry(self._recording.odometry[self._at], self._recording.odometry_cov[self._at])
+        r = self._recording
+        touched = r.touched is not None and bool(r.touched[self._at])
+        return Odometry(r.odometry[self._at], r.odometry_cov[self._at], touched)
 
 
 def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
@@ -82,7 +88,7 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
         said = read_archive(source, {"format": "int"})["format"]
         if said != FORMAT:
             raise ArchiveError(f"format {said}, where this version reads {FORMAT}")
-        return read_archive(source, NEEDED, TRUTH)
+        return read_archive(source, NEEDED, {**TRUTH, **LATER})
     except FileNotFoundError as error:
         raise RecordingError(f"expected a run's log.npz, found no file {name} there: name a log that exists") from error
     except ArchiveError as error:
@@ -96,7 +102,7 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
     """Return the recording in a log's arrays; raises RecordingError where their numbers make none."""
     recording = Recording(
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], float(arrays["sigma_m"]),
-        float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"],
+        float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:

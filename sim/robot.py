@@ -1,6 +1,6 @@
 """The simulated robot: it owns the truth, and only what `slam.robot` defines leaves it towards the software."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -101,7 +101,7 @@ class SimulatedRobot:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
 
         Where the body would touch a wall the robot stops at the last free place of its way, the collision is
-        counted, and the wheels report the part that was driven.
+        counted, the wheels report the part that was driven, and the bumper that it touched.
         """
         drive = self.config.drive
         command = clamp(command, drive)
@@ -111,7 +111,8 @@ class SimulatedRobot:
         shares = np.linspace(0.0, 1.0, count + 1)[1:]
         motions = true_motion(command, slip, drive, shares)
         free = self._free_places(to_world(motions[:, :2], self._pose))
-        if free < count:
+        touched = free < count
+        if touched:
             self._record.collisions += 1
             share = float(shares[free - 1]) if free else 0.0
             command = MotionCommand(share * command.forward_m, share * command.turn_rad)
@@ -122,7 +123,7 @@ class SimulatedRobot:
         duration = seconds(command, drive)
         self._time_s += duration
         self._record.drive_time_s += duration
-        return odometry(command, drive)
+        return replace(odometry(command, drive), touched=touched)
 
     def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:
         """Return how many places, from the first on, keep the body clear of every face."""

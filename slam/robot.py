@@ -36,6 +36,8 @@ class Odometry:
     """x m, y m, heading rad."""
     cov: Float[np.ndarray, "3 3"]
     """Covariance of the motion's error, in the same frame."""
+    touched: bool = False
+    """A bumper says that the body met something on the way; a robot without one never says so."""
 
 
 @dataclass(frozen=True)

@@ -57,9 +57,9 @@ def test_the_same_seed_gives_the_same_bytes_and_wheels_never_shift_the_laser():
 @pytest.mark.parametrize("heading", [0.0, 0.3, 0.8, 2.0])
 def test_the_body_stops_before_the_wall_and_the_collision_is_counted(heading):
     robot = SimulatedRobot(room(heading), seed=2)
-    for _ in range(30):
-        robot.drive(MotionCommand(0.15, 0.0))
-    assert robot.record.collisions > 0
+    touched = [robot.drive(MotionCommand(0.15, 0.0)).touched for _ in range(30)]
+    assert robot.record.collisions == sum(touched) > 0
+    assert not touched[0]
     gap = distance_to_segments(robot.true_pose[None, :2], room().faces).min()
     assert 0.2 <= gap < 0.35
 
