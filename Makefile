@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test test-long mutants check bench docs smoke compare random strategies bias heading
+.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts strategies bias heading
 
 setup: .venv/made
 
@@ -44,6 +44,9 @@ bias: setup
 
 heading: setup
 	$(BIN)/python -m experiments.heading_study --out results/heading.csv --picture results/heading.png
+
+courts: setup
+	$(BIN)/python -m experiments.courts_study --out results/courts.jsonl
 
 strategies: setup
 	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv
