@@ -105,18 +105,20 @@ class Pilot:
         scan: Scan,
         free_space: FreeSpace,
         recent_robot: Float[np.ndarray, "r 2"] = _NOTHING,
+        touched_robot: Float[np.ndarray, "t 2"] = _NOTHING,
     ) -> MotionCommand | None:
         """Return the next step along the path, or None where no safe one leads on.
 
         `recent_robot` are returns of the last scans, in the robot's frame of now: they count where there is room. In
-        a narrow place the noise of so many would leave none.
+        a narrow place the noise of so many would leave none. What the body touched, `touched_robot`, always
+        counts.
         """
         points, ahead = returns(scan), self._aim(pose_world, self._config.lookahead_m)
         aim, gap_m, narrow = _centred(ahead, points, self._config)
         if gap_m < self._config.narrow_m:
             steady = steadied(points, recent_robot)
             aim, gap_m, narrow = _centred(ahead, steady, self._config)
-        points = steady if narrow else np.concatenate([points, recent_robot])
+        points = np.concatenate([steady if narrow else points, _NOTHING if narrow else recent_robot, touched_robot])
         if gap_m < self._config.narrow_m:
             command = _towards(aim, points, self._config, narrow)
         else:
@@ -244,6 +246,20 @@ def _centred(
     return middle + max(through @ (aim_robot - middle), config.beside_m - through @ middle) * through, gap, True
 
 
+def keeps_clear(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> bool:
+    """Return whether the disc comes to cover nothing that it does not cover now: enough on a way that it came."""
+    least_m = config.radius_m + config.least_margin_m
+    beside = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) > least_m]
+    return _least_gap(command, beside) >= least_m
+
+
+def _least_gap(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"]) -> float:
+    """Return the least distance m from the middle of the body to any point on the way."""
+    places = np.stack([arc(share * command.forward_m, share * command.turn_rad)[:2] for share in (0.25, 0.5, 0.75, 1)])
+    gap = points_robot - places[:, None]
+    return float(np.hypot(gap[..., 0], gap[..., 1]).min(initial=np.inf))
+
+
 def _is_safe(
     command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, narrow: bool
 ) -> bool:
@@ -253,9 +269,7 @@ def _is_safe(
     near = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.step_m + 0.1]
     if not len(near):
         return True
-    places = np.stack([arc(share * command.forward_m, share * command.turn_rad)[:2] for share in (0.25, 0.5, 0.75, 1)])
-    gap = near - places[:, None]
-    least = float(np.hypot(gap[..., 0], gap[..., 1]).min())
+    least = _least_gap(command, near)
     now = float(np.hypot(near[:, 0], near[:, 1]).min())
     margin = config.margin_m
     if narrow:  # deep in a gap hardly wider than the body, a step along it may take some of what little is left

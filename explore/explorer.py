@@ -126,6 +126,20 @@ class Explorer:
             self._give_up(around)
         return self._look_again(around, len(self.set_aside) > known)
 
+    def interrupt(self, around: Surroundings) -> None:
+        """Look for another way to the present goal: something stands in this one."""
+        if self._errand is not None:
+            self._errand.interrupt(around)
+
+    def start_over(self) -> None:
+        """Forget what was given up, and where: the floor is drawn anew."""
+        self._drop()
+        self._sweep = Sweep(self._config.sweeping, self._config.sweep)
+        self._attempts, self._gone = Spots(0.3), Spots(0.3)
+        self._walked, self._floor_known = set(), {}
+        self.set_aside.clear()
+        self._looked_again = 0
+
     def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
         """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do.
 

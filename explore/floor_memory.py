@@ -1,13 +1,14 @@
 """Scans kept with the walls around them, so that the grid of free floor can follow the map where the map moves."""
 
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals
-from slam.geometry.poses import rotation, wrap
-from slam.robot import Scan
+from slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
+from slam.robot import Odometry, Scan
 from slam.stochastic_map import StochasticMap
 
 from .free_space import FreeSpace
@@ -29,6 +30,12 @@ class FloorMemoryConfig:
     """So many steps at least, and a tenth of the scans kept, lie between two looks at how far the walls have moved."""
     faith_m: float = 0.01
     """Where no wall nearby tells, a scan moves as the one kept before it did: worth this many metres of wall."""
+    last_scans: int = 100
+    """So many of the last scans are enough to begin the grid anew."""
+    touched_m: float = 0.1
+    """Where the body touched something, the way that it drove is closed this far around."""
+    step_m: float = 0.3
+    """Two poses of one step that lie no farther apart are joined by a way that the robot drove; else the map jumped."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,10 @@ class _Kept:
     alphas: Float[np.ndarray, " w"]
     offsets: Float[np.ndarray, " w"]
     """From the pose to each line along its normal, m."""
+    way_robot: Float[np.ndarray, "d 2"]
+    """Where the robot drove while the scans of this place were taken, in the frame of this one, m."""
+    touched_robot: Float[np.ndarray, "t 2"]
+    """What its body touched then."""
 
 
 @dataclass(frozen=True)
@@ -63,27 +74,83 @@ class FloorMemory:
     """Draws every scan into a grid, keeps some, and draws those anew when the walls around them have moved.
 
     No filter keeps past poses, but each keeps the walls: a kept scan goes where the nearest walls went, by the turn and
-    the shift that fit best, in least squares by length of wall.
+    the shift that fit best, in least squares by length of wall. The way that the robot drove goes with the scans.
     """
 
     def __init__(self, free_space: FreeSpace, config: FloorMemoryConfig = FloorMemoryConfig()) -> None:
         self.free_space, self._config = free_space, config
         self._kept: dict[tuple[int, ...], _Kept] = {}
         self._rested = 0
+        self._last: deque[tuple[Float[np.ndarray, 3], Scan]] = deque(maxlen=config.last_scans)
+        self._before_world: Float[np.ndarray, 2] | None = None
+
+    def move(self, odometry: Odometry) -> None:
+        """Take note that the robot has moved."""
+        back = inverse(odometry.motion)
+        for k, (pose, scan) in enumerate(self._last):
+            self._last[k] = compose(back, pose), scan
+
+    def last_way_world(self, pose_world: Float[np.ndarray, "3"], length_m: float) -> Float[np.ndarray, "w 2"]:
+        """Return where the wheels say that the robot drove last, m, if it now is at a pose: the last place first."""
+        way = to_world(np.array([pose[:2] for pose, _ in reversed(self._last)]).reshape(-1, 2), pose_world)
+        along = np.cumsum(np.hypot(*np.diff(way, axis=0, prepend=pose_world[None, :2]).T))
+        return way[along <= length_m]
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Take in one scan at the pose that the map believes in."""
         pose = walls.belief.pose_world
-        self.free_space.integrate(pose, scan)
-        key = tuple(np.floor(pose[:2] / self._config.spacing_m).astype(int).tolist())
-        if not scan.is_full_turn:
-            key = *key, int(pose[2] // (0.25 * np.pi))
-        self._kept.pop(key, None)  # the newest stands last
-        self._kept[key] = self._beside(walls, walls.distances_m, pose, scan)
+        self._last.append((np.zeros(3), scan))
+        self._take_in(walls, walls.distances_m, pose, scan)
         self._rested += 1
         if self._rested >= max(self._config.rest_steps, len(self._kept) // 10):
             self._rested = 0
             self._follow(walls)
+
+    def note_touched(self, pose_world: Float[np.ndarray, "3"], places_robot: Float[np.ndarray, "t 2"]) -> None:
+        """Remember that the body, at the pose of the last scan, touched something, and that it does not fit there."""
+        for place in to_world(places_robot, pose_world):
+            self.free_space.note_touched(place)
+        self.free_space.note_too_tight(pose_world[:2])
+        self.free_space.forget_driven(pose_world[:2], self._config.touched_m)
+        key = next(reversed(self._kept))
+        view = self._kept[key]
+        self._kept[key] = replace(view, touched_robot=np.vstack([view.touched_robot, places_robot]))
+
+    def way_world(self) -> Float[np.ndarray, "w 2"]:
+        """Return where the robot drove, as the map has it now, m."""
+        return np.concatenate([to_world(view.way_robot, view.pose_world) for view in self._kept.values()])
+
+    def begin_anew(self, walls: StochasticMap) -> None:
+        """Forget all but the last scans, and draw those where the wheels say that they were taken, seen from now."""
+        self.free_space.clear()
+        self._kept.clear()
+        self._before_world, self._rested = None, 0
+        here = walls.belief.pose_world
+        poses = [compose(here, pose) for pose, _ in self._last]
+        distances = distance_to_segments(np.array([pose[:2] for pose in poses]), walls.ends_world)
+        for pose, (_, scan), away in zip(poses, self._last, distances, strict=True):
+            self._take_in(walls, away, pose, scan)
+
+    def _take_in(
+        self, walls: StochasticMap, distances_m: Float[np.ndarray, " n"], pose: Float[np.ndarray, "3"], scan: Scan
+    ) -> None:
+        """Draw one scan taken at a pose, note the way there, and keep it in place of an older one from nearby."""
+        self.free_space.integrate(pose, scan)
+        way_world = _between(self._before_world, pose[:2], self._config.step_m, 0.5 * self.free_space.config.cell_m)
+        self.free_space.note_driven(way_world)
+        self._before_world = pose[:2].copy()
+        key = tuple(np.floor(pose[:2] / self._config.spacing_m).astype(int).tolist())
+        if not scan.is_full_turn:
+            key = *key, int(pose[2] // (0.25 * np.pi))
+        old = self._kept.pop(key, None)  # the newest stands last
+        touched_world = np.zeros((0, 2))
+        if old is not None:
+            touched_world = to_world(old.touched_robot, old.pose_world)
+            way_world = np.unique(np.round(np.vstack([to_world(old.way_robot, old.pose_world), way_world]), 2), axis=0)
+        view = self._beside(walls, distances_m, pose, scan)
+        self._kept[key] = replace(
+            view, way_robot=to_robot(way_world, pose), touched_robot=to_robot(touched_world, pose)
+        )
 
     def _beside(
         self, walls: StochasticMap, distances_m: Float[np.ndarray, " n"], pose_world: Float[np.ndarray, "3"], scan: Scan
@@ -93,7 +160,14 @@ class FloorMemory:
         rows = rows[~walls.tentative[rows]]
         ids, lines = np.full(self._config.walls, -1), np.zeros((self._config.walls, 2))
         ids[: len(rows)], lines[: len(rows)] = walls.ids[rows], walls.belief.lines_world[rows]
-        return _Kept(pose_world, scan, ids, lines[:, 0], lines[:, 1] - normals(lines[:, 0]) @ pose_world[:2])
+        return _Kept(
+            pose_world,
+            scan,
+            ids,
+            lines[:, 0],
+            lines[:, 1] - normals(lines[:, 0]) @ pose_world[:2],
+            *np.zeros((2, 0, 2)),
+        )
 
     def _follow(self, walls: StochasticMap) -> None:
         """Draw the grid anew if the walls have carried a kept scan away from where it was drawn."""
@@ -108,7 +182,22 @@ class FloorMemory:
         self.free_space.clear()
         for key, view, pose, away in zip(list(self._kept), kept, poses, distances, strict=True):
             self.free_space.integrate(pose, view.scan)
-            self._kept[key] = self._beside(walls, away, pose, view.scan)
+            self.free_space.note_driven(to_world(view.way_robot, pose))
+            for place in to_world(view.touched_robot, pose):
+                self.free_space.note_touched(place)
+            moved = self._beside(walls, away, pose, view.scan)
+            self._kept[key] = replace(moved, way_robot=view.way_robot, touched_robot=view.touched_robot)
+
+
+def _between(
+    before_world: Float[np.ndarray, "2"] | None, now_world: Float[np.ndarray, "2"], most_m: float, every_m: float
+) -> Float[np.ndarray, "n 2"]:
+    """Return places on the straight way from one place to the next; the next alone where they lie too far apart."""
+    length_m = np.inf if before_world is None else float(np.hypot(*(now_world - before_world)))
+    if before_world is None or length_m > most_m:
+        return now_world[None].copy()
+    share = np.linspace(0.0, 1.0, int(np.ceil(length_m / every_m)) + 1)[:, None]
+    return before_world + share * (now_world - before_world)
 
 
 def _told(walls: StochasticMap, kept: list[_Kept]) -> _Told:

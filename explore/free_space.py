@@ -9,6 +9,8 @@ from scipy.ndimage import distance_transform_edt
 from slam.geometry.poses import to_world, wrap_positive
 from slam.robot import Scan
 
+_FARTHEST_M = 1e9
+"""Cells farther from the origin are not counted any more."""
 _Box = tuple[int, int, int, int]
 """First and end row, first and end column."""
 
@@ -24,8 +26,14 @@ class FreeSpaceConfig:
     """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
     body_m: float = 0.2
     """Floor this near to the robot is free: it stands there."""
+    cells_max: int = 100_000_000
+    """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
     clearance_limit_m: float = 1.0
     """Clearances are exact up to here; beyond, they are at least this."""
+
+
+class FloorTooLargeError(ValueError):
+    """The robot believes to be where no grid can hold it and the floor that it has seen."""
 
 
 class FreeSpace:
@@ -35,7 +43,8 @@ class FreeSpace:
         self.config = config
         self._evidence = np.zeros((0, 0), dtype=np.int8)
         self._clearance = np.zeros((0, 0), dtype=np.float32)
-        self._stood = np.zeros((0, 0), dtype=bool)
+        self._driven = np.zeros((0, 0), dtype=bool)
+        self._touched = np.zeros((0, 0), dtype=bool)
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: _Box | None = None
         self._too_tight = np.zeros((0, 2))
@@ -48,7 +57,7 @@ class FreeSpace:
     def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
         """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit.
 
-        Those in which it stood count among them wherever they lie: what let it in lets it out.
+        Those through which it drove count among them wherever they lie: what let it in lets it out.
         """
         r0, r1, _ = box[0].indices(self.shape[0])
         c0, c1, _ = box[1].indices(self.shape[1])
@@ -60,7 +69,29 @@ class FreeSpace:
             row, column = np.ogrid[rows, columns]
             near = np.hypot(row - r, column - c) * self.config.cell_m <= reach_m
             fits[rows.start - r0 : rows.stop - r0, columns.start - c0 : columns.stop - c0] &= ~near
-        return fits | self._stood[box]
+        return fits | self._driven[box]
+
+    def note_touched(self, place_world: Float[np.ndarray, "2"]) -> None:
+        """Remember that the body touched something at a place: an obstacle, whatever beams say of it."""
+        cell = self.cells(place_world[None])[0]
+        if self.inside(cell):
+            self._touched[tuple(cell)] = True
+            self._mark(cell[0], cell[0] + 1, cell[1], cell[1] + 1)
+
+    def note_driven(self, places_world: Float[np.ndarray, "n 2"]) -> None:
+        """Remember that the robot's centre was at some places of the grid: the body fits there."""
+        cells = self.cells(places_world)
+        self._driven[tuple(cells[self.inside(cells)].T)] = True
+
+    def forget_driven(self, place_world: Float[np.ndarray, "2"], reach_m: float) -> None:
+        """Forget that the body fitted within reach of a place."""
+        reach = int(np.ceil(reach_m / self.config.cell_m))
+        r, c = np.maximum(self.cells(place_world[None])[0] - reach, 0).tolist()
+        self._driven[r : r + 2 * reach + 1, c : c + 2 * reach + 1] = False
+
+    def driven(self, box: tuple[slice, slice]) -> Bool[np.ndarray, "h w"]:
+        """Return through which cells of a part of the grid the robot's centre went."""
+        return self._driven[box]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -108,7 +139,7 @@ class FreeSpace:
             limit = self.config.clearance_limit_m
             pad = int(np.ceil(limit / self.config.cell_m)) + 1
             inner, outer = (_grown(self._dirty, k * pad, self._evidence.shape) for k in (1, 2))
-            occupied = self._evidence[_slices(outer)] > 0
+            occupied = (self._evidence[_slices(outer)] > 0) | self._touched[_slices(outer)]
             distance = np.full(occupied.shape, limit, dtype=np.float32)
             if occupied.any():
                 distance = np.minimum(distance_transform_edt(~occupied, sampling=self.config.cell_m), limit)
@@ -117,14 +148,15 @@ class FreeSpace:
         return self._clearance
 
     def clear(self) -> None:
-        """Forget every scan, where the robot stood, and where the body did not fit."""
+        """Forget every scan, where the robot drove, what it touched, and where the body did not fit."""
         self._evidence[:] = 0
-        self._stood[:] = False
+        self._driven[:] = False
+        self._touched[:] = False
         self._too_tight = np.zeros((0, 2))
         self._mark(0, self.shape[0], 0, self.shape[1])
 
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
-        """Take in one scan at an estimated pose."""
+        """Take in one scan at an estimated pose; raises FloorTooLargeError for a pose too far from all others."""
         cell = self.config.cell_m
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
@@ -132,16 +164,15 @@ class FreeSpace:
         beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
         tips = self.cells(to_world(beams * reach[:, None], pose_world))
         here = self.cells(pose_world[None, :2])[0]
-        # With the cells beside it: steps of 0.15 m leave no gap between.
-        self._stood[here[0] - 1 : here[0] + 2, here[1] - 1 : here[1] + 2] = True
         box = self._box(here, tips, scan)
         window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
-        free = self._seen_free(pose_world, scan, reach, box)
-        free[tuple(hits.T)] = False
+        free, body = self._seen_free(pose_world, scan, reach, box)
+        free[tuple(hits.T)] = body[tuple(hits.T)] = False
         change = -free.astype(np.int8)
         change[tuple(hits.T)] = self.config.hit
         before = window > 0
         np.clip(window + change, -self.config.limit, self.config.limit, out=window)
+        window[body] = np.minimum(window[body], -1)
         changed = np.nonzero((window > 0) != before)
         if len(changed[0]):
             (r0, r1), (c0, c1) = ((int(axis.min()), int(axis.max()) + 1) for axis in changed)
@@ -159,8 +190,8 @@ class FreeSpace:
 
     def _seen_free(
         self, pose_world: Float[np.ndarray, "3"], scan: Scan, reach: Float[np.ndarray, " k"], box: _Box
-    ) -> Bool[np.ndarray, "h w"]:
-        """Cells of a part of the grid that lie before the nearer of the two beams beside them."""
+    ) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+        """Cells of a part of the grid before the nearer of the two beams beside them, and those within the body."""
         here = self.cells(pose_world[None, :2])
         offset, (r, c) = self.points(here)[0] - pose_world[:2], here[0].tolist()
         x = (np.arange(box[2] - c, box[3] - c) * self.config.cell_m + offset[0]).astype(np.float32)
@@ -175,7 +206,8 @@ class FreeSpace:
         between[: k - 1] = np.minimum(shown[:-1], shown[1:])
         if scan.is_full_turn:
             between[k - 1 :] = min(shown[-1], shown[0])
-        return (distance < between[beam]) | (distance < self.config.body_m)
+        body = distance < self.config.body_m
+        return (distance < between[beam]) | body, distance < self.config.body_m - 0.71 * self.config.cell_m
 
     @staticmethod
     def _reach(scan: Scan) -> Float[np.ndarray, " k"]:
@@ -189,6 +221,8 @@ class FreeSpace:
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""
         reach = int(np.ceil(reach_m / self.config.cell_m)) + 1
+        if not np.all(np.abs(centre_world) < _FARTHEST_M):
+            raise self._too_large(centre_world)
         at = np.floor(centre_world / self.config.cell_m).astype(np.int64)
         low, high = at - reach, at + reach + 1
         old_first, old_end = self._first, self._first + self._evidence.shape[::-1]
@@ -199,17 +233,29 @@ class FreeSpace:
         spare = reach
         first = np.where(low < old_first, low - spare, old_first)
         end = np.where(high > old_end, high + spare, old_end)
-        shape = tuple((end - first)[::-1])
-        evidence, stood = np.zeros(shape, dtype=np.int8), np.zeros(shape, dtype=bool)
+        shape = tuple((end - first)[::-1].tolist())
+        if shape[0] * shape[1] > self.config.cells_max:
+            raise self._too_large(centre_world)
+        evidence, driven, touched = (np.zeros(shape, dtype=kind) for kind in (np.int8, bool, bool))
         clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
         if self._evidence.size:
             c, r = (self._first - first).tolist()
             place = (slice(r, r + self._evidence.shape[0]), slice(c, c + self._evidence.shape[1]))
-            evidence[place], clearance[place], stood[place] = self._evidence, self._clearance, self._stood
+            evidence[place], clearance[place] = self._evidence, self._clearance
+            driven[place], touched[place] = self._driven, self._touched
             if self._dirty is not None:
                 r0, r1, c0, c1 = self._dirty
                 self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
-        self._evidence, self._clearance, self._stood, self._first = evidence, clearance, stood, first
+        self._evidence, self._clearance, self._first = evidence, clearance, first
+        self._driven, self._touched = driven, touched
+
+    def _too_large(self, centre_world: Float[np.ndarray, "2"]) -> FloorTooLargeError:
+        side_m = np.sqrt(self.config.cells_max) * self.config.cell_m
+        x, y = centre_world
+        return FloorTooLargeError(
+            f"expected all poses within {side_m:.0f} m by {side_m:.0f} m, found the robot believed at"
+            f" ({x:.4g}, {y:.4g}) m: its estimate is lost"
+        )
 
     def _mark(self, r0: int, r1: int, c0: int, c1: int) -> None:
         """Remember where occupied cells changed since the clearances were computed."""

@@ -97,5 +97,16 @@ class Homing:
         # The way home may have shown something new.
         return self.command(around, chains, graph)
 
+    def interrupt(self, around: Surroundings) -> None:
+        """Look for another way from here."""
+        if self._way is not None:
+            self._way.interrupt(around)
+        self._explorer.interrupt(around)
+
+    def start_over(self) -> None:
+        """Forget what was given up, the way home included."""
+        self._way, self._trouble = None, ""
+        self._explorer.start_over()
+
     def _is_home(self, around: Surroundings) -> bool:
         return float(np.hypot(*(around.pose_world[:2] - self._start))) <= HOME_M

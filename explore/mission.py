@@ -5,25 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
 
-import networkx as nx
 import numpy as np
 
 from slam.backend import Backend
-from slam.chains import Chain
 from slam.mapper import Mapper, MapperConfig
-from slam.robot import MotionCommand, Odometry, Robot
+from slam.robot import Odometry, Robot
 
+from .decider import Decider
 from .explorer import Explorer, ExplorerConfig
 from .floor_memory import FloorMemory, FloorMemoryConfig
 from .free_space import FreeSpace, FreeSpaceConfig
-from .goal import Goal, LeftPlace, SetAside
 from .homing import Homing
 from .limits import Limits, limited
 from .outcome import Outcome
 from .passenger import Passenger
 from .recent import RecentReturns
+from .retreat import Retreat
 from .step import Step
 from .strategies import Strategy
 from .visibility import VisibilityGraph, followed_wall
@@ -42,60 +40,6 @@ class MissionConfig:
     """A mission that takes longer ends as `stopped`."""
     return_to_start: bool = False
     """Once there is nothing left to explore, drive back to where the mission began."""
-
-
-@runtime_checkable
-class Decider(Protocol):
-    """Who chooses where to go: the explorer, or a passenger of a recorded robot."""
-
-    @property
-    def set_aside(self) -> dict[tuple[int, int], SetAside]:
-        """The ends that exploration gave up, by (wall id, side)."""
-        ...
-
-    @property
-    def goal(self) -> Goal | None:
-        """The open end or the place that the robot is about."""
-        ...
-
-    @property
-    def walls_to_follow(self) -> tuple[int, ...]:
-        """The walls along which the goal is approached."""
-        ...
-
-    @property
-    def needs_floor(self) -> bool:
-        """Whether it plans paths; nobody else reads the free space."""
-        ...
-
-    @property
-    def still_open(self) -> tuple[SetAside, ...]:
-        """The ends that were set aside and are open still."""
-        ...
-
-    @property
-    def left_places(self) -> tuple[LeftPlace, ...]:
-        """The borders of unseen floor that were to be visited, and what was in the way."""
-        ...
-
-    @property
-    def doing(self) -> str:
-        """What the robot is about, in words."""
-        ...
-
-    @property
-    def outcome(self) -> Outcome:
-        """Why there is nothing left to do."""
-        ...
-
-    @property
-    def closing_words(self) -> str:
-        """The same in words."""
-        ...
-
-    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
-        """Return the next step, or None at the end."""
-        ...
 
 
 def explore_mission(
@@ -127,9 +71,10 @@ def ride_mission(
     return limited(steps, Limits(config.max_steps))
 
 
-def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConfig) -> Iterator[Step]:
+def _mission(robot: Robot, mapper: Mapper, inner: Decider, config: MissionConfig) -> Iterator[Step]:
     free_space, graph, recent = FreeSpace(config.free_space), VisibilityGraph(), RecentReturns()
     floor = FloorMemory(free_space, config.floor_memory)
+    decider = Retreat(inner, floor, config.explorer.following)
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     path_length, index = 0.0, 0
     while True:
@@ -159,6 +104,8 @@ def _mission(robot: Robot, mapper: Mapper, decider: Decider, config: MissionConf
             return
         odometry = robot.drive(command)
         mapper.predict(odometry)
+        floor.move(odometry)
+        decider.moved(command, odometry)
         recent.see(scan)
         recent.move(odometry)
         path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))

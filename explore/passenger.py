@@ -31,3 +31,9 @@ class Passenger:
         """Return a command that nobody obeys, or None after the last scan."""
         self._left -= 1
         return MotionCommand(0.0, 0.0) if self._left > 0 else None
+
+    def interrupt(self, around: Surroundings) -> None:
+        """Nothing of it is its own."""
+
+    def start_over(self) -> None:
+        """Nothing was given up."""

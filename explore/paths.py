@@ -214,11 +214,14 @@ class Planner:
 def passable(
     free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig
 ) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Return in which cells of a part of the grid the body fits, and in which it has room enough."""
+    """Return in which cells of a part of the grid the body fits, and in which it has room enough.
+
+    It fits wherever it drove, whatever beams say that were drawn at other poses.
+    """
     is_free, clearance = free_space.is_free(box), free_space.clearance()[box]
     roomy_cells = roomy(is_free, clearance, config)
     fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
-    return fits | roomy_cells, roomy_cells
+    return fits | roomy_cells | free_space.driven(box), roomy_cells
 
 
 def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], coast_m: float) -> Bool[np.ndarray, "p q"]:

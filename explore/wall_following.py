@@ -48,6 +48,8 @@ class Surroundings:
     scan: Scan
     recent_robot: Float[np.ndarray, "r 2"] = field(default_factory=lambda: np.zeros((0, 2)))
     """What the scans before this one hit nearby, m, in the robot's frame of now."""
+    touched_robot: Float[np.ndarray, "t 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """What the body touched, likewise."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, "3"]:
@@ -81,11 +83,18 @@ class Errand(ABC):
                 return None
             assert self._pilot is not None
             if not self._pilot.is_obstructed(around.pose_world, around.scan):
-                command = self._pilot.command(around.pose_world, around.scan, around.free_space, around.recent_robot)
+                command = self._pilot.command(
+                    around.pose_world, around.scan, around.free_space, around.recent_robot, around.touched_robot
+                )
                 if command is not None and not self._is_stalled(self._pilot.remaining_m):
                     return command
             self._blocked(around)
         return None
+
+    def interrupt(self, around: Surroundings) -> None:
+        """Look for another way: something stands in this one."""
+        if self._pilot is not None:
+            self._blocked(around)
 
     @abstractmethod
     def _plan(self, around: Surroundings) -> bool:

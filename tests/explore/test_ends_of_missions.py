@@ -108,6 +108,7 @@ def test_a_robot_that_cannot_drive_again_where_it_has_been_is_told_so():
     # A wall all along y = 2 from wall to wall, as a map that has turned would draw it.
     cells = last.free_space.cells(np.stack([np.arange(0.0, 4.0, 0.02), np.full(200, 2.0)], axis=-1))
     last.free_space.evidence[tuple(cells.T)] = 6
+    last.free_space._driven[:] = False
     last.free_space._mark(*np.array([cells.min(axis=0), cells.max(axis=0) + 1]).T.ravel().tolist())
     here = way[:, 1] > 2.0 if last.pose_world[1] > 2.0 else way[:, 1] < 2.0
     share = certify(last, last.outcome, PathConfig(), True, way).reachable_way

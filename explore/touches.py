@@ -1,0 +1,51 @@
+"""What the body touched, kept in the robot's frame by what the wheels report: an obstacle whatever the scans show."""
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.geometry.poses import to_robot
+from slam.robot import MotionCommand, Odometry
+
+RADIUS_M = 0.2
+"""Of the body."""
+REACH_M = 0.04
+"""A return this near to the body, on the side to which it moved, may be what it met."""
+KEPT_M = 1.0
+"""What is farther off matters to no step from here."""
+
+
+class Touches:
+    """Places that the body met."""
+
+    def __init__(self) -> None:
+        self._points: Float[np.ndarray, "n 2"] = np.zeros((0, 2))
+        self._ahead = np.array([1.0, 0.0])
+        self.is_new = False
+        """Whether the last step touched something that was not located yet."""
+
+    @property
+    def points_robot(self) -> Float[np.ndarray, "n 2"]:
+        """All that is remembered, m, in the robot's frame of now."""
+        return self._points
+
+    def move(self, odometry: Odometry, command: MotionCommand) -> None:
+        """Take note of one step: where the robot went, and whether it touched something."""
+        points = to_robot(self._points, odometry.motion)
+        self._points = points[np.hypot(points[:, 0], points[:, 1]) < KEPT_M]
+        self.is_new = odometry.touched
+        self._ahead = np.array([-1.0 if command.forward_m < 0.0 else 1.0, 0.0])
+
+    def meet(self, near_robot: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "t 2"]:
+        """Return where the body may have met something, given what the last scans hit, m, robot frame; remember it.
+
+        That is its front, whatever the scans show, and the nearest return on that side.
+        """
+        gap = np.hypot(near_robot[:, 0], near_robot[:, 1])
+        met = [RADIUS_M * self._ahead]
+        on_side = (near_robot @ self._ahead > -0.25 * gap) & (gap < RADIUS_M + REACH_M)
+        if on_side.any():
+            nearest = near_robot[on_side][int(np.argmin(gap[on_side]))]
+            met.append(RADIUS_M * nearest / max(float(np.hypot(*nearest)), 1e-9))
+        self._points = np.vstack([self._points, *met])
+        self.is_new = False
+        return np.array(met)
