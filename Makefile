@@ -1,10 +1,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
+PLANS ?= ../shared/data/plans
 
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts strategies bias heading
+.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts strategies bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -50,6 +51,17 @@ courts: setup
 
 strategies: setup
 	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv
+
+rules: setup
+	$(BIN)/python -m studies.rules.study --plans $(PLANS) --out studies/rules/rows.jsonl
+	$(BIN)/python -m studies.rules.report
+
+rules-held: setup
+	$(BIN)/python -m studies.rules.held --out studies/rules/held.jsonl
+	$(BIN)/python -m studies.rules.report
+
+rules-table: setup
+	$(BIN)/python -m studies.rules.report
 
 docs: setup
 	docs/make-pictures

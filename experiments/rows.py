@@ -92,11 +92,11 @@ def _world(name: str) -> World:
 
 
 def _settings(trial: TrialConfig) -> Row:
-    return {"code": _code(), "file": Path(trial.world).name} | {name: getattr(trial, name) for name in SETTINGS}
+    return {"code": fingerprint(), "file": Path(trial.world).name} | {name: getattr(trial, name) for name in SETTINGS}
 
 
 @lru_cache
-def _code() -> str:
+def fingerprint() -> str:
     """Return a fingerprint of the code that decides a trial."""
     digest = hashlib.sha256()
     for package in (slam, explore, sim):

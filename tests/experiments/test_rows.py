@@ -40,7 +40,7 @@ def test_other_settings_and_other_code_are_other_trials(instant, tmp_path, monke
     for settings in ({}, {"errorless": True}, {"backend": "graph"}, {"p0": "zero"}, {"max_steps": 9}, {"seed": 2}):
         assert len(list(rows_of(trials(1, **settings), out, 1))) == 1
     assert len(instant) == 6
-    monkeypatch.setattr(rows, "_code", lambda: "another")
+    monkeypatch.setattr(rows, "fingerprint", lambda: "another")
     assert [row["code"] for row in rows_of(trials(1), out, 1)] == ["another"]
     assert len(instant) == 7
 

@@ -1,0 +1,1 @@
+"""Studies of the product by its own parts; the product never imports them."""
