@@ -28,6 +28,12 @@ test-long: setup
 mutants: setup
 	$(BIN)/python tests/mutants.py $(MODULE)
 
+.PHONY: plans
+
+# Do all the plans and pictures of a folder load? PLANS=...
+plans: setup
+	$(BIN)/python -m studies.plans $(dir $(PLANS))
+
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	$(BIN)/mypy
