@@ -27,7 +27,7 @@ def test_each_arm_uses_the_matches_that_its_name_tells(monkeypatch):
         trial = Trial("paper-fig4", "nearest-robot", "block-ekf", arm, 2)
         config = config_of(CAMPAIGN, DRIVE if trial.association else trial)
         calls.clear()
-        record = unpack(perform(Job(trial, config, log)).record)
+        record = unpack(perform(Job(trial, config, log)).record, trial)
         found[arm] = (record.summary["mode"], record.summary["association"], bool(calls))
         assert (record.summary["backend"], record.summary["steps"]) == ("block-ekf", 12)
         # Innovations are taken where the truth tells the pairs: a gate of its own would cut off their tail.
