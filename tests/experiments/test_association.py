@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.association import OVERLAP_M, UNLABELLED, Votes, duplicate_lines, duplicate_pairs
-from experiments.truth import Truth
+from experiments.truth import truth_of
+from sim.robot import RobotConfig
 from slam.segments import Segments
 
 WALLS = np.array([0, 0, 1, 2, 2, 3])
@@ -16,8 +17,9 @@ BEAMS = 40
 
 @pytest.fixture
 def truth(world):
-    faces = np.zeros((len(WALLS), 2, 2))
-    return Truth(world, faces, np.zeros((len(WALLS), 2)), WALLS, np.zeros(len(WALLS), int), None)
+    n = len(WALLS)
+    made = truth_of(world, RobotConfig())
+    return replace(made, faces=np.zeros((n, 2, 2)), lines=np.zeros((n, 2)), walls=WALLS, rings=np.zeros(n, int))
 
 
 def segments_of(spans):
