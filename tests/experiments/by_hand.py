@@ -51,6 +51,7 @@ def log_of(estimated=None, **changes):
         "time_s": np.arange(3.0), "bearings_rad": np.linspace(-np.pi, np.pi, BEAMS, endpoint=False),
         "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": 0.01, "range_max_m": 4.0,
         "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
+        "touched": np.zeros(3, bool),
         "estimated_world": estimated, "estimated_cov": COVS, "true_world": TRUE,
         "face_of_beam": np.full((3, BEAMS), -1), "path_length_m": np.array([0.0, 0.1, 0.25]),
         "open_ends": np.array([1, 2, 4]), "lines": np.array([3, 3, 3]), "tentative": np.array([0, 0, 1]),
