@@ -241,6 +241,7 @@ def test_at_a_mark_runs_that_failed_before_are_counted_and_in_no_mean():
     assert told[0] == {
         "world": "a", "strategy": "nearest-robot", "backend": "full-ekf", "arm": "closed", "metres": "10",
         "driving": 2, "finished": 1, "failed": 1,
+        "without": dict.fromkeys(("pose_anees_so_far", "map_anees", "wall_rmse_m", "wall_shape_m"), 1),
     } | {name: pytest.approx(2.0 * x) for name, x in scores.items()}  # fmt: skip
 
 

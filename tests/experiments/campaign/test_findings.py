@@ -21,7 +21,8 @@ def row(backend, arm="closed", **scores):
         "trials": 20, "complete": 20, "sound": 20, "steps_outside_band": 0.0, "matches_false": 0, "double_entries": 1,
         "sightings": 1000, "distances": 500, "trace_least": 1.0, "trace_below": told(0.0), "bound_margin": 0.0,
         "bound_runs_below": 0, "bound_margin_median": None, "bound_first_m_median": None, "bound_worst_m_median": None,
-        "pose_anees": told(1.0, 0.95, 1.05), "distances_in_95": told(0.95), "doubles_beyond_gate": told(-9.0),
+        "pose_anees": told(1.0, 0.95, 1.05), "without": {"pose_anees": 0},
+        "distances_in_95": told(0.95), "doubles_beyond_gate": told(-9.0),
     }  # fmt: skip
     return {"backend": backend, "arm": arm} | good | scores
 
@@ -77,6 +78,11 @@ def test_an_interval_partly_within_the_aim_leaves_the_claim_undecided(ends):
     table = finding_table(Campaign(("w",), ("graph",), ("s",), 20, arms=ARMS), {"findings": findings(pooled, 0.99)})
     (cell,) = [cells[2] for cells in table.rows if "pose ANEES" in cells[0]]
     assert cell.startswith("too few runs to say: 1 (")
+    assert "complete runs have none" not in cell
+    pooled = [row("graph", pose_anees=told(1.0, *ends), without={"pose_anees": 3})]
+    table = finding_table(Campaign(("w",), ("graph",), ("s",), 20, arms=ARMS), {"findings": findings(pooled, 0.99)})
+    (cell,) = [cells[2] for cells in table.rows if "pose ANEES" in cells[0]]
+    assert cell.endswith("; 3 complete runs have none")
 
 
 def test_a_back_end_without_a_complete_run_is_judged_by_nothing():
