@@ -16,10 +16,11 @@ from .campaign.runner import on_cores, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
 from .campaign.words import left_out
+from .interrupts import INTERRUPTED
 from .replay import Association
 from .scenario import P0, UsageError, load_world
 
-FAILED, INTERRUPTED = 1, 130
+FAILED = 1
 JOBS_A_CORE = 8
 """Processes beyond this for each core only take memory from one another."""
 
