@@ -87,16 +87,20 @@ def strike(process: subprocess.Popen[bytes], folder: Path, delay_s: float, early
     return True
 
 
-def state(folder: Path) -> str:
-    """Return how far a killed command was, in a word."""
+def state(folder: Path, status: int) -> str:
+    """Return how far a killed command was, in words."""
     if not (folder / "config.json").exists():
         return "before its first file"
-    if (folder / "recordings").exists():
-        return "between trials" if not (folder / "trials.csv").exists() else "while the tables were written"
+    if status == STOPPED:
+        return "stopped it"
+    if not any(folder.glob("log*")) and not (folder / "summary.json").exists():
+        if (folder / "trials.csv").exists():
+            return "while the tables were written"
+        return "between trials" if (folder / "recordings").exists() else "before its first trial or step"
     if (folder / "summary.json").exists():
         return "while the results were written" if (folder / RUNNING).exists() else "after the last file"
     steps = (folder / RUNNING).stat().st_size if (folder / RUNNING).exists() else 0
-    return "under way" if steps > 4096 else "before its first step"
+    return "under way" if steps > 4096 else "before its first trial or step"
 
 
 def timeless(folder: Path) -> dict[str, Any]:
@@ -137,7 +141,7 @@ def one(subject: Subject, folder: Path, lasts_s: float, draws: np.random.Generat
         in_time = strike(process, folder, delay_s, early and not struck, chosen)
         said.append(complaints(process))
         if in_time:
-            struck.append(f"{SIGNALS[chosen % len(SIGNALS)].name} {state(folder)}")
+            struck.append(f"{SIGNALS[chosen % len(SIGNALS)].name} {state(folder, process.returncode)}")
         elif not struck:
             # It was over before: another moment, from the start.
             shutil.rmtree(folder)
