@@ -159,6 +159,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
     walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
     size = 3 + 2 * len(walls)
     return {
+        "format": FORMAT,
         "pose": walls.belief.pose_world,
         "ids": walls.ids,
         "lines": walls.belief.means,
