@@ -88,7 +88,9 @@ def test_killed_and_resumed_it_leaves_the_same_table_and_redoes_only_what_is_mis
     assert not list(folder.rglob(".*.part"))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, *(pytest.param(n, marks=pytest.mark.long) for n in (signal.SIGTERM, signal.SIGHUP))]
+)
 def test_interrupted_it_says_so_and_keeps_what_is_done(number, undisturbed, tmp_path):
     folder = tmp_path / "campaign"
     assert start(folder, "--jobs", "2", struck=(number, 1)).wait() == 130
