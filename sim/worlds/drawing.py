@@ -7,6 +7,8 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
+from .text import printable
+
 SMALLEST_M, LARGEST_M = 1.0, 1000.0
 """A drawing outside these extents has the wrong scale."""
 
@@ -15,7 +17,7 @@ class WorldError(ValueError):
     """A map that cannot be used, told in one line: what was expected, what was found, what to do."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        super().__init__(printable(message))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,10 @@ class Drawing:
     """The border of a picture: nothing is known beyond it, so it bounds the free space."""
     simplify_m: float = 0.012
     """Deviations from straight below this are not drawn on purpose."""
+    understood: str = ""
+    """What was taken for what, in words."""
+    scale: str = ""
+    """What a unit is, and who said so, in words."""
 
 
 def numbers(value: Any, counts: tuple[int, ...], what: str, example: str) -> Float[np.ndarray, " k"]:
@@ -54,6 +60,11 @@ def numbers(value: Any, counts: tuple[int, ...], what: str, example: str) -> Flo
 def as_pose(value: Float[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
     """Return (x, y) or (x, y, heading) as a pose, heading 0 where none is given."""
     return np.array([value[0], value[1], value[2] if len(value) > 2 else 0.0])
+
+
+def counted(count: int, one: str, many: str) -> str:
+    """Return a number of things in words, nothing for none of them."""
+    return "" if not count else f"{count} {one if count == 1 else many}"
 
 
 def shorten(value: Any) -> str:

@@ -36,7 +36,12 @@ def random_building(seed: int) -> Drawing:
     floor = shapely.transform(floor, lambda at: (at - start) @ rotation)
     solid = floor.exterior.convex_hull.buffer(OUTER_M, join_style="mitre").difference(floor)
     heading = chance.uniform(-np.pi, np.pi)
-    return Drawing(solids=tuple(shapely.get_parts(solid)), start=np.array([0.0, 0.0, heading]))
+    return Drawing(
+        solids=tuple(shapely.get_parts(solid)),
+        start=np.array([0.0, 0.0, heading]),
+        understood="drawn by chance",
+        scale="in metres",
+    )
 
 
 def _floor(chance: np.random.Generator) -> shapely.Polygon:

@@ -1,4 +1,4 @@
-"""Maps as pictures: drawn in a paint program, or made by a robot (ROS map_server: an image and its YAML).
+"""Maps as pictures: drawn in a paint program, or made by a robot.
 
 In a bare picture dark is wall and light is free, transparency lies on white, and a pixel is 0.05 m unless the caller
 says otherwise. A picture with much of grey 205 and of 254 is a robot's map without its YAML: 205 is unknown. Unknown is
@@ -8,92 +8,48 @@ solid, for nobody can vouch for it. Beyond the border of the picture all is soli
 import io
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
-import yaml
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int, UInt8
 from PIL import Image, UnidentifiedImageError
 from skimage.measure import find_contours, label
 
-from .drawing import Drawing, WorldError, numbers, shorten
+from .drawing import Drawing, WorldError, shorten
 from .files import read_bytes
 from .solid import drop_collinear
 
 PIXEL_M = 0.05
 PIXELS_MAX = 40_000_000
 SIDE_MAX = 20_000
+EDGES_MAX = 1_000_000
+"""Sides of pixels between wall and free floor: 50 km of them at 0.05 m; noise and patterns have more."""
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF", "WEBP")
-WALL_GREY = 160.0
+WALL_GREY = 160
 """Above the middle, so that a one-pixel line whose antialiasing spreads it over two rows stays a wall."""
 UNKNOWN_GREY, FREE_GREY = 205, 254
 UNKNOWN_SHARE = 0.05
 SPECK_PIXELS = 6
 STRAIGHT_PIXELS = 1.0
 """Slanted walls are stairs of pixels: what deviates less than this from straight is straight."""
+STRIP_PIXELS = 4_000_000
+"""Pictures are converted in strips of rows of about this size, to hold one copy of a large one and not four."""
 
 
 def read_image(path: Path, scale: float | None = None) -> Drawing:
     """Return the drawing in a bare picture, `scale` metres per pixel (0.05 where None), origin at its lower left."""
-    grey = _grey(path)
+    grey = read_grey(path)
     mapped = np.mean(grey == UNKNOWN_GREY) > UNKNOWN_SHARE and np.mean(grey >= FREE_GREY) > UNKNOWN_SHARE
-    return _trace(grey <= UNKNOWN_GREY if mapped else grey < WALL_GREY, scale or PIXEL_M, np.zeros(3))
+    said = "given" if scale else "assumed (--scale METRES says another)"
+    words = "dark pixels and unknown ones as walls" if mapped else "dark pixels as walls"
+    drawing = outlines(grey <= UNKNOWN_GREY if mapped else grey < WALL_GREY, scale or PIXEL_M, np.zeros(3))
+    return replace(drawing, understood=words, scale=f"{scale or PIXEL_M:g} m a pixel, {said}")
 
 
-def read_ros_map(path: Path, scale: float | None = None) -> Drawing:
-    """Return the drawing of a ROS map: a YAML file that names an image next to it, in the map's frame."""
-    if scale is not None:
-        raise WorldError("expected no scale for a ROS map, whose resolution says it, found one: leave it out")
-    document = _yaml(read_bytes(path))
-    name = document.get("image")
-    if not isinstance(name, str) or not name or "\0" in name:
-        raise WorldError(f"expected image: to name a picture, found {shorten(name)}: correct the YAML file")
-    image = path.parent / name
-    if not image.resolve().is_relative_to(path.parent.resolve()):
-        raise WorldError(
-            f"expected image: in the folder of the YAML file, found {shorten(name)}: move the picture there"
-        )
-    resolution = numbers([document.get("resolution")], (1,), "resolution", "0.05")[0]
-    if not 0 < resolution <= 10:
-        raise WorldError(f"expected a resolution of 0 to 10 m per pixel, found {resolution:g}: correct the YAML file")
-    origin = numbers(document.get("origin", [0, 0, 0]), (2, 3), "origin", "[x, y, yaw]")
-    occupied, free = (
-        numbers([document.get(key, default)], (1,), key, str(default))[0]
-        for key, default in (("occupied_thresh", 0.65), ("free_thresh", 0.196))
-    )
-    if not 0 <= free <= occupied <= 1:
-        raise WorldError(
-            f"expected 0 <= free_thresh <= occupied_thresh <= 1, found {free:g}, {occupied:g}: correct them"
-        )
-    mode = document.get("mode", "trinary")
-    if mode not in ("trinary", "scale", "raw"):
-        raise WorldError(f"expected mode trinary, scale or raw, found {shorten(mode)}: correct the YAML file")
-    if document.get("negate", 0) not in (0, 1):
-        raise WorldError(f"expected negate 0 or 1, found {shorten(document['negate'])}: correct the YAML file")
-    grey = _grey(image)
-    chance = grey / 255 if document.get("negate", 0) else 1 - grey / 255
-    # The second test keeps grey 205 unknown also under a rounded threshold of 0.25, as map_saver means it.
-    solid = chance >= free if mode != "raw" else grey >= 100 * free
-    if mode == "trinary":
-        solid |= grey == UNKNOWN_GREY
-    pose = np.array([origin[0], origin[1], origin[2] if len(origin) > 2 else 0.0])
-    return _trace(solid, float(resolution), pose)
-
-
-def _yaml(data: bytes) -> dict[str, Any]:
-    try:
-        document = yaml.safe_load(data)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise WorldError(f"expected a ROS map YAML, found {shorten(str(error))}: correct the file") from None
-    if not isinstance(document, dict):
-        raise WorldError(f"expected a ROS map YAML with image: and resolution:, found {shorten(document)}: correct it")
-    return document
-
-
-def _grey(path: Path) -> Float[np.ndarray, "h w"]:
-    """Return a picture's lightness, 0 to 255, transparency on white; raise WorldError where it cannot be read."""
+def read_grey(path: Path) -> UInt8[np.ndarray, "h w"]:
+    """Return a picture's lightness, transparency on white; raise WorldError where it cannot be read."""
     data = read_bytes(path)
     try:
         with warnings.catch_warnings():
@@ -119,36 +75,76 @@ def _grey(path: Path) -> Float[np.ndarray, "h w"]:
         raise WorldError(f"expected a PNG or PGM image, found {shorten(str(error))}: save {path.name} again") from None
 
 
-def _lightness(image: Image.Image) -> Float[np.ndarray, "h w"]:
-    if image.mode.startswith("I"):
-        values = np.asarray(image).astype(float)
-        return np.clip(values / 65535 * 255, 0, 255)
+def _lightness(image: Image.Image) -> UInt8[np.ndarray, "h w"]:
     if image.mode == "F":
         raise WorldError("expected grey or colour pixels, found floating point: save the image as PNG")
-    rgba = image.convert("RGBA")
-    flat = Image.alpha_composite(Image.new("RGBA", rgba.size, "white"), rgba)
-    return np.asarray(flat.convert("L")).astype(float)
+    if image.mode.startswith("I"):
+        return (np.clip(np.asarray(image), 0, 65535) >> 8).astype(np.uint8)
+    width, height = image.size
+    rows = max(STRIP_PIXELS // width, 1)
+    strips = [image.crop((0, top, width, min(top + rows, height))) for top in range(0, height, rows)]
+    return np.concatenate([_strip_lightness(strip) for strip in strips])
 
 
-def _trace(solid: Bool[np.ndarray, "h w"], metres: float, origin: Float[np.ndarray, "3"]) -> Drawing:
-    """Return the outlines of solid pixels as polygons in the frame of the map's origin (x, y, yaw)."""
-    height, width = solid.shape
-    clusters = label(solid, connectivity=2)  # type: ignore[no-untyped-call]
-    keep = np.bincount(clusters.ravel()) >= SPECK_PIXELS
-    keep[0] = False
-    mask = np.pad(keep[clusters], 1)
-    if not mask.any():
+def _strip_lightness(strip: Image.Image) -> UInt8[np.ndarray, "h w"]:
+    if strip.mode not in ("1", "L") or "transparency" in strip.info:
+        rgba = strip.convert("RGBA")
+        strip = Image.alpha_composite(Image.new("RGBA", rgba.size, "white"), rgba)
+    return np.asarray(strip.convert("L"))
+
+
+def outlines(solid: Bool[np.ndarray, "h w"], metres: float, origin: Float[np.ndarray, "3"]) -> Drawing:
+    """Return the outlines of solid pixels as polygons in the frame of the map's origin (x, y, yaw).
+
+    Raises WorldError where there is no wall, no free floor, or so much outline that this is no plan of a building.
+    """
+    height = len(solid)
+    solid, corner = _about_the_free(solid)
+    kept = _without_specks(solid)
+    if not kept.any():
         raise WorldError("expected dark walls on a light ground, found no dark line in the image: draw the walls")
-    if keep[clusters].all():
-        raise WorldError("expected light free space, found only dark or unknown pixels: check the image's greys")
-    found = find_contours(mask.astype(float), 0.5, fully_connected="high")  # type: ignore[no-untyped-call]
+    edges = sum(int(np.count_nonzero(np.diff(kept, axis=axis))) for axis in (0, 1))
+    if edges > EDGES_MAX:
+        raise WorldError(
+            f"expected at most {EDGES_MAX} sides of pixels between wall and free floor, found {edges}: this is noise"
+            " or a pattern; smooth the picture, or shrink it"
+        )
+    found = find_contours(np.pad(kept, 1), 0.5, fully_connected="high")  # type: ignore[no-untyped-call]
     rings = [_square(ring[:-1]) for ring in found if len(ring) > 4]
-    outlines = [shapely.LinearRing(_to_world(ring, height, metres, origin)) for ring in rings]
-    area = shapely.build_area(shapely.geometrycollections(outlines))
-    corners = np.array([[-0.5, -0.5], [-0.5, width - 0.5], [height - 0.5, width - 0.5], [height - 0.5, -0.5]]) + 1
+    moved = [_to_world(ring + corner, height, metres, origin) for ring in rings]
+    area = shapely.build_area(shapely.geometrycollections([shapely.LinearRing(ring) for ring in moved]))
+    corners = 0.5 + np.array([(0, 0), (0, kept.shape[1]), kept.shape, (kept.shape[0], 0)])
     parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
-    sheet = shapely.Polygon(_to_world(corners, height, metres, origin))
+    sheet = shapely.Polygon(_to_world(corners + corner, height, metres, origin))
     return Drawing(solids=tuple(parts), sheet=sheet, simplify_m=STRAIGHT_PIXELS * metres)
+
+
+def _about_the_free(solid: Bool[np.ndarray, "h w"]) -> tuple[Bool[np.ndarray, "i j"], Int[np.ndarray, "2"]]:
+    """Return the part of a picture around its free pixels, a solid pixel about it, and where it begins.
+
+    A robot's map is mostly unknown: what lies about the floor is solid, however much of it there is.
+    """
+    spans = []
+    for axis in (1, 0):
+        free = np.flatnonzero(~solid.all(axis=axis))
+        if not len(free):
+            raise WorldError("expected light free space, found only dark or unknown pixels: check the image's greys")
+        spans.append((max(int(free[0]) - 1, 0), int(free[-1]) + 2))
+    (top, bottom), (left, right) = spans
+    return solid[top:bottom, left:right], np.array([top, left])
+
+
+def _without_specks(solid: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    """Return the solid pixels without clusters too small to be a thing that stands there."""
+    clusters = label(solid, connectivity=2)  # type: ignore[no-untyped-call]
+    count = int(clusters.max()) + 1
+    sizes = np.zeros(count, dtype=np.int64)
+    for strip in np.array_split(clusters, clusters.size // STRIP_PIXELS + 1):
+        sizes += np.bincount(strip.ravel(), minlength=count)
+    keep = sizes >= SPECK_PIXELS
+    keep[0] = False
+    kept: Bool[np.ndarray, "h w"] = keep[clusters]
+    return kept
 
 
 def _square(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:

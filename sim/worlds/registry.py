@@ -11,7 +11,8 @@ from jaxtyping import Float
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
 from .files import read_bytes, read_json_map
 from .random_building import read_seed
-from .raster import read_image, read_ros_map
+from .raster import read_image
+from .ros_map import read_ros_map
 from .solid import build
 from .svg import read_svg
 from .world import World
@@ -99,6 +100,9 @@ def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
     family, colon, which = text.partition(":")
     if colon and family in FAMILIES:
         return text, FAMILIES[family].read(which)
+    if not text.isprintable():
+        # Results name their world in many files, which are to be read again.
+        raise WorldError(f"expected a file name of letters that can be shown, found {shorten(text)}: rename the file")
     path = Path(text)
     reader = READERS.get(path.suffix.lower())
     if reader is None:

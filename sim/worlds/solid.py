@@ -8,9 +8,10 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError
-from .world import ROBOT_RADIUS_M, World
+from .rooms import WALL_M, areas
+from .text import name_of
+from .world import ROBOT_RADIUS_M, Reading, World
 
-WALL_M = 0.1
 SLIT_M = 0.06
 """Free gaps narrower than this are artefacts of drawing: no beam should pass."""
 MITRE = 10.0
@@ -26,11 +27,14 @@ def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = No
     wanted = start if start is not None else drawing.start
     if wanted is None:
         part, pose = _choose(enclosed, open_parts)
+        said = "assumed, where a robot has most room (--start X Y says another)"
     else:
         part, pose = _part_with(wanted, solid, enclosed + open_parts), wanted
+        said = "given" if start is not None else "as the file says"
     free = orient(_straighten(part, drawing.simplify_m), 1.0)
     _check_clearance(free, pose)
-    return World(name, free, pose, dict(drawing.labels))
+    reading = Reading(drawing.understood, drawing.scale, said)
+    return World(name_of(name), free, pose, dict(drawing.labels), reading)
 
 
 def solid_of(drawing: Drawing) -> BaseGeometry:
@@ -41,20 +45,13 @@ def solid_of(drawing: Drawing) -> BaseGeometry:
     merged = shapely.line_merge(shapely.union_all(lines)) if len(lines) else shapely.LineString()
     thick = merged.buffer(0.5 * WALL_M, cap_style="square", join_style="mitre", mitre_limit=MITRE)
     mended = [shapely.make_valid(polygon) for polygon in solids]
-    return shapely.union_all([thick, *(part for shape in mended for part in _areas(shape))])
+    return shapely.union_all([thick, *(part for shape in mended for part in areas(shape))])
 
 
 def _on_grid(shapes: tuple[shapely.LineString, ...] | tuple[shapely.Polygon, ...]) -> NDArray[np.object_]:
     """Return shapes on a grid of 1 micrometre, without those that vanish: finer steps upset the algebra of polygons."""
     rounded: NDArray[np.object_] = shapely.transform(np.array(shapes, dtype=object), lambda at: np.round(at, 6))
     return rounded[shapely.length(rounded) > 0]
-
-
-def _areas(shape: BaseGeometry) -> list[shapely.Polygon]:
-    """Return the polygons of a geometry, dropping points and lines."""
-    return [
-        part for part in shapely.get_parts(shapely.get_parts(shape)) if part.geom_type == "Polygon" and part.area > 0
-    ]
 
 
 def _check_extent(solid: BaseGeometry) -> None:
@@ -72,7 +69,7 @@ def _free_parts(
     """Return the free parts that walls enclose, and those that end at the border of a picture."""
     page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
     # Slits are sealed first: two walls that all but touch keep the outside out.
-    parts = [piece for part in _areas(page.difference(solid)) for piece in _opened(part, SLIT_M)]
+    parts = [piece for part in areas(page.difference(solid)) for piece in _opened(part, SLIT_M)]
     touching = shapely.distance(np.array(parts, dtype=object), page.exterior) < 1e-6
     enclosed = [part for part, out in zip(parts, touching, strict=True) if not out]
     outer = [part for part, out in zip(parts, touching, strict=True) if out]
@@ -88,25 +85,27 @@ def _behind_leaks(part: shapely.Polygon, page: shapely.Polygon) -> list[shapely.
     if len(outside) == len(roomy):
         return []
     rest = part.difference(shapely.union_all(outside))
-    return [piece for inner in _areas(rest) for piece in _opened(inner, SLIT_M)]
+    return [piece for inner in areas(rest) for piece in _opened(inner, SLIT_M)]
 
 
 def _opened(part: shapely.Polygon, width_m: float) -> list[shapely.Polygon]:
     """Return the pieces of a free part without what is narrower, all other corners where they were drawn."""
-    pieces = _areas(part.buffer(-0.5 * width_m, quad_segs=8))
+    pieces = areas(part.buffer(-0.5 * width_m, quad_segs=8))
     # Grown with mitres, a little more than what arcs of 8 chords lost, and clipped: corners come back exactly. One by
     # one, lest the mitres of two pieces meet again in the slit between them.
     grown = [piece.buffer(0.505 * width_m, join_style="mitre", mitre_limit=MITRE) for piece in pieces]
-    return [area for piece in grown for area in _areas(piece.intersection(part))]
+    # Among many acute corners the mitres of one piece cross each other at times.
+    whole = [piece if piece.is_valid else shapely.make_valid(piece) for piece in grown]
+    return [area for piece in whole for area in areas(piece.intersection(part))]
 
 
 def _choose(
     enclosed: list[shapely.Polygon], open_parts: list[shapely.Polygon]
 ) -> tuple[shapely.Polygon, Float[np.ndarray, "3"]]:
     """Return the part where a robot has most room to drive, and its place farthest from all walls."""
-    roomy = [max((p for p in parts), key=_drivable, default=shapely.Polygon()) for parts in (enclosed, open_parts)]
-    part = roomy[0] if OUTSIDE_RATIO * _drivable(roomy[0]) >= _drivable(roomy[1]) else roomy[1]
-    if _drivable(part) == 0:
+    (inside_m2, inside), (outside_m2, outside) = (_roomiest(parts) for parts in (enclosed, open_parts))
+    drivable_m2, part = (inside_m2, inside) if OUTSIDE_RATIO * inside_m2 >= outside_m2 else (outside_m2, outside)
+    if drivable_m2 == 0:
         raise WorldError(
             "expected a free space that walls enclose and that a robot of 0.2 m radius fits into, found none:"
             " draw a closed wall around the building"
@@ -115,9 +114,19 @@ def _choose(
     return part, np.array([round(middle[0], 3), round(middle[1], 3), 0.0])
 
 
+def _roomiest(parts: list[shapely.Polygon]) -> tuple[float, shapely.Polygon]:
+    """Return the part with most room to drive in, and how much that is, m2."""
+    # What is smaller than the most room found so far need not be measured: there may be thousands of chambers.
+    best, room_m2 = shapely.Polygon(), 0.0
+    for part in parts:
+        if part.area > room_m2 and (drivable_m2 := _drivable(part)) > room_m2:
+            best, room_m2 = part, drivable_m2
+    return room_m2, best
+
+
 def _drivable(part: shapely.Polygon) -> float:
     """Return the area m2 of the largest piece that the robot's centre can roam."""
-    return max((piece.area for piece in _areas(part.buffer(-ROBOT_RADIUS_M))), default=0.0)
+    return max((piece.area for piece in areas(part.buffer(-ROBOT_RADIUS_M))), default=0.0)
 
 
 def _part_with(start: Float[np.ndarray, "3"], solid: BaseGeometry, parts: list[shapely.Polygon]) -> shapely.Polygon:

@@ -23,12 +23,16 @@ import shapely
 import svgelements
 from defusedxml.common import DefusedXmlException
 
-from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError, shorten
+from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError, counted, shorten
+from .limits import check_count, check_labels, check_size
+from .text import name_of
 from .winding import filled
 
 DARK = 0.7
 CURVE_STEPS = 24
 SHAPES = 200_000
+WORDS_MAX = 10_000
+"""Characters of an attribute (not of a path) or a <style>."""
 UNITLESS_MAX = 200.0
 PHYSICAL = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "Q": 0.00025}
 PIXEL_M = 0.0254 / 96
@@ -40,7 +44,7 @@ def read_svg(data: bytes, scale: float | None = None) -> Drawing:
     """Return the drawing in an SVG file's bytes; `scale` in metres per user unit overrides the file's own."""
     root = _parse(data)
     box = _view_box(root)
-    stated = _stated_scale(root, box) if scale is None else scale
+    stated, said = _stated_scale(root, box) if scale is None else (scale, "given")
     shapes, marks = _shapes(root, box)
     if not shapes:
         raise WorldError("expected dark lines or dark filled shapes in the SVG file, found none: draw the walls")
@@ -48,16 +52,27 @@ def read_svg(data: bytes, scale: float | None = None) -> Drawing:
     height = box[3] if box else 0.0
     lines: list[shapely.LineString] = []
     solids: list[shapely.Polygon] = []
-    for rings, rule in shapes:
-        world = [np.round((ring * [1, -1] + [0, height]) * metres, 6) for ring in rings]
+    drawn = [([np.round((ring * [1, -1] + [0, height]) * metres, 6) for ring in rings], rule) for rings, rule in shapes]
+    check_size([shapely.LineString(ring) for rings, _ in drawn for ring in rings], ())
+    for rings, rule in drawn:
         if rule is None:
-            lines += [shapely.LineString(ring) for ring in world]
+            lines += [shapely.LineString(ring) for ring in rings]
         else:
-            solids += filled(world, even_odd=rule == "evenodd")
+            solids += filled(rings, even_odd=rule == "evenodd")
     points = {name: (x * metres, (height - y) * metres, heading) for name, (x, y, heading) in marks.items()}
     start = points.pop("start", None)
-    labels = {name.removeprefix("label-"): (x, y) for name, (x, y, _) in points.items()}
-    return Drawing(tuple(lines), tuple(solids), None if start is None else np.array(start), labels)
+    check_labels(points)
+    labels = {name_of(name.removeprefix("label-")): (x, y) for name, (x, y, _) in points.items()}
+    fills = sum(rule is not None for _, rule in drawn)
+    words = counted(len(lines), "line as a wall", "lines as walls"), counted(fills, "shape as solid", "shapes as solid")
+    return Drawing(
+        tuple(lines),
+        tuple(solids),
+        None if start is None else np.array(start),
+        labels,
+        understood=", ".join(word for word in words if word),
+        scale=f"{metres:.4g} m a unit, {said}",
+    )
 
 
 def _parse(data: bytes) -> Element:
@@ -70,9 +85,23 @@ def _parse(data: bytes) -> Element:
         raise WorldError(f"expected an SVG file, found broken XML ({shorten(str(error))}): save it again") from None
     if not isinstance(root.tag, str) or root.tag.rpartition("}")[2] != "svg":
         raise WorldError(f"expected an <svg> element, found <{shorten(root.tag)}>: choose an SVG file")
+    _check_words(root)
     if _copies(root) > SHAPES:
         raise WorldError(f"expected at most {SHAPES} shapes, found more, counting <use> copies: simplify the drawing")
     return root
+
+
+def _check_words(root: Element) -> None:
+    """Raise WorldError for attributes and styles on which the parser would work for minutes."""
+    for element in root.iter():
+        # Paths are read in one pass, embedded pictures and a program's own attributes not at all.
+        words = [t for key, t in element.items() if key not in ("d", "points") and key[0] != "{" and t[:5] != "data:"]
+        words += [element.text or ""] if str(element.tag).endswith("style") else []
+        longest = max((len(text) for text in words), default=0)
+        if longest > WORDS_MAX:
+            raise WorldError(
+                f"expected at most {WORDS_MAX} characters in an attribute or <style>, found {longest}: simplify it"
+            )
 
 
 def _copies(root: Element) -> int:
@@ -107,8 +136,8 @@ def _view_box(root: Element) -> tuple[float, float, float, float] | None:
     return x, y, width, height
 
 
-def _stated_scale(root: Element, box: tuple[float, float, float, float] | None) -> float | None:
-    """Return metres per user unit where the file states it."""
+def _stated_scale(root: Element, box: tuple[float, float, float, float] | None) -> tuple[float | None, str]:
+    """Return metres per user unit where the file states it, and in words who says so."""
     text = root.get("data-metres-per-unit")
     if text is not None:
         try:
@@ -117,7 +146,7 @@ def _stated_scale(root: Element, box: tuple[float, float, float, float] | None) 
             value = math.nan
         if not 0 < value < math.inf:
             raise WorldError(f"expected data-metres-per-unit above 0, found {shorten(text)}: correct the <svg> element")
-        return value
+        return value, "as the file says"
     sizes = []
     for key, i in (("width", 2), ("height", 3)):
         length = (root.get(key) or "").strip()
@@ -129,7 +158,9 @@ def _stated_scale(root: Element, box: tuple[float, float, float, float] | None) 
                     f"expected {key} as a length such as 900cm, found {shorten(length)}: correct it"
                 ) from None
             sizes.append(metres / box[i] if box else PIXEL_M)
-    return min(sizes) if sizes and math.isfinite(min(sizes)) and min(sizes) > 0 else None
+    if sizes and math.isfinite(min(sizes)) and min(sizes) > 0:
+        return min(sizes), "by the size of the page, drawn 1:1 (--scale METRES says another)"
+    return None, "assumed (--scale METRES says another)"
 
 
 def _unitless_scale(shapes: list[tuple[list[Any], str | None]]) -> float:
@@ -154,10 +185,13 @@ def _shapes(
         root.set("height", repr(box[3]))
     shapes: list[tuple[list[Any], str | None]] = []
     marks: dict[str, tuple[float, float, float]] = {}
+    pieces = 0
     try:
         for element in svgelements.SVG.parse(io.BytesIO(tostring(root))).elements():
             if isinstance(element, svgelements.Shape):
                 rings = [ring for ring in _rings(element) if len(ring) > 1]
+                pieces += sum(len(ring) - 1 for ring in rings)
+                check_count(pieces)
                 name = _mark(element)
                 if name is None:
                     shapes += _visible(element, rings)
@@ -226,7 +260,7 @@ def _rings(shape: Any) -> list[Any]:
         if isinstance(piece, svgelements.Line | svgelements.Close):
             rings[-1] += [[piece.end.x, piece.end.y]] if piece.end is not None else []
         else:
-            rings[-1] += [[p.x, p.y] for p in (piece.point(t) for t in np.linspace(0, 1, CURVE_STEPS + 1)[1:])]
+            rings[-1] += piece.npoint(np.linspace(0, 1, CURVE_STEPS + 1)[1:]).tolist()
         if isinstance(piece, svgelements.Close) and piece.end is not None:
             rings.append([[piece.end.x, piece.end.y]])
     return [np.array(ring) for ring in rings if ring]

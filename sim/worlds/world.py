@@ -13,6 +13,15 @@ ROBOT_RADIUS_M = 0.2
 SENSOR_RANGE_M = 4.0
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How a drawing was read, in words: what was taken for what, and who said what was not drawn."""
+
+    understood: str
+    scale: str
+    start: str
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """A building as it truly is; walls are solid."""
@@ -24,6 +33,8 @@ class World:
     """Pose (x m, y m, heading rad) in the world frame."""
     labels: dict[str, tuple[float, float]]
     """Named points, m, world frame."""
+    reading: Reading | None = None
+    """None for a world that was not drawn."""
 
     @cached_property
     def faces(self) -> Float[np.ndarray, "n 2 2"]:

@@ -29,6 +29,11 @@ def _plan(**changes: object) -> str:
     return json.dumps({"walls": BOX, "start": [4, 3], **changes})
 
 
+def _laughs(more: str) -> str:
+    lines = ["l0: &l0 {a: 1}", *(f"l{i}: &l{i} " + more.format(f"*l{i - 1}") for i in range(1, 30))]
+    return "\n".join([*lines, "image: b.pgm", "resolution: 0.05"])
+
+
 def _geo(kind: str, coordinates: object) -> str:
     return json.dumps({"type": kind, "coordinates": coordinates})
 
@@ -55,7 +60,8 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "huge int": ("a.json", '{"walls": [[0, 0, 1' + "0" * 400 + ", 1]]}", "finite"),
     "bool": ("a.json", _plan(walls=[[0, 0, True, 1]]), "finite"),
     "points only": ("a.json", _plan(walls=[[1, 1, 1, 1]]), "nothing drawn"),
-    "too big": ("a.json", _plan(walls=[[0, 0, 1e9, 0]]), "1000 m"),
+    "too big": ("a.json", _plan(walls=[[0, 0, 1e4, 0]]), "1000 m"),
+    "too far": ("a.json", _plan(walls=[*BOX, [0, 0, 1e300, 0]]), "1e+07 m"),
     "too small": ("a.json", _plan(walls=[[0, 0, 0.1, 0]]), "1000 m"),
     "start in wall": ("a.json", _plan(start=[0.01, 3]), "inside a wall"),
     "start near wall": ("a.json", _plan(start=[0.2, 3]), "0.150 m"),
@@ -100,6 +106,20 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "yaml outside": ("a.yaml", "image: ../../etc/passwd\nresolution: 0.05", "folder"),
     "yaml absolute": ("a.yaml", "image: /etc/passwd\nresolution: 0.05", "folder"),
     "yaml resolution": ("a.yaml", "image: b.pgm\nresolution: -1", "resolution"),
+    "yaml laughs": ("a.yaml", _laughs("[{0}, {0}, {0}, {0}]"), "alias"),
+    "yaml merges": ("a.yaml", _laughs("{{<<: [{0}, {0}, {0}]}}"), "alias"),
+    "yaml float": ("a.yaml", 'image: b.pgm\nresolution: !!float ""', "tag"),
+    "yaml int": ("a.yaml", 'image: b.pgm\nresolution: !!int ""', "tag"),
+    "yaml bool": ("a.yaml", "image: b.pgm\nresolution: !!bool foo", "tag"),
+    "yaml timestamp": ("a.yaml", "image: b.pgm\nresolution: !!timestamp foo", "tag"),
+    "yaml local tag": ("a.yaml", "image: ! b.pgm\nresolution: 1", "tag"),
+    "yaml tag of all": ("a.yaml", "!!omap [a: 1]", "tag"),
+    "yaml surrogate": ("a.yaml", 'image: "b\\ud800.pgm"\nresolution: 0.05', "picture"),
+    "yaml escape": ("a.yaml", 'image: "\\e[2J.pgm"\nresolution: 0.05', "picture"),
+    "yaml no character": ("a.yaml", 'image: "\\UFFFFFFFF"\nresolution: 0.05', "YAML"),
+    "yaml two": ("a.yaml", "a: 1\n---\na: 1", "2 documents"),
+    "yaml nan": ("a.yaml", "image: b.pgm\nresolution: .nan", "finite"),
+    "yaml digits": ("a.yaml", "image: b.pgm\nresolution: " + "9" * 5000, "finite"),
     "yaml date": ("a.yaml", "image: b.pgm\nresolution: 2001-01-01", "resolution"),
     "extension": ("a.dwg", "x", "ending in"),
 }
@@ -129,6 +149,23 @@ def test_what_is_no_file_is_refused(tmp_path):
     assert "no such file" in _refused(tmp_path / "none.svg")
     for name in ("", "\0.json", "x" * 5000 + ".json", "nowhere"):
         _refused(name)
+
+
+def test_links_that_lead_to_each_other_are_no_file(tmp_path):
+    (tmp_path / "b.pgm").symlink_to("c.pgm")
+    (tmp_path / "c.pgm").symlink_to("b.pgm")
+    (tmp_path / "a.yaml").write_text("image: b.pgm\nresolution: 0.05")
+    (tmp_path / "d.yaml").symlink_to("d.yaml")
+    assert "found" in _refused(tmp_path / "a.yaml")
+    assert "found" in _refused(tmp_path / "d.yaml")
+
+
+def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "home").mkdir()
+    (tmp_path / "b.pgm").write_bytes(b"P5\n1 1\n255\n\0")
+    (tmp_path / "home" / "b.pgm").symlink_to(tmp_path / "b.pgm")
+    (tmp_path / "home" / "a.yaml").write_text("image: b.pgm\nresolution: 0.05")
+    assert "folder" in _refused(tmp_path / "home" / "a.yaml")
 
 
 def test_pictures_without_walls_or_without_room_are_refused(tmp_path):

@@ -1,0 +1,55 @@
+"""How large a drawing may be: what comes in below this is a world within 20 s and 1 GB."""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import shapely
+
+from .drawing import WorldError
+
+WALLS_MAX = 20_000
+"""Straight pieces of all lines and outlines."""
+MEETINGS_MAX = 200_000
+"""How often pieces may touch or cross another, ends that meet included."""
+FARTHEST_M = 1e7
+"""Distance from the origin: any projected frame fits, and a micrometre is still a number there."""
+LABELS_MAX = 200
+"""Each pair of labels is measured."""
+AT_ONCE = 100
+
+
+def check_count(count: int) -> None:
+    """Raise WorldError for more straight pieces than a drawing may have."""
+    if count > WALLS_MAX:
+        raise WorldError(f"expected at most {WALLS_MAX} straight pieces of wall, found {count}: simplify the drawing")
+
+
+def check_size(lines: Sequence[shapely.LineString], polygons: Sequence[shapely.Polygon]) -> None:
+    """Raise WorldError for a drawing that has too many walls, that meet too often, or lie too far off; metres."""
+    rings = shapely.get_rings(np.array(polygons, dtype=object)).tolist()
+    paths = [shapely.get_coordinates(path) for path in (*lines, *rings)]
+    check_count(sum(len(path) - 1 for path in paths))
+    if not paths:
+        return
+    # Not written as a comparison with the largest: NaN is too far, too.
+    if not all(np.all(np.abs(path) <= FARTHEST_M) for path in paths):
+        raise WorldError(
+            f"expected walls at most {FARTHEST_M:g} m from the origin, found farther ones: move the drawing"
+        )
+    pieces = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+    walls = np.array(shapely.linestrings(pieces))
+    tree = shapely.STRtree(walls)
+    meetings = 0
+    for first in range(0, len(walls), AT_ONCE):
+        some = walls[first : first + AT_ONCE]
+        meetings += tree.query(some, predicate="intersects").shape[1] - len(some)
+        if meetings > MEETINGS_MAX:
+            raise WorldError(
+                f"expected walls that meet at most {MEETINGS_MAX} times, found more: this is a scribble; draw fewer"
+            )
+
+
+def check_labels(names: Collection[str]) -> None:
+    """Raise WorldError for more named points than a world may have."""
+    if len(names) > LABELS_MAX:
+        raise WorldError(f"expected at most {LABELS_MAX} named points, found {len(names)}: take names away")
