@@ -1,8 +1,17 @@
-"""Where tables and progress go: a console that prints what it is given."""
+"""Where tables, progress and single lines go: what a terminal shows is what was meant, whatever a name holds."""
+
+import sys
 
 from rich.console import Console
+
+from .streams import one_line
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
     """Return a console without markup and emoji: names are the user's, and `random:1234:` is an emoji."""
     return Console(stderr=stderr, width=width, markup=False, emoji=False)
+
+
+def say(words: str, *, stderr: bool = False) -> None:
+    """Print one line, with letters in place of what would steer the terminal: file names are the user's, too."""
+    print(one_line(words), file=sys.stderr if stderr else sys.stdout)

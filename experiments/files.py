@@ -5,7 +5,6 @@ import errno
 import json
 import math
 import os
-import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO, StringIO
@@ -14,12 +13,9 @@ from typing import Any
 
 import numpy as np
 
-PART = re.compile(r"\..+\.\d+\.part")
-"""The names of files that are being written; a process that was killed leaves them behind."""
-
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError that names it."""
+    """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with temporary.open("wb") as file:
@@ -28,10 +24,6 @@ def write(path: Path, content: bytes) -> None:
             # Without this a power cut may leave the new name with nothing under it.
             os.fsync(file.fileno())
         temporary.replace(path)
-    except OSError as error:
-        # A full disk names no file, and the temporary name is nobody's business.
-        error.filename, error.filename2 = str(path), None
-        raise
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -61,7 +53,9 @@ def write_anywhere(path: Path, content: bytes) -> None:
 
 def json_bytes(value: Any) -> bytes:
     """Return a value as indented JSON; arrays become lists, and NaN or infinity null."""
-    return (json.dumps(_plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    text = json.dumps(_plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    # A path may hold bytes that are no UTF-8, to Python halves of surrogate pairs: as \\udc80 they come back.
+    return text.encode(errors="backslashreplace")
 
 
 def npz_bytes(arrays: Mapping[str, Any]) -> bytes:

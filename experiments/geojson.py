@@ -43,6 +43,7 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
             *(_unseen_feature(border) for border in certificate.unseen or ()),
             *(_unexplained_feature(thing) for thing in certificate.unexplained or ()),
             _trajectory_feature(log),
+            _start_feature(log),
         ],
     }
 
@@ -120,3 +121,9 @@ def _trajectory_feature(log: Log) -> dict[str, Any]:
     """Return the estimated way; a run of one step has a way of no length."""
     way = log.estimated_world[:, :2] if len(log) > 1 else np.repeat(log.estimated_world[:, :2], 2, axis=0)
     return _feature("LineString", way, kind="trajectory", steps=len(log), path_length_m=log.path_length_m[-1])
+
+
+def _start_feature(log: Log) -> dict[str, Any]:
+    """Return where the robot believes to have started: explored as a world, the map has a start."""
+    x, y, heading = log.estimated_world[0]
+    return _feature("Point", [x, y], kind="start", id="start", heading=heading)

@@ -10,6 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from . import palette
+from .text import literal
 
 WORST = 100.0
 """From here on all is one colour."""
@@ -44,9 +45,9 @@ def anees_map(
         for field, axes in zip(line, axes_line, strict=False):
             shown = np.clip(field.anees, 1.0, WORST)
             image = axes.imshow(shown, cmap=COLOURS, norm=LogNorm(1.0, WORST), aspect="auto", origin="lower")
-            axes.set_title(field.title, fontsize=9, loc="left")
-            axes.set_xticks(range(len(columns)), columns, fontsize=8)
-            axes.set_yticks(range(len(rows)), rows, fontsize=8)
+            axes.set_title(literal(field.title), fontsize=9, loc="left")
+            axes.set_xticks(range(len(columns)), [literal(name) for name in columns], fontsize=8)
+            axes.set_yticks(range(len(rows)), [literal(name) for name in rows], fontsize=8)
             axes.tick_params(length=0)
             for (row, column), value in np.ndenumerate(field.anees):
                 ink = palette.PAGE if value > DARK else palette.INK

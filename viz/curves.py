@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from . import palette
+from .text import literal
 
 SIZE_INCH = (5.2, 3.7)
 """One figure stands alone on a phone, two or three beside each other on a page."""
@@ -98,7 +99,7 @@ def ratio_figure(title: str, ratios: Sequence[Ratio], label: str) -> Figure:
         axes.plot([ratio.low, ratio.high], [row, row], color=paint, linewidth=2.0)
         axes.plot([ratio.value], [row], mark, color=paint, markersize=5.5, markeredgecolor=palette.PAGE)
     for mark, group in zip(MARKS, groups, strict=False):
-        axes.plot([], [], mark, color=palette.INK, markersize=5.5, label=group)
+        axes.plot([], [], mark, color=palette.INK, markersize=5.5, label=literal(group))
     axes.axvline(1.0, color=palette.INK, linewidth=0.8)
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(FixedLocator(round_ratios(*axes.get_xlim())))
@@ -106,7 +107,7 @@ def ratio_figure(title: str, ratios: Sequence[Ratio], label: str) -> Figure:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     names = [ratio.name for ratio in ratios]
     first = [row for row, name in enumerate(names) if row == 0 or names[row - 1] != name]
-    axes.set_yticks(first, [names[row] for row in first], fontsize=8)
+    axes.set_yticks(first, [literal(names[row]) for row in first], fontsize=8)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(ratios) - 0.5, -0.5)
     axes.set_xlabel(label, fontsize=9)
@@ -156,7 +157,7 @@ def _figure(title: str, size: tuple[float, float] = SIZE_INCH) -> tuple[Figure, 
     figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    axes.set_title(title, fontsize=10, loc="left")
+    axes.set_title(literal(title), fontsize=10, loc="left")
     axes.grid(color=palette.GRID, linewidth=0.6, which="major")
     axes.tick_params(labelsize=8, length=2)
     for side in ("top", "right"):

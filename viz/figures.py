@@ -1,5 +1,6 @@
 """Pictures of a map, in the manner of the paper's figures: a grid of one metre, open ends circled."""
 
+import warnings
 from dataclasses import dataclass, field
 from io import BytesIO
 from textwrap import wrap
@@ -23,6 +24,7 @@ from slam.stochastic_map import StochasticMap
 
 from . import palette
 from .shapes import ellipses
+from .text import literal
 
 WALL_M = 0.1
 """How thick true walls are drawn around the floor, m."""
@@ -92,7 +94,7 @@ def draw_map(picture: Picture) -> Figure:
 
 
 def _write(axes: Axes, lines: list[str], above: float, **look: Any) -> None:
-    axes.text(0.0, 1.0 + above, "\n".join(lines), transform=axes.transAxes, va="bottom", **look)
+    axes.text(0.0, 1.0 + above, literal("\n".join(lines)), transform=axes.transAxes, va="bottom", **look)
 
 
 def png(figure: Figure) -> bytes:
@@ -104,7 +106,9 @@ def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
     """Return a figure as the bytes of a file, the same for the same figure; svg and pdf stay sharp at any size."""
     buffer = BytesIO()
     unsaid = {"png": "Software", "svg": "Date", "pdf": "CreationDate"}
-    with mpl.rc_context({"svg.hashsalt": "chainslam"}):
+    with mpl.rc_context({"svg.hashsalt": "chainslam"}), warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(buffer, format=kind, metadata={unsaid[kind]: None})
     return buffer.getvalue()
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from . import palette
 from .curves import SmallMap, paint_map
 from .shapes import ellipses
+from .text import literal
 
 MARGIN_M = 0.5
 DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
@@ -24,7 +25,7 @@ def panels(title: str, rows: int, columns: int, size_inch: tuple[float, float]) 
     size = (columns * size_inch[0], rows * size_inch[1] + 0.35)
     figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, x=0.01, ha="left", size=11, weight="bold")
+    figure.suptitle(literal(title), x=0.01, ha="left", size=11, weight="bold")
     found = list(np.ravel(figure.subplots(rows, columns)))
     for axes in found:
         axes.tick_params(labelsize=7)
@@ -44,7 +45,7 @@ def map_panels(title: str, maps: Sequence[SmallMap], columns: int) -> tuple[Figu
     figure, axes = panels(title, -(-len(maps) // columns), columns, size)
     for one, small in zip(axes, maps, strict=False):
         paint_map(one, small, low, high)
-        one.set_title(small.title, fontsize=8, loc="left")
+        one.set_title(literal(small.title), fontsize=8, loc="left")
     for empty in axes[len(maps) :]:
         empty.set_axis_off()
     return figure, axes

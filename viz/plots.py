@@ -16,6 +16,7 @@ from slam.consistency import chi2_band
 
 from . import palette
 from .shapes import SIGMAS, VAGUE_RAD, ellipses
+from .text import literal
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
@@ -157,7 +158,7 @@ def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
 def _figure(title: str, size: tuple[float, float]) -> tuple[Figure, Axes]:
     figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, x=0.02, ha="left", size=10, weight="bold")
+    figure.suptitle(literal(title), x=0.02, ha="left", size=10, weight="bold")
     axes = figure.subplots()
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=7)

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from viz import palette
+from viz.text import literal
 
 from ..scenario import TrialConfig
 from ..trial import TrialResult
@@ -51,4 +52,6 @@ def mark(axes: Axes, result: TrialResult) -> None:
     """Name the corners that the paper names."""
     for name, at in result.scenario.world.labels.items():
         axes.plot(*at, "o", markersize=6, color="none", markeredgecolor=palette.ALARM, mew=1.2)
-        axes.annotate(name, at, xytext=(4, 4), textcoords="offset points", size=9, weight="bold", color=palette.ALARM)
+        axes.annotate(
+            literal(name), at, xytext=(4, 4), textcoords="offset points", size=9, weight="bold", color=palette.ALARM
+        )

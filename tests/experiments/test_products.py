@@ -51,7 +51,13 @@ def test_geojson_holds_valid_shapes_and_says_that_it_is_in_metres(explored, worl
         shape = shapely.from_geojson(json.dumps(feature["geometry"]))
         assert shape.is_valid
         shapes.setdefault(feature["properties"]["kind"], []).append((shape, feature["properties"]))
-    assert {kind: len(found) for kind, found in shapes.items()} == {"chain": 2, "wall": 8, "corner": 8, "trajectory": 1}
+    assert {kind: len(found) for kind, found in shapes.items()} == {
+        "chain": 2,
+        "wall": 8,
+        "corner": 8,
+        "trajectory": 1,
+        "start": 1,
+    }
     assert all(shape.exterior.is_ccw for shape, _ in shapes["chain"])
     for kind, key in (("wall", "covariance_alpha_d"), ("corner", "covariance_xy_m2")):
         covs = np.array([properties[key] for _, properties in shapes[kind]])
@@ -60,7 +66,7 @@ def test_geojson_holds_valid_shapes_and_says_that_it_is_in_metres(explored, worl
     assert room.hausdorff_distance(shapely.Polygon(world.free.exterior)) < 0.05
 
 
-@pytest.mark.parametrize("name", ["map.yaml", "map.svg"])
+@pytest.mark.parametrize("name", ["map.yaml", "map.svg", "map.geojson"])
 def test_a_map_is_a_world_again_and_explored_again(explored, world, name):
     _, folder = explored
     again = load(folder / name)
