@@ -15,12 +15,12 @@ from .campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_cam
 from .campaign.runner import on_cores, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
-from .campaign.words import left_out
-from .interrupts import INTERRUPTED
+from .console import say
+from .echo import echo_world
 from .replay import Association
 from .scenario import P0, UsageError, load_world
 
-FAILED = 1
+FAILED, INTERRUPTED = 1, 130
 JOBS_A_CORE = 8
 """Processes beyond this for each core only take memory from one another."""
 
@@ -98,7 +98,7 @@ class Compare:
                 f"expected 1 to {most} processes on this machine, found --jobs {self.jobs}: choose another"
             )
         for world in campaign.worlds:
-            load_world(world)
+            echo_world(load_world(world))
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
         with opened(self.out, campaign) as store:
             try:
@@ -111,14 +111,12 @@ class Compare:
                 print(f"chainslam: {error}; what is done is kept in {self.out}, the same command goes on",
                       file=sys.stderr)  # fmt: skip
                 return FAILED
-            said = write_tables(self.out, campaign, trials(campaign), store.record)
+            write_tables(self.out, campaign, trials(campaign), store.record)
         print(tally.words())
-        for words in left_out(said):
-            print(words)
-        print(f"results in {self.out}")
+        say(f"results in {self.out}")
         problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
         for problem in problems:
-            print(f"chainslam: not written: {problem}", file=sys.stderr)
+            say(f"chainslam: not written: {problem}", stderr=True)
         return 1 if problems else 0
 
     def _of_others(self) -> int:
@@ -134,5 +132,5 @@ class Compare:
             contrast(*self.against, self.out)
             for words in verdict(read_contrast(self.out)):
                 print(words)
-        print(f"results in {self.out}")
+        say(f"results in {self.out}")
         return 0

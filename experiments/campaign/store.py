@@ -1,5 +1,6 @@
 """A campaign's folder: a file for each trial, written whole or not at all, so that whatever stops it can go on."""
 
+import fcntl
 import json
 import sys
 from collections.abc import Iterator
@@ -11,16 +12,16 @@ from typing import Any
 from sim.archive import regular
 from sim.replay import FORMAT
 
+from ..explore_command import prepare
 from ..files import json_bytes, write
 from ..reading import Each, UnfitError, fit, read_json, told
 from ..results import config_record
-from ..run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
 from ..scenario import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .score import Record
 from .work import Done, unpack
 
-CONFIG = "config.json"
+CONFIG, LOCK = "config.json", ".lock"
 TODO = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
@@ -44,12 +45,7 @@ class Store:
         return self.path(trial).exists()
 
     def save(self, done: Done) -> None:
-        """Write what a job left, the recording before the record: a record means that all is there.
-
-        Raises FolderGoneError where the campaign's folder is no longer there, and OSError.
-        """
-        if not (self.folder / CONFIG).exists():
-            raise FolderGoneError(self.folder)
+        """Write what a job left, the recording before the record: a record means that all is there."""
         if done.log is not None:
             path = self.path(done.trial.recording)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,7 +69,7 @@ class Store:
 def opened_anew(folder: Path) -> Iterator[None]:
     """Make a folder that must be empty, and keep it to this process; raises UsageError."""
     prepare(folder)
-    with held(folder):
+    with _locked(folder):
         if any(child.name != LOCK for child in folder.iterdir()):
             raise UsageError(f"expected an empty folder, found files in {folder}: name another with --out")
         yield
@@ -86,10 +82,21 @@ def opened(folder: Path, campaign: Campaign) -> Iterator[Store]:
     Raises UsageError for a folder of another campaign, and for one that another process is working in.
     """
     prepare(folder)
-    with held(folder):
-        clear_leftovers(folder, "**/.*")
+    with _locked(folder):
         _settle(folder, campaign)
+        for leftover in folder.rglob(".*.part"):
+            leftover.unlink()
         yield Store(folder, campaign)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    with (folder / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UsageError(f"expected a folder to itself, found another campaign at work in {folder}") from error
+        yield
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,6 @@ def step_rows(records: Sequence[Record]) -> list[Row]:
                 **{key: records[0].summary[key] for key in KEYS},
                 "step": k,
                 "trials": int(going[:, k].sum()),
-                "without_nees": int(going[:, k].sum()) - len(nees),
                 "path_length_m": float(column["path_length_m"].mean()),
                 "pose_anees": anees,
                 "band_low": low / 3.0,
@@ -190,11 +189,8 @@ def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
 
 def write_tables(
     folder: Path, campaign: Campaign, trials: Sequence[Trial], record_of: Callable[[Trial], Record]
-) -> Row:
-    """Write every table of some trials, which stand cell by cell, and return what they say: `comparison.json`.
-
-    `campaign` names the levels.
-    """
+) -> None:
+    """Write every table of some trials, which stand cell by cell, and what they say; `campaign` names the levels."""
     rows, marks, steps, bands = [], [], [], []
     for _, cell in groupby(trials, key=lambda t: (t.world, t.strategy, t.backend, t.arm)):
         records = [record_of(trial) for trial in cell]
@@ -209,4 +205,3 @@ def write_tables(
     said = compare(campaign, rows, marks, bands)
     said |= {"format": FORMAT, "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     write(folder / "comparison.json", json_bytes(said))
-    return said
