@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import results, words
+from . import results, words, worlds
 
 Mutator = Callable[[np.random.Generator, Path], list[list[str]]]
 MUTATORS: dict[str, Mutator] = {
@@ -20,4 +20,8 @@ MUTATORS: dict[str, Mutator] = {
     "contrasts": results.contrasts,
     "merged": results.merged,
     "words": words.words,
+    "world-bytes": worlds.damaged_file,
+    "world-values": worlds.other_values,
+    "world-words": worlds.other_words,
+    "world-shapes": worlds.other_shapes,
 }
