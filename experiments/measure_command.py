@@ -1,5 +1,6 @@
 """`chainslam measure`: distances, lengths and areas of a map, with error bars."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -82,4 +83,4 @@ def _words(measured: Measured) -> str:
 def _estimator(folder: Path) -> str:
     """Return whose word the intervals are; nothing where the folder does not tell."""
     config = folder / "config.json"
-    return f", as {read_config(config).trial.backend} states it" if config.exists() else ""
+    return f", as {read_config(config).trial.backend} states it" if os.path.lexists(config) else ""

@@ -78,7 +78,9 @@ def in_order(found: Iterable[Trial], levels: Campaign) -> list[Trial]:
 def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
     if not store.has(trial):
         raise UsageError(f"expected a campaign that is done, found {store.folder} without {trial.path}: run it again")
-    if trial in found and not same(found[trial].record(trial), store.record(trial)):
+    # Read before anything is written: a result that is none must leave no folder that is half made.
+    record = store.record(trial)
+    if trial in found and not same(found[trial].record(trial), record):
         raise UsageError(f"expected one result of {trial.path}, found two that differ: merge campaigns of one version")
     found.setdefault(trial, store)
 

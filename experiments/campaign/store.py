@@ -2,6 +2,7 @@
 
 import fcntl
 import json
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -141,6 +142,7 @@ def read_config(folder: Path) -> Settled:
 def _settle(folder: Path, campaign: Campaign) -> None:
     """Write the config, or hold it against the one that is there."""
     path = folder / CONFIG
+    before = read_config(folder).said if os.path.lexists(path) else None
     try:
         digests = world_digests(campaign)
     except OSError as error:
@@ -148,12 +150,11 @@ def _settle(folder: Path, campaign: Campaign) -> None:
     now = plain({"format": FORMAT, "campaign": asdict(campaign), "worlds_sha256": digests})
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
-    if not path.exists():
+    if before is None:
         if any(child.name != LOCK for child in folder.iterdir()):
             raise UsageError(f"expected an empty folder or a campaign's, found {folder} with other files: name another")
         write(path, json_bytes(now | made_with))
         return
-    before = read_config(folder).said
     different = [key for key in now["campaign"] if before.get("campaign", {}).get(key) != now["campaign"][key]]
     different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
     if different:
