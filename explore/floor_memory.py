@@ -83,9 +83,12 @@ class FloorMemory:
         self._rested = 0
         self._last: deque[tuple[Float[np.ndarray, 3], Scan]] = deque(maxlen=config.last_scans)
         self._before_world: Float[np.ndarray, 2] | None = None
+        self._expected_world: Float[np.ndarray, 3] | None = None
 
     def move(self, odometry: Odometry) -> None:
         """Take note that the robot has moved."""
+        if self._expected_world is not None:
+            self._expected_world = compose(self._expected_world, odometry.motion)
         back = inverse(odometry.motion)
         for k, (pose, scan) in enumerate(self._last):
             self._last[k] = compose(back, pose), scan
@@ -100,11 +103,21 @@ class FloorMemory:
         """Take in one scan at the pose that the map believes in."""
         pose = walls.belief.pose_world
         self._last.append((np.zeros(3), scan))
-        self._take_in(walls, walls.distances_m, pose, scan)
         self._rested += 1
-        if self._rested >= max(self._config.rest_steps, len(self._kept) // 10):
+        jumped = self._has_jumped(pose)
+        self._expected_world = pose.copy()
+        if jumped or self._rested >= max(self._config.rest_steps, len(self._kept) // 10):
             self._rested = 0
             self._follow(walls)
+        self._take_in(walls, walls.distances_m, pose, scan)
+
+    def _has_jumped(self, pose_world: Float[np.ndarray, "3"]) -> bool:
+        """Return whether the robot is not where the wheels have led it: the walls may have moved with it."""
+        if self._expected_world is None:
+            return False
+        moved = np.hypot(*(pose_world - self._expected_world)[:2])
+        turned = abs(wrap(pose_world[2] - self._expected_world[2]))
+        return bool(moved + self._config.arm_m * turned > self._config.moved_m)
 
     def note_touched(self, pose_world: Float[np.ndarray, "3"], places_robot: Float[np.ndarray, "t 2"]) -> None:
         """Remember that the body, at the pose of the last scan, touched something, and that it does not fit there."""

@@ -8,8 +8,8 @@ import pytest
 from explore.floor_memory import FloorMemory, FloorMemoryConfig
 from explore.free_space import FreeSpace
 from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import compose, to_world, wrap
-from slam.robot import Scan
+from slam.geometry.poses import compose, inverse, to_world, wrap
+from slam.robot import Odometry, Scan
 
 FACES = np.array(
     [
@@ -131,3 +131,16 @@ def test_headings_wrap(scene):
     drive(memory, scene, np.tile([3.0, 3.0, 0.0], (SCENE_REST, 1)), np.array([0.0, 0.0, 0.05]))
     kept = next(iter(memory._kept.values())).pose_world
     np.testing.assert_allclose(kept[2], wrap(np.pi + 0.04), atol=1e-3)
+
+
+def test_the_floor_follows_at_once_where_robot_and_map_jump_together(scene, way):
+    """In the twenty steps until the next look the robot stood in a wall of the old floor, and gave up all its ends."""
+    memory, still = FloorMemory(FreeSpace()), Odometry(np.zeros(3), np.zeros((3, 3)))
+    poses, jump = way[0][:8], np.array([0.3, 0.9, 0.0])
+    for before, pose in zip(poses, [*poses[1:], poses[-1]], strict=True):
+        memory.see(scene.walls(before), scan_at(before))
+        memory.move(replace(still, motion=compose(inverse(before), pose)))
+    drawn = np.argwhere(memory.free_space.driven((slice(None), slice(None))))
+    memory.see(moved_scene(scene, jump).walls(compose(jump, poses[-1])), scan_at(poses[-1]))
+    follows = np.argwhere(memory.free_space.driven((slice(None), slice(None))))
+    np.testing.assert_allclose(0.05 * (follows.mean(axis=0) - drawn.mean(axis=0))[::-1], jump[:2], atol=0.07)
