@@ -133,8 +133,8 @@ def differences(graph: Graph) -> dict[str, float]:
     joint, shown = belief.joint(belief.ids), np.flatnonzero(arrays["line_shown"])
     _, of_poses = np.unique(arrays["poses_of_steps"], return_index=True)
     found = trajectory[of_poses]
-    # The graph's first pose is its origin: lines no longer shown begin where it linearised them.
-    lines = lines_to_world(arrays["lines"], problem.prior)
+    # The graph's origin is the pose that saw the first wall: lines no longer shown begin where it linearised them.
+    lines = lines_to_world(arrays["lines"], found[int(arrays["first_pose"])])
     lines[:, 1] -= np.sum(normals(lines[:, 0]) * problem.anchors, axis=-1)
     lines[shown] = belief.means
     poses, truth, cov = problem.solve(found, lines)

@@ -1,27 +1,36 @@
 """The stochastic map as a factor graph: every pose kept and relinearised, solved step by step (iSAM2).
 
-Inside, the first pose is the origin, so that no answer depends on where the world has its own. The calls of one step
-are collected and handed to iSAM2 together when a belief is next asked for; a prediction alone is propagated without it.
+Inside, the pose from which the first wall was seen is the origin: no scan tells where that pose lies in the world, and
+what prior and wheels told of it is kept beside the graph (`Frame`). The calls of one step are collected and handed to
+iSAM2 together when a belief is next asked for; a prediction alone is propagated without it.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..backend import Belief, Observations
-from ..geometry.poses import compose, to_robot, to_world
+from ..geometry.poses import to_robot, to_world
 from ..models import grow
 from ..robot import Odometry
 from .graph_belief import believe
 from .graph_isam import GraphConfig
 from .graph_loose import wrapped
+from .graph_optimum import solve_anew
 from .graph_record import LineRecord, Record
 from .graph_solver import Solver
 
 DEFAULTS = GraphConfig()
 G = TypeVar("G", bound="Graph")
+FAULTS = (RuntimeError, ValueError, IndexError)
+"""What GTSAM and `Solver` raise where they cannot go on."""
+
+
+class UnsolvableError(RuntimeError):
+    """No least-squares solution was found; what was last entered is taken out again, the rest holds."""
 
 
 class Graph:
@@ -35,9 +44,13 @@ class Graph:
     ) -> None:
         """Start at a pose with its covariance and an empty map."""
         self._config = config
+        self.recoveries = 0
+        """How often a solution did not hold and everything was solved anew."""
         self._version = 0
         self._belief: Belief | None = None
         self._record = Record(np.array(pose_world, dtype=np.float64), np.array(pose_cov, dtype=np.float64))
+        self._holds = 0, 0
+        """Sightings and ids of which a solution was found."""
         self._start_from(np.zeros((1, 3)), np.zeros((0, 2)))
 
     # -- the Backend protocol ---------------------------------------------------------------------------------------
@@ -46,7 +59,7 @@ class Graph:
     def belief(self) -> Belief:
         """The estimate now."""
         if self._belief is None:
-            self._solver.settle()
+            self._settle()
             version = self._version
             self._belief = believe(
                 self._solver, self._record, self._anchors, self._inner_anchors, lambda: version == self._version
@@ -74,7 +87,7 @@ class Graph:
         self._move_on()
         self._solver.enter_poses()
         new = grow(self._solver.pose, lines, centres, at_wall=False)
-        anchors = to_world(to_world(centres, self._solver.pose), self._record.pose_world)
+        anchors = self._record.frame.anchors_world(to_world(centres, self._solver.pose))
         ids = np.arange(self._record.next_id, self._record.next_id + len(lines))
         self._record.next_id += len(lines)
         self._record.lines |= {line: LineRecord(anchor) for line, anchor in zip(ids.tolist(), anchors, strict=True)}
@@ -144,13 +157,11 @@ class Graph:
         """Return rows (number of the sighting, predictions made before it) of a line, oldest first."""
         self._rows([line])
         numbers = np.array(sorted(self._record.lines[line].sightings), dtype=np.int64)
-        poses = np.array(self._record.seen_from, dtype=np.int64)[numbers]
-        return np.stack([numbers, np.searchsorted(self._record.poses_of_steps, poses)], axis=-1)
+        return np.stack([numbers, self._record.steps_of(numbers)], axis=-1)
 
     def trajectory(self) -> Float[np.ndarray, "n 3"]:
         """Return the present estimates of the pose at the start and after every prediction, world frame (smoothed)."""
-        poses = self._all_entered().poses()
-        return np.array([compose(self._record.pose_world, poses[k]) for k in self._record.poses_of_steps])
+        return self._record.path_world(self._all_entered().poses())
 
     def relinearise(self) -> None:
         """Linearise everything anew at the present estimates."""
@@ -177,9 +188,44 @@ class Graph:
         """Make the graph of the record anew, linearised at these poses and lines (inner frame)."""
         self._move_on()
         self._solver = Solver(self._config, self._record, poses, lines, anew)
-        shown = self._solver.ids.tolist()
-        self._anchor(np.array([self._record.lines[line].anchor for line in shown]).reshape(-1, 2))
-        self._solver.settle()
+        self._anchor_shown()
+        self._settle()
+
+    def _settle(self) -> None:
+        """Solve for all that was entered; where iSAM2 fails or goes astray, solve all of the record anew.
+
+        Raises UnsolvableError where that fails too: the sightings since the last solution are then taken out, and
+        the graph is as it was before them.
+        """
+        try:
+            self._solver.settle()
+        except FAULTS as error:
+            self._recover(error)
+        self._holds = len(self._record.seen), self._record.next_id
+
+    def _recover(self, error: Exception) -> None:
+        self.recoveries += 1
+        self._config = replace(self._config, careful=True)
+        start = self._solver.start()
+        try:
+            self._solver = solve_anew(self._config, self._record, *start)
+        except FAULTS:
+            self._take_back(*start)
+            words = " ".join(str(error).split()).partition(" Thrown when")[0]
+            raise UnsolvableError(
+                f"expected a least-squares solution of {len(start[0])} poses and {len(start[1])} lines, found"
+                f" {words}: the last scan is taken out again"
+            ) from error
+
+    def _take_back(self, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]) -> None:
+        """Take out the sightings since the last solution; raises UnsolvableError where not even the rest is solved."""
+        known = np.array([line < self._holds[1] for line in self._record.lines], dtype=bool)
+        self._record.forget(*self._holds)
+        try:
+            self._solver = solve_anew(self._config, self._record, poses, lines[known])
+        except FAULTS as error:
+            raise UnsolvableError(f"expected a solution without the last scan, found {error}") from error
+        self._anchor_shown()
 
     def _move_on(self) -> None:
         self._version += 1
@@ -187,15 +233,14 @@ class Graph:
 
     def _settled(self) -> Solver:
         """Solve for all that was entered, and make beliefs stale."""
-        self._solver.settle()
+        self._settle()
         self._move_on()
         return self._solver
 
     def _all_entered(self) -> Solver:
-        """Solve for all that was entered, then enter the predictions that wait."""
-        solver = self._settled()
-        solver.enter_poses()
-        return solver
+        """Solve for all that was entered, the predictions that wait too."""
+        self._settled().enter_poses()
+        return self._settled()
 
     def _rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return where the ids stand among the lines shown; raises KeyError for others."""
@@ -208,8 +253,12 @@ class Graph:
             raise KeyError(f"expected ids of lines in the map, found {wanted[~found].tolist()}")
         return rows
 
+    def _anchor_shown(self) -> None:
+        shown = self._solver.ids.tolist()
+        self._anchor(np.array([self._record.lines[line].anchor for line in shown]).reshape(-1, 2))
+
     def _anchor(self, anchors: Float[np.ndarray, "n 2"]) -> None:
-        self._anchors, self._inner_anchors = anchors, to_robot(anchors, self._record.pose_world)
+        self._anchors, self._inner_anchors = anchors, to_robot(anchors, self._record.frame.pose_world)
 
     def _hide(self, rows: Int[np.ndarray, " m"]) -> None:
         self._solver.hide(rows)

@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 
 from ..backend import Belief, Joint, StaleBeliefError, columns_of
 from ..geometry.lines import directions, normals
-from ..geometry.poses import compose, rotation, wrap
-from ..models import move
+from ..geometry.poses import compose
+from .graph_ahead import Ahead
 from .graph_record import Record
 from .graph_solver import Solver
 
@@ -24,20 +24,27 @@ def believe(
 
     The largest joint covariance asked for is kept: what is part of it is not asked of the solver again.
     """
-    ahead = _Ahead(compose(record.pose_world, solver.pose))
+    frame = record.frame
+    ahead = Ahead(compose(frame.pose_world, solver.pose))
     for index in range(solver.last, len(record.motions)):
         ahead.move(record.motions[index], record.motion_covs[index])
+    pose_cov = ahead.pose_cov(solver.pose_cov())
     means = solver.lines.copy()
     means[:, 1] -= np.vecdot(normals(means[:, 0]), inner_anchors)
-    means[:, 0] = wrap(means[:, 0] + record.pose_world[2])
+    means = frame.means_world(means)
     answers: list[tuple[Int[np.ndarray, " m"], Float[np.ndarray, "s s"]]] = []
+
+    def in_world(cov: Float[np.ndarray, "s s"], rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "s s"]:
+        """Add the frame's own error, which no scan lessens."""
+        moves = frame.moving(ahead.pose, means[rows], anchors[rows]) @ frame.root
+        return np.asarray(cov + moves @ moves.T)
 
     def query(wanted: Int[np.ndarray, " m"]) -> Joint:
         if not is_present():
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
         rows = belief.rows(wanted)
         if not answers or not np.all(np.isin(rows, answers[0][0])):
-            cov = ahead.joint_cov(_joint_cov(solver, rows, inner_anchors))
+            cov = in_world(ahead.joint_cov(_joint_cov(solver, rows, inner_anchors)), rows)
             cov[:3, :3] = belief.pose_cov
             answers[:] = [(rows, cov)]
         known, cov = answers[0]
@@ -47,7 +54,7 @@ def believe(
         mean = np.concatenate([belief.pose_world, belief.means[rows].ravel()])
         return Joint(mean, cov[columns[:, None], columns], anchors[rows])
 
-    belief = Belief(ahead.pose_world, ahead.pose_cov(solver.pose_cov()), solver.ids, anchors, means, query)
+    belief = Belief(ahead.pose, in_world(pose_cov, np.zeros(0, dtype=np.int64)), solver.ids, anchors, means, query)
     return belief
 
 
@@ -61,27 +68,3 @@ def _joint_cov(
     cov[4::2] -= lever[:, None] * cov[3::2]
     cov[:, 4::2] -= lever * cov[:, 3::2]
     return np.asarray(0.5 * (cov + cov.T))
-
-
-class _Ahead:
-    """A pose some predictions ahead of the last pose of the graph."""
-
-    def __init__(self, pose_world: Float[np.ndarray, "3"]) -> None:
-        self.pose_world = pose_world
-        self._F, self._Q = np.eye(3), np.zeros((3, 3))
-        self._F[:2, :2] = rotation(pose_world[2])
-
-    def move(self, motion: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> None:
-        step = move(self.pose_world, motion)
-        self.pose_world = step.pose_world
-        self._F = step.F @ self._F
-        self._Q = step.F @ self._Q @ step.F.T + step.W @ cov @ step.W.T
-
-    def pose_cov(self, cov_body: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
-        cov = self._F @ cov_body @ self._F.T + self._Q
-        return np.asarray(0.5 * (cov + cov.T))
-
-    def joint_cov(self, cov: Float[np.ndarray, "s s"]) -> Float[np.ndarray, "s s"]:
-        cov[:3, 3:] = self._F @ cov[:3, 3:]
-        cov[3:, :3] = cov[:3, 3:].T
-        return cov

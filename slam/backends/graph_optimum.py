@@ -17,6 +17,7 @@ def optimise(
     Sightings are linearised anew at each optimum, at most `rounds` times; after the second it hardly moves.
     """
     params = gtsam.LevenbergMarquardtParams()
+    params.setLinearSolverType("MULTIFRONTAL_QR")
     params.setRelativeErrorTol(1e-14)
     params.setAbsoluteErrorTol(1e-14)
     for _ in range(rounds):
@@ -27,3 +28,15 @@ def optimise(
         if np.allclose(poses, before[0], rtol=0, atol=1e-9) and np.allclose(lines, before[1], rtol=0, atol=1e-9):
             break
     return poses, lines
+
+
+def solve_anew(
+    config: GraphConfig, record: Record, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]
+) -> Solver:
+    """Return the record's graph, solved by damped steps, each of which comes nearer, and linearised there.
+
+    Raises what `Solver.settle` raises.
+    """
+    solver = Solver(config, record, *optimise(record, poses, lines))
+    solver.settle()
+    return solver

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from ..geometry.poses import compose
 from ..robot import Odometry
+from .frame import Frame
 
 Seen = tuple[float, float, float, float, float]
 """One sighting of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass
@@ -31,11 +33,13 @@ class Record:
 
     pose_world: Float[np.ndarray, "3"]
     pose_cov: Float[np.ndarray, "3 3"]
+    lead: list[Odometry] = field(default_factory=list)
+    """How the robot came from its start to pose 0, where its first wall came into sight: no scan says more of it."""
     motions: list[Float[np.ndarray, "3"]] = field(default_factory=list)
     """How the robot came to pose k + 1 from pose k."""
     motion_covs: list[Float[np.ndarray, "3 3"]] = field(default_factory=list)
-    poses_of_steps: list[int] = field(default_factory=lambda: [0])
-    """Index of the pose after each prediction (a rest without any error makes no new pose), the start first."""
+    steps: list[int] = field(default_factory=lambda: [0])
+    """Motions made after each prediction (a rest without any error makes none), none at the start."""
     seen_from: list[int] = field(default_factory=list)
     """Index of the pose of each sighting."""
     seen: list[Seen] = field(default_factory=list)
@@ -44,13 +48,38 @@ class Record:
     lines: dict[int, LineRecord] = field(default_factory=dict)
     """By id, ascending."""
     next_id: int = 0
+    frame: Frame = field(init=False)
+    """Where pose 0 lies in the world, as far as prior and wheels tell: everything in the map is relative to it."""
+
+    def __post_init__(self) -> None:
+        self.frame = Frame(self.pose_world, self.pose_cov)
+        for odometry in self.lead:
+            self.frame = self.frame.moved(odometry)
 
     def move(self, odometry: Odometry) -> None:
         """Note a motion; a rest without any error makes no new pose."""
         if np.any(odometry.motion) or np.any(odometry.cov):
-            self.motions.append(np.array(odometry.motion, dtype=np.float64))
-            self.motion_covs.append(np.array(odometry.cov, dtype=np.float64))
-        self.poses_of_steps.append(len(self.motions))
+            motion, cov = np.array(odometry.motion, dtype=np.float64), np.array(odometry.cov, dtype=np.float64)
+            if self.next_id:
+                self.motions.append(motion)
+                self.motion_covs.append(cov)
+            else:
+                self.lead.append(Odometry(motion, cov))
+                self.frame = self.frame.moved(self.lead[-1])
+        self.steps.append(len(self.lead) + len(self.motions))
+
+    def path_world(self, poses: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "n 3"]:
+        """Return the pose at the start and after every prediction, given the poses from pose 0 on in its frame."""
+        path = [self.pose_world]
+        for odometry in self.lead:
+            path.append(compose(path[-1], odometry.motion))
+        path[-1:] = [compose(self.frame.pose_world, pose) for pose in poses]
+        return np.array([path[k] for k in self.steps])
+
+    def steps_of(self, numbers: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return how many predictions were made before sightings."""
+        motions = len(self.lead) + np.array(self.seen_from, dtype=np.int64)[numbers]
+        return np.searchsorted(self.steps, motions)
 
     def see(self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> int:
         """Note a sighting and return its number."""
@@ -61,6 +90,13 @@ class Record:
         self.lines[line].sightings.append(len(self.seen) - 1)
         return len(self.seen) - 1
 
+    def forget(self, sightings: int, ids: int) -> None:
+        """Forget all sightings but the first so many, and the lines with larger ids."""
+        del self.seen[sightings:], self.seen_from[sightings:], self.epsilons[sightings:]
+        self.lines = {line: known for line, known in self.lines.items() if line < ids}
+        for known in self.lines.values():
+            known.sightings = [number for number in known.sightings if number < sightings]
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return everything as plain arrays, fit for `numpy.savez`."""
         owner = np.full(len(self.seen), -1, dtype=np.int64)
@@ -70,10 +106,11 @@ class Record:
             "format": np.array(FORMAT),
             "prior_pose_world": self.pose_world,
             "prior_cov": self.pose_cov,
-            "odometry": np.array(self.motions).reshape(-1, 3),
-            "odometry_cov": np.array(self.motion_covs).reshape(-1, 3, 3),
-            "poses_of_steps": np.array(self.poses_of_steps, dtype=np.int64),
-            "seen_from": np.array(self.seen_from, dtype=np.int64),
+            "odometry": np.array([o.motion for o in self.lead] + self.motions).reshape(-1, 3),
+            "odometry_cov": np.array([o.cov for o in self.lead] + self.motion_covs).reshape(-1, 3, 3),
+            "poses_of_steps": np.array(self.steps, dtype=np.int64),
+            "first_pose": np.array(len(self.lead)),
+            "seen_from": len(self.lead) + np.array(self.seen_from, dtype=np.int64),
             "seen": np.array(self.seen, dtype=np.float64).reshape(-1, 5),
             "seen_line": owner,
             "seen_epsilon": np.array(self.epsilons, dtype=np.float64),
@@ -97,13 +134,16 @@ class Record:
         for number, line in enumerate(arrays["seen_line"].tolist()):
             if line >= 0:
                 lines[line].sightings.append(number)
+        first = int(arrays["first_pose"])
+        motions, covs = list(np.array(arrays["odometry"])), list(np.array(arrays["odometry_cov"]))
         return cls(
             pose_world=np.array(arrays["prior_pose_world"]),
             pose_cov=np.array(arrays["prior_cov"]),
-            motions=list(np.array(arrays["odometry"])),
-            motion_covs=list(np.array(arrays["odometry_cov"])),
-            poses_of_steps=arrays["poses_of_steps"].tolist(),
-            seen_from=arrays["seen_from"].tolist(),
+            lead=[Odometry(*both) for both in zip(motions[:first], covs[:first], strict=True)],
+            motions=motions[first:],
+            motion_covs=covs[first:],
+            steps=arrays["poses_of_steps"].tolist(),
+            seen_from=(arrays["seen_from"] - first).tolist(),
             seen=[tuple(row) for row in arrays["seen"].tolist()],
             epsilons=arrays["seen_epsilon"].tolist(),
             lines=lines,

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.special import chdtri
 
-from ..geometry.poses import compose, rotation, wrap
-from .graph_factors import line_factor, line_key, odometry_factor, prior_factor
+from ..geometry.poses import compose, wrap
+from .graph_ahead import Ahead
+from .graph_factors import line_factor, line_key, odometry_factor, origin_factor
 from .graph_guess import guess
 from .graph_isam import GraphConfig, Isam
 from .graph_loose import Loose, wrapped
@@ -17,6 +19,13 @@ from .graph_record import Record
 
 MOST_TURN = 1.2
 """Sightings are linearised no farther than this from the prediction, rad: beyond pi/2 a line is seen from behind."""
+
+BEYOND = float(chdtri(3, 1e-9))
+"""A pose may depart by this much, in chi-square, from where it was expected: further off once in 1e9 scans."""
+
+
+class DivergedError(RuntimeError):
+    """A solution is not finite, or is where the prediction rules it out: the next one would be linearised nowhere."""
 
 
 class Solver:
@@ -52,10 +61,14 @@ class Solver:
         """The last pose entered: predicted until it is settled."""
         self.last = 0
         """Index of that pose."""
+        self._settled_at = -1
+        """Index of the last pose that is settled."""
+        self._ahead = Ahead(self.pose)
+        """Where the wheels alone lead from there."""
+        self._expected_cov = np.zeros((0, 0))
+        """Covariance of the last settled pose before the present solution, body frame; empty before the first."""
 
-        body = np.eye(3)
-        body[:2, :2] = rotation(-record.pose_world[2])
-        self.isam.enter(prior_factor(body @ record.pose_cov @ body.T))
+        self.isam.enter(origin_factor())
         self.isam.enter_pose(0, self.pose)
         for pose in poses[1:]:
             self.enter_pose(pose)
@@ -80,6 +93,7 @@ class Solver:
         self.isam.enter_pose(self.last, self.pose)
         motion, cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
         self.isam.enter(odometry_factor(self.last, motion, cov))
+        self._ahead.move(motion, cov)
         self._is_settled = False
 
     def enter_scan(
@@ -146,9 +160,14 @@ class Solver:
     # -- solving ----------------------------------------------------------------------------------------------------
 
     def settle(self) -> None:
-        """Solve for what was entered since the last time."""
+        """Solve for what was entered since the last time.
+
+        Raises DivergedError for a solution that the prediction rules out, and what GTSAM raises: RuntimeError,
+        ValueError or IndexError. The points of linearisation are then those of the last solution that held.
+        """
         if self._is_settled:
             return
+        self._expected_cov = self.pose_cov() if self._settled_at >= 0 else np.zeros((0, 0))
         self._push()
         for _ in range(self._config.passes):
             if not self._tighten() and self._astray.max(initial=0.0) <= self._config.closure:
@@ -157,7 +176,7 @@ class Solver:
         if self.isam.is_waiting:
             self._push()
         self._loose.calm()
-        self._is_settled = True
+        self._is_settled, self._settled_at, self._ahead = True, self.last, Ahead(self.pose)
 
     def _push(self) -> None:
         """Hand over what was collected, linearise anew what is astray, and estimate."""
@@ -165,13 +184,33 @@ class Solver:
         self.isam.push(self.last, relinearise=bool(len(astray)))
         self.pose = self.isam.pose(self.last)
         self._pose_cov = np.zeros((0, 0))  # Asked of iSAM2 when wanted.
+        self._hold_pose()
         if not self._keys:
             return
         self._linearised_at[astray] = self.isam.lines([self._keys[row] for row in astray.tolist()])
         moved = self.isam.moved(self._keys)
+        if not np.abs(moved[:, 0]).max() <= MOST_TURN or not np.all(np.isfinite(moved[:, 1])):
+            raise DivergedError("expected lines that turn by less than 1.2 rad at once, found one that turns further")
         self.lines = self._linearised_at + moved
         self.lines[:, 0] = wrap(self.lines[:, 0])
         self._astray = np.max(np.abs(moved) / self._thresholds, axis=1)
+
+    def _hold_pose(self) -> None:
+        """Hold the pose against its prediction; raises DivergedError where both cannot be.
+
+        Within a few thresholds of linearisation any solution is as good as its factors, whatever was expected.
+        """
+        off = self.pose - self._ahead.pose
+        off[2] = wrap(off[2])
+        linear = self._thresholds[[1, 1, 0]]
+        beyond = float(np.sum(np.square(off / linear)))
+        if BEYOND < beyond < np.inf:
+            if not len(self._expected_cov):  # The first solution of a graph made anew: nothing was expected.
+                return
+            cov = np.diag(linear**2) + self._ahead.pose_cov(self._expected_cov)
+            beyond = float(off @ np.linalg.solve(cov, off))
+        if not beyond <= BEYOND:
+            raise DivergedError(f"expected a pose within chi-square {BEYOND:.0f} of its prediction, found {beyond:.3g}")
 
     def _tighten(self) -> int:
         """Collect anew the sightings that their line's present direction puts wrong; return how many."""
@@ -192,19 +231,22 @@ class Solver:
     # -- asking -----------------------------------------------------------------------------------------------------
 
     def poses(self, linearisation: bool = False) -> Float[np.ndarray, "p 3"]:
-        """Return the present estimates of all poses, or the points at which they are linearised."""
-        self.settle()
+        """Return the estimates of all poses when it was settled, or the points at which they are linearised."""
         return self.isam.all(linearisation).poses(self.last + 1)
 
     def all_lines(self, linearisation: bool = False) -> Float[np.ndarray, "n 2"]:
-        """Return the present estimates of all lines of the record, shown or not, or where they are linearised."""
-        self.settle()
+        """Return the estimates of all lines of the record, shown or not, or where they are linearised."""
         return self.isam.all(linearisation).lines(list(self._record.lines))
 
+    def start(self) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
+        """Return where to begin anew: the points of linearisation of all that was entered, settled or not."""
+        values = self.isam.linearisation()
+        return values.poses(self.last + 1), values.lines(list(self._record.lines))
+
     def pose_cov(self) -> Float[np.ndarray, "3 3"]:
-        """Return the covariance of the last pose, body frame."""
+        """Return the covariance of the last pose that is settled, body frame."""
         if not len(self._pose_cov):
-            self._pose_cov = self.isam.pose_cov(self.last)
+            self._pose_cov = self.isam.pose_cov(self._settled_at)
         return self._pose_cov
 
     def joint_cov(self, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "s s"]:
