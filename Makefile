@@ -5,7 +5,7 @@ PLANS ?= ../shared/data/plans
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts strategies bias heading rules rules-held rules-table
+.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts schools strategies bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -38,6 +38,10 @@ bench: setup
 
 random: setup
 	$(BIN)/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
+
+# 312 runs of 1,500 noisy steps, about two hours of one core; begun again, it goes on where it was.
+schools: setup
+	$(BIN)/python -m experiments.schools_study --plans $(PLANS) --out results/schools-short.jsonl
 
 bias: setup
 	$(BIN)/python -m experiments.bias_study --strategies nearest-robot nearest-start --out results/bias.csv

@@ -70,7 +70,7 @@ def one(config: TrialConfig) -> Row:
         return row | {"world": Path(config.world).stem, "status": "not loaded", "reason": str(error)}
     except Exception as error:  # a trial that cannot even be scored is a row of the table, not the end of it
         reason = f"{type(error).__name__}: {error}"
-        return row | {"world": Path(config.world).stem, "status": "failed", "reason": reason}
+        return row | {"world": Path(config.world).stem, "status": "failed", "reason": reason, "raised": True}
     summary = result.summary
     row |= {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
     for timed in TIMED:
@@ -78,6 +78,8 @@ def one(config: TrialConfig) -> Row:
     for pair, distance in summary.get("distances", {}).items():
         mapped = distance["mapped_m"]
         row[f"distance_error_{pair}_m"] = None if mapped is None else mapped - distance["true_m"]
+    row["raised"] = bool(result.ending.traceback)
+    row["recoveries"] = getattr(result.scenario.backend, "recoveries", None)
     row["set_aside"] = len(summary.get("set_aside", []))
     row["reachable_way"] = summary.get("certificate", {}).get("reachable_way")
     if result.log is not None:

@@ -25,9 +25,9 @@ def smooth(backend: Backend, last: StochasticMap, steps: int) -> Smoothed | None
 
     Every belief before it goes stale.
     """
-    if not isinstance(backend, Smoother):
-        return None
     try:
+        if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
+            return None
         poses = backend.finish()[:steps]
         belief = backend.belief
         if len(poses) < steps or not np.array_equal(belief.ids, last.ids):
