@@ -17,7 +17,6 @@ def optimise(
     Sightings are linearised anew at each optimum, at most `rounds` times; after the second it hardly moves.
     """
     params = gtsam.LevenbergMarquardtParams()
-    params.setLinearSolverType("MULTIFRONTAL_QR")
     params.setRelativeErrorTol(1e-14)
     params.setAbsoluteErrorTol(1e-14)
     for _ in range(rounds):
