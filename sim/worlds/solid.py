@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from .drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError
+from .drawing import Drawing, WorldError
+from .limits import check_apart, check_extent
 from .rooms import WALL_M, areas
 from .text import name_of
 from .world import ROBOT_RADIUS_M, Reading, World
@@ -22,7 +23,7 @@ OUTSIDE_RATIO = 8.0
 def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = None) -> World:
     """Return the world of a drawing, `start` overriding its own; raise WorldError where no robot could drive in it."""
     solid = solid_of(drawing)
-    _check_extent(solid)
+    check_extent(np.reshape(solid.bounds, (2, 2)))
     enclosed, open_parts = _free_parts(solid, drawing.sheet)
     wanted = start if start is not None else drawing.start
     if wanted is None:
@@ -43,6 +44,7 @@ def solid_of(drawing: Drawing) -> BaseGeometry:
         raise WorldError("expected walls, found nothing drawn: draw dark lines or filled shapes")
     lines, solids = _on_grid(drawing.lines), _on_grid(drawing.solids)
     merged = shapely.line_merge(shapely.union_all(lines)) if len(lines) else shapely.LineString()
+    check_apart([merged], WALL_M)
     thick = merged.buffer(0.5 * WALL_M, cap_style="square", join_style="mitre", mitre_limit=MITRE)
     mended = [shapely.make_valid(polygon) for polygon in solids]
     return shapely.union_all([thick, *(part for shape in mended for part in areas(shape))])
@@ -54,22 +56,15 @@ def _on_grid(shapes: tuple[shapely.LineString, ...] | tuple[shapely.Polygon, ...
     return rounded[shapely.length(rounded) > 0]
 
 
-def _check_extent(solid: BaseGeometry) -> None:
-    x0, y0, x1, y1 = solid.bounds
-    extent = max(x1 - x0, y1 - y0)
-    if not SMALLEST_M <= extent <= LARGEST_M:
-        raise WorldError(
-            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m: correct the scale"
-        )
-
-
 def _free_parts(
     solid: BaseGeometry, sheet: shapely.Polygon | None
 ) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
     """Return the free parts that walls enclose, and those that end at the border of a picture."""
     page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
     # Slits are sealed first: two walls that all but touch keep the outside out.
-    parts = [piece for part in areas(page.difference(solid)) for piece in _opened(part, SLIT_M)]
+    free = areas(page.difference(solid))
+    check_apart(free, 0.5 * SLIT_M)
+    parts = [piece for part in free for piece in _opened(part, SLIT_M)]
     touching = shapely.distance(np.array(parts, dtype=object), page.exterior) < 1e-6
     enclosed = [part for part, out in zip(parts, touching, strict=True) if not out]
     outer = [part for part, out in zip(parts, touching, strict=True) if out]
@@ -139,7 +134,7 @@ def _part_with(start: Float[np.ndarray, "3"], solid: BaseGeometry, parts: list[s
     else:
         found = "outside all that walls enclose"
     raise WorldError(
-        f"expected a start in the free space, found ({start[0]:.3f}, {start[1]:.3f}) {found}:"
+        f"expected a start in the free space, found ({start[0]:.6g}, {start[1]:.6g}) {found}:"
         " move the start, or close the outer wall around it"
     )
 
@@ -150,7 +145,7 @@ def _check_clearance(free: shapely.Polygon, start: Float[np.ndarray, "3"]) -> No
     if clearance < ROBOT_RADIUS_M:
         raise WorldError(
             f"expected a start {ROBOT_RADIUS_M} m or more from all walls, found {clearance:.3f} m at"
-            f" ({start[0]:.3f}, {start[1]:.3f}): move the start"
+            f" ({start[0]:.6g}, {start[1]:.6g}): move the start"
         )
 
 

@@ -111,7 +111,7 @@ def _explored(rng: np.random.Generator, folder: Path, name: str, content: bytes)
     if rng.random() < 0.15:
         words += ["--scale", str(rng.choice(["0", "-1", "1e-300", "0.02", "1e300", "nan"]))]
     if rng.random() < 0.15:
-        words += ["--start", *rng.choice(["0", "4", "3", "1e300", "nan", "-1"], 2)]
+        words += ["--start", *map(str, rng.choice(["0", "4", "3", "1e300", "nan", "-1"], 2))]
     return [words]
 
 
