@@ -190,7 +190,9 @@ def test_a_map_that_is_none_gets_one_line_and_status_2(refused, change):
         refused("run", "map.npz", words, spoil)
 
 
-@pytest.mark.parametrize("spoil", [*PLACES.values(), lambda path: path.write_bytes(b"PK\x03\x04")], ids=str)
+@pytest.mark.parametrize(
+    "spoil", [*PLACES.values(), lambda path: path.write_bytes(b"PK\x03\x04")], ids=[*PLACES, "an archive cut short"]
+)
 def test_a_map_whose_file_is_none_gets_one_line_and_status_2(refused, spoil):
     refused("run", "map.npz", ["measure", "DIR"], spoil)
 
