@@ -151,10 +151,10 @@ def test_pairs_are_renamed_when_entries_are_merged():
     assert not kinks.cut
 
 
-def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0):
+def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, away_m=1.0):
     """Drive along a bent wall and back, exact wheels; return the update of each step."""
     way = np.concatenate([np.linspace(-4, 4, steps // 2), np.linspace(4, -4, steps - steps // 2)])
-    poses = np.column_stack([way, np.full(steps, -1.0), np.zeros(steps)])
+    poses = np.column_stack([way, np.full(steps, -away_m), np.zeros(steps)])
     mapper = Mapper(BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), MapperConfig(kinks=kinks))
     updates = []
     for k, scan in enumerate(scans(bent(turn_rad), poses, np.random.default_rng(seed), sigma)):
@@ -186,6 +186,18 @@ def test_the_sides_of_a_bend_never_overlap(seed):
     one, other = np.sort(last.ends_world[..., 0], axis=-1)[np.argsort(last.ends_world[..., 0].min(axis=-1))]
     assert -0.5 < one[1] < 0.5
     assert abs(other[0] - one[1]) < 0.06
+
+
+@pytest.mark.parametrize("away_m", [2.5, 3.0])
+def test_a_bend_that_only_many_scans_together_show_makes_two_walls_of_one(away_m):
+    """From so far one line fits both sides in every scan; without the sums over the scans they stay one wall."""
+    turn = np.deg2rad(0.5)
+    updates = drive(KinksConfig(), turn, steps=120, sigma=0.01, away_m=away_m)
+    assert len(updates[15].map) == 1
+    first = next(k for k, update in enumerate(updates) if len(update.map) == 2)
+    assert all(len(update.map) == 2 for update in updates[first:])
+    alpha = updates[-1].map.belief.means[:, 0]
+    assert abs(alpha[0] - alpha[1]) == pytest.approx(turn, abs=np.deg2rad(0.25))
 
 
 def test_a_straight_wall_stays_one_and_no_number_is_changed():
