@@ -28,6 +28,18 @@ test-long: setup
 mutants: setup
 	$(BIN)/python tests/mutants.py $(MODULE)
 
+.PHONY: plans
+
+# Do all the plans and pictures of a folder load? PLANS=...
+plans: setup
+	$(BIN)/python -m studies.plans $(dir $(PLANS))
+
+.PHONY: kills
+
+# Kills runs and campaigns at random moments, lets them go on, and holds what they leave against undisturbed ones.
+kills: setup
+	$(BIN)/python -m studies.kills
+
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	$(BIN)/mypy

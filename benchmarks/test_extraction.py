@@ -15,7 +15,7 @@ from sim.worlds import load
 from slam.extraction import extract
 from slam.robot import Scan
 
-PLANS = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans"
+PLANS = Path(__file__).parents[1] / "tests" / "data" / "plans"
 
 
 @pytest.fixture(autouse=True)
@@ -42,12 +42,10 @@ def scans(world_name: str, count: int, config: LidarConfig) -> list[Scan]:
 
 
 @pytest.mark.parametrize("beams", [180, 360])
-@pytest.mark.parametrize("world", ["rooms", "paper-fig5", "lifull_05b17c6b40dd_0001.json"])
+@pytest.mark.parametrize("world", ["rooms", "paper-fig5", "apartment.json"])
 def test_one_extraction(benchmark: BenchmarkFixture, world: str, beams: int) -> None:
     """Typical scans in turn; the target is a median of 0.5 ms for 180 beams."""
     if world.endswith(".json"):
-        if not (PLANS / world).exists():
-            pytest.skip("the shared plans are not here")
         world = str(PLANS / world)
     taken = itertools.cycle(scans(world, 40, LidarConfig(beams=beams)))
     benchmark(lambda: extract(next(taken)))

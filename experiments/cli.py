@@ -10,7 +10,7 @@ import tyro
 
 from .compare_command import Compare
 from .explore_command import Explore
-from .interrupts import nothing_half_built_speaks
+from .interrupts import INTERRUPTED, nothing_half_built_speaks
 from .listings import Backends, Strategies, Worlds
 from .measure_command import Measure
 from .replay_command import Replay
@@ -20,7 +20,7 @@ from .scenario import UsageError, choose
 from .streams import Lasting, is_full, lasting_streams, one_line
 from .view_command import View
 
-FAILED, BAD_USAGE, INTERRUPTED = 1, 2, 130
+FAILED, BAD_USAGE = 1, 2
 
 
 @runtime_checkable
@@ -77,7 +77,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _parse(arguments).run()
     except UsageError as error:
         _tell(error)
-        return BAD_USAGE
+        return error.exit_status
     except OSError as error:
         place = "" if error.filename is None else f" at {error.filename}"
         _tell(f"expected files that can be read and written, found {error.strerror or error}{place}: check that place")

@@ -15,12 +15,14 @@ from .campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_cam
 from .campaign.runner import on_cores, run_campaign
 from .campaign.store import opened
 from .campaign.tables import write_tables
+from .campaign.words import left_out
 from .console import say
 from .echo import echo_world
+from .interrupts import INTERRUPTED
 from .replay import Association
 from .scenario import P0, UsageError, load_world
 
-FAILED, INTERRUPTED = 1, 130
+FAILED = 1
 JOBS_A_CORE = 8
 """Processes beyond this for each core only take memory from one another."""
 
@@ -111,8 +113,10 @@ class Compare:
                 print(f"chainslam: {error}; what is done is kept in {self.out}, the same command goes on",
                       file=sys.stderr)  # fmt: skip
                 return FAILED
-            write_tables(self.out, campaign, trials(campaign), store.record)
+            said = write_tables(self.out, campaign, trials(campaign), store.record)
         print(tally.words())
+        for words in left_out(said):
+            print(words)
         say(f"results in {self.out}")
         problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
         for problem in problems:

@@ -1,27 +1,29 @@
 """`chainslam explore`: one world, one robot, one map."""
 
-import os
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from explore.explorer import ExplorerConfig
 from explore.mission import MissionConfig
 from explore.step import Step
+from sim.worlds import World
 
 from .console import say
 from .echo import echo_world
 from .interrupts import first_interrupt_waits
 from .progress import print_summary, progress
-from .results import write_results
-from .saved import read_saved
+from .results import config_record, write_results
+from .run_folder import clear_leftovers, held, prepare, refuse_others, settle
+from .running_log import RunningLog
+from .saved import SavedRun, read_saved
 from .scenario import P0, TrialConfig, UsageError, build, check, load_world
 from .timelines import Recording
-from .trial import default_mission, run_scenario
+from .trial import TrialResult, default_mission, run_scenario
 
+MAX_STEPS = TrialConfig.max_steps
 SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale")
 """What a saved run has settled; only its limits may be others when it goes on."""
 
@@ -44,8 +46,8 @@ class Explore:
     """Exact ranges and wheels, the estimate started at the truth; the models keep the stated noise."""
     sweep: bool = True
     """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
-    max_steps: int = 100_000
-    """The run is stopped after this many scans."""
+    max_steps: int | None = None
+    """The run is stopped after this many scans; 100,000 where no number is named."""
     max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
     """The run is stopped once the wheels have counted this many metres."""
     time_limit: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
@@ -58,10 +60,14 @@ class Explore:
     scale: float | None = None
     """Metres per pixel or drawing unit, for files that do not say."""
     out: Path | None = None
-    """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED."""
+    """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. One that holds anything but the same run
+    is refused."""
+    force: bool = False
+    """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """In place of WORLD: go on with the run in this folder, up to the limits given now. It is driven again from its
-    start, which takes as long as it took, and leaves what a run that was never stopped would have left."""
+    """In place of WORLD: go on with the run in this folder, stopped or killed, up to its own limits or to those given
+    now. It is driven again from its start, which takes as long as it took, and leaves what a run that was never
+    stopped would have left."""
     rrd: Path | None = None
     """Record the run for Rerun's viewer into this file (`chainslam view FILE` opens it)."""
     view: bool = False
@@ -79,7 +85,7 @@ class Explore:
             seed=self.seed,
             p0=self.p0,
             errorless=self.errorless,
-            max_steps=self.max_steps,
+            max_steps=MAX_STEPS if self.max_steps is None else self.max_steps,
             start=self.start,
             scale=self.scale,
             max_path_m=self.max_path,
@@ -95,54 +101,117 @@ class Explore:
                     f"expected nothing but limits and --out with --resume, found {name}: the saved run has settled it"
                 )
         home = self.return_to_start or saved.mission.return_to_start
-        return replace(
-            saved,
-            max_steps=self.max_steps,
-            max_path_m=self.max_path,
-            time_limit_s=self.time_limit,
-            mission=replace(saved.mission, return_to_start=home),
-        )
+        going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
+        if self.max_steps is self.max_path is self.time_limit is None:
+            return going_on
+        steps = MAX_STEPS if self.max_steps is None else self.max_steps
+        return replace(going_on, max_steps=steps, max_path_m=self.max_path, time_limit_s=self.time_limit)
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
-        saved = None if self.resume is None else read_saved(self.resume)
-        trial = self.trial if saved is None else self.continued(saved.trial)
-        check(trial)
         if self.view and self.rrd is not None:
             raise UsageError("expected --rrd or --view, found both: the viewer can save what it shows")
+        if self.resume is not None:
+            return self._go_on(self.resume)
+        trial = self.trial
+        check(trial)
         world = load_world(trial.world, trial.start, trial.scale)
-        folder = self.out or self.resume or default_folder(world.name, trial)
+        folder = self.out or default_folder(world.name, trial)
         prepare(folder)
+        with held(folder):
+            config = config_record(trial)
+            refuse_others(folder, config, self.force)
+            settle(folder, config)
+            status = self._drive(trial, world, folder, config)
+        if self.out is None:
+            _point_latest_at(folder)
+        return status
+
+    def _go_on(self, source: Path) -> int:
+        """Take up the run in a folder; raises UsageError where there is none, or none that these limits let go on."""
+        # Read before any folder is made, and once more when nobody else can write into it.
+        check(self.continued(read_saved(source).trial))
+        folder = self.out or source
+        prepare(folder)
+        with held(folder):
+            saved = read_saved(source)
+            trial = self.continued(saved.trial)
+            world = load_world(trial.world, trial.start, trial.scale)
+            in_place = folder.samefile(source)
+            if in_place and saved.is_finished(trial):
+                print(f"the run in {source} is finished ({_why(saved)}): nothing done")
+                return 0
+            if saved.outlasts(trial.limits):
+                raise UsageError(
+                    f"expected limits beyond the {len(saved)} steps of the saved run, found one before their end: its"
+                    " files are left as they were, raise it"
+                )
+            config = config_record(trial)
+            if in_place:
+                clear_leftovers(folder)
+            else:
+                refuse_others(folder, config, self.force)
+                settle(folder, config)
+            return self._drive(trial, world, folder, config, saved)
+
+    def _drive(
+        self, trial: TrialConfig, world: World, folder: Path, config: dict[str, Any], saved: SavedRun | None = None
+    ) -> int:
+        """Drive a run, write it into its folder, and return the exit status; raises UsageError."""
         scenario = build(trial, world)
         echo_world(world)
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
+        log = RunningLog(folder, config, saved.kept if saved is not None else None)
         recording = Recording(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
-        with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
+        try:
+            with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
 
-            def watch(step: Step) -> None:
-                if saved is not None:
-                    saved.check(step)
-                show(step)
-                stop_if_asked()
+                def watch(step: Step) -> None:
+                    if saved is not None:
+                        saved.check(step)
+                    log.add(step)
+                    show(step)
+                    stop_if_asked()
 
-            recorded = recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
-            result = run_scenario(scenario, recorded, default_mission)
-        if saved is not None and len(result.log or ()) < len(saved.recording):
-            told = f"expected to pass the end of the saved run, found {result.ending.reason}: its files are left as"
-            print(f"chainslam: {told} they were", file=sys.stderr)
+                recorded = recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
+                result = run_scenario(scenario, recorded, default_mission)
+            log.check()
+        except UsageError:
             recording.drop()
-            return result.ending.exit_status or 2
-        problems = write_results(result, folder) + recording.close()
-        if self.out is None and saved is None:
-            _point_latest_at(folder)
-        print_summary(result.summary)
-        say(f"results in {folder}")
-        if result.ending.exit_status:
-            say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)
-        for problem in problems:
-            say(f"chainslam: not written: {problem}", stderr=True)
-        return result.ending.exit_status or (1 if problems else 0)
+            if saved is not None and saved.kept is None:
+                log.remove()
+            raise
+        finally:
+            log.close()
+        if saved is not None and result.ending.exit_status and len(result.log or ()) < len(saved):
+            recording.drop()
+            told = f"expected to pass the end of the saved run, found {result.ending.reason}: its files are left as"
+            say(f"chainslam: {told} they were, --resume goes on", stderr=True)
+            return result.ending.exit_status
+        problems = write_results(result, folder, config)
+        if not problems:
+            log.remove()
+        problems += recording.close()
+        return _told(result, folder, problems)
+
+
+def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
+    """Print what came of a run, and return the exit status."""
+    print_summary(result.summary)
+    say(f"results in {folder}")
+    if result.ending.exit_status:
+        say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)
+    for problem in problems:
+        say(f"chainslam: not written: {problem}", stderr=True)
+    return result.ending.exit_status or (1 if problems else 0)
+
+
+def _why(saved: SavedRun) -> str:
+    """Return in words why a finished run is over."""
+    assert saved.outcome is not None
+    words = f"{saved.outcome.status}: {saved.outcome}"
+    return words if saved.outcome.status == "complete" else f"{words}; raise the limit to go on"
 
 
 def default_folder(world: str, trial: TrialConfig) -> Path:
@@ -151,18 +220,6 @@ def default_folder(world: str, trial: TrialConfig) -> Path:
     parts += [trial.p0] if trial.p0 != "small" else []
     parts += ["errorless"] if trial.errorless else []
     return Path("results") / "-".join(parts)
-
-
-def prepare(folder: Path) -> None:
-    """Make a folder that files can be written into; raises UsageError, before anything is computed, where it cannot."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"expected a folder for the results, found {folder} ({error.strerror}): name another with --out"
-        ) from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"expected a folder to write into, found {folder} read-only: name another with --out")
 
 
 def _point_latest_at(folder: Path) -> None:

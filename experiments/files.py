@@ -5,6 +5,7 @@ import errno
 import json
 import math
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO, StringIO
@@ -13,9 +14,12 @@ from typing import Any
 
 import numpy as np
 
+PART = re.compile(r"\..+\.\d+\.part")
+"""The names of files that are being written; a process that was killed leaves them behind."""
+
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError."""
+    """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError that names it."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with temporary.open("wb") as file:
@@ -24,6 +28,10 @@ def write(path: Path, content: bytes) -> None:
             # Without this a power cut may leave the new name with nothing under it.
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        # A full disk names no file, and the temporary name is nobody's business.
+        error.filename, error.filename2 = str(path), None
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C as a wish to stop: the step in hand is finished, so that map, covariance and log belong together."""
+"""Ctrl-C, SIGTERM and SIGHUP as a wish to stop: the step in hand is finished, so that all results belong together."""
 
 import gc
 import signal
@@ -7,42 +7,48 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
+
+INTERRUPTED = 130
+"""The exit status of a command that was asked to stop."""
+STOPS = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP"}
+"""The signals that ask a command to stop, and what a person calls them."""
 
 
 @contextmanager
 def first_interrupt_waits() -> Iterator[Callable[[], None]]:
-    """Keep the first Ctrl-C until the yielded function is called, which raises it as KeyboardInterrupt.
+    """Keep the first of the signals until the yielded function is called, which raises it as KeyboardInterrupt.
 
-    A second one is raised at once, wherever the program is. Outside the main thread nothing is changed, nor where
-    Ctrl-C is ignored: a shell script starts so what is to run in the background, whatever is stopped in front of it.
+    A second one does what it did before, wherever the program is: it stops at once. Outside the main thread nothing
+    is changed, nor where a signal is ignored: a shell script starts so what is to run in the background, whatever is
+    stopped in front of it, and `nohup` what is to outlive its terminal.
     """
-    asked = False
+    asked: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        asked = True
-        signal.signal(signal.SIGINT, before)
+        asked.append(number)
+        _set(before)
 
     def check() -> None:
         if asked:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(STOPS[signal.Signals(asked[0])])
 
-    ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-    if ignored or threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    before = signal.signal(signal.SIGINT, note)
+    before: dict[signal.Signals, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        before = {number: handler for number in STOPS if (handler := signal.getsignal(number)) != signal.SIG_IGN}
     try:
+        _set(dict.fromkeys(before, note))
         yield check
     finally:
-        signal.signal(signal.SIGINT, before)
+        _set(before)
 
 
 @contextmanager
 def nothing_half_built_speaks() -> Iterator[None]:
-    """Let Ctrl-C leave objects half built in silence: what their finalizers then raise, Python would print.
+    """Let the signals leave objects half built in silence: what their finalizers then raise, Python would print.
 
-    Outside the main thread nothing is changed, nor where Ctrl-C does something else than raise KeyboardInterrupt.
+    SIGTERM and SIGHUP raise KeyboardInterrupt, too, as long as the block runs. Outside the main thread nothing is
+    changed, nor where a signal does something else than it does by itself.
     """
     hook, interrupted = sys.unraisablehook, False
 
@@ -50,17 +56,23 @@ def nothing_half_built_speaks() -> Iterator[None]:
         nonlocal interrupted
         interrupted = True
         sys.unraisablehook = lambda _: None
-        signal.default_int_handler(number, frame)
+        raise KeyboardInterrupt(STOPS[signal.Signals(number)])
 
-    other = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    if other or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signal.signal(signal.SIGINT, interrupt)
+    usual = (signal.default_int_handler, signal.SIG_DFL)
+    before: dict[signal.Signals, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        before = {number: handler for number in STOPS if (handler := signal.getsignal(number)) in usual}
     try:
+        _set(dict.fromkeys(before, interrupt))
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        _set(before)
         if interrupted:
             gc.collect()
-        sys.unraisablehook = hook
+        if before:
+            sys.unraisablehook = hook
+
+
+def _set(handlers: dict[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

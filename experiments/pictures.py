@@ -23,12 +23,12 @@ from viz.figures import draw_map, saved
 from viz.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
 from viz.shapes import hessian_cov
 
-from .explore_command import prepare
 from .files import write
 from .map_files import read_map
 from .reading import UnfitError, told
 from .replay import read_run
 from .results import LOG
+from .run_folder import prepare
 from .saved import TODO, read_trial
 from .saved_map import saved_map
 from .scenario import TrialConfig, UsageError, load_world

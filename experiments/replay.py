@@ -129,6 +129,11 @@ class ReplayedRobot(RecordedRobot):
         return odometry
 
 
+def replayed(run: RecordedRun, backend: str) -> TrialConfig:
+    """Return the settings of a recording's replay through a back end."""
+    return replace(run.trial, backend=backend, strategy=STRATEGY_OF_REPLAYS)
+
+
 def replay(
     run: RecordedRun,
     backend: str,
@@ -143,7 +148,7 @@ def replay(
     `world` saves loading it again; `around` may wrap the matcher, to listen to it; `extractor` finds the
     segments of a scan unless the options put the truth in its place.
     """
-    config = replace(run.trial, backend=backend, strategy=STRATEGY_OF_REPLAYS)
+    config = replayed(run, backend)
     check(config)
     world = world or load_world(config.world, config.start, config.scale)
     recording = run.recording

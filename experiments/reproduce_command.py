@@ -11,10 +11,10 @@ from rich.table import Table
 from viz.figures import saved
 
 from .console import plain_console
-from .explore_command import prepare
 from .files import json_bytes, write
 from .reproductions import REPRODUCTIONS, Reproduction
 from .reproductions.reproduction import Value
+from .run_folder import prepare
 from .scenario import UsageError, choose
 
 SEED_LARGEST = 2**32

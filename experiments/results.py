@@ -26,8 +26,16 @@ from .scores import odometry_path, pose_nees
 from .trial import TrialResult
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
-LOG = "log.npz"
+CONFIG, LOG, SUMMARY = "config.json", "log.npz", "summary.json"
+RUNNING = "log.arrow"
+"""The log while the run goes on: it is there until all results are."""
 RECORDING = "run.rrd"
+RUN_FILES = (
+    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, "map.npz", "map.geojson", "map.svg", "map.png", "map.pgm"),
+    *("map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
+    *(RECORDING, "report.html", "tables.tex"),
+)
+"""All that a run leaves, and what `view` and `report` make of it in the same folder."""
 REPLAY = "replay"
 """In `config.json`: the options of a replay; none for a run that drove."""
 STEP_COLUMNS = (
@@ -41,27 +49,29 @@ STEP_COLUMNS = (
 with the poses beside it, all that `pose_nees` is made of."""
 
 
-def write_results(result: TrialResult, folder: Path, replayed: dict[str, Any] | None = None) -> list[str]:
-    """Write every file of a trial into `folder`, and return, in words, what could not be written.
+def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | None = None) -> list[str]:
+    """Write every file of a trial into `folder`, and return, in words, what could not be written and why.
 
-    `replayed` holds the options of a replay, for `config.json`. One file that fails does not cost the others.
+    `config` is what `config.json` holds, by default the record of the trial's settings. One file that fails does not
+    cost the others.
     """
-    problems = []
-    for name, make in _files(result, replayed or {}).items():
+    problems: dict[str, list[str]] = {}
+    for name, make in _files(result, config or config_record(result.scenario.config)).items():
         try:
             write(folder / name, make())
         except Exception as error:  # nothing that was computed may be lost to one bad file
-            problems.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
+            known = error.strerror if isinstance(error, OSError) else None
+            why = known or f"{type(error).__name__}: {' '.join(str(error).split())}"
+            problems.setdefault(why, []).append(name)
     if not result.ending.traceback:
         (folder / "failure.txt").unlink(missing_ok=True)
-    return problems
+    return [f"{', '.join(names)}: {why}" for why, names in problems.items()]
 
 
-def _files(result: TrialResult, replayed: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
-    more = {REPLAY: replayed} if replayed else {}
+def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
     files: dict[str, Callable[[], bytes]] = {
-        "config.json": lambda: json_bytes(config_record(result.scenario.config) | more),
-        "summary.json": lambda: json_bytes({"format": FORMAT} | result.summary),
+        CONFIG: lambda: json_bytes(config),
+        SUMMARY: lambda: json_bytes({"format": FORMAT} | result.summary),
     }
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()

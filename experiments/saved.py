@@ -3,19 +3,25 @@
 A run is decided by its settings alone, so going on means driving it once more from the start, past the place where
 it stopped; that costs the time of the first part again, and leaves the bytes of a run that was never stopped. What the
 robot reports on the way is held against the log, so that a world or a software that has changed since is noticed.
+A run that was killed left no `log.npz`, or an older one, but the stream that it wrote as it went (`running_log.py`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
+from explore.limits import Limits
+from explore.outcome import Outcome
 from explore.step import Step
-from sim.replay import Recording, RecordingError, read_log, recording_of
+from sim.replay import RecordingError, read_log, recording_of
 
-from .reading import Each, Maybe, UnfitError, fit, read_json, told
-from .scenario import TrialConfig, UsageError
+from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
+from .results import LOG, RUNNING
+from .running_log import Kept, read_running
+from .scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
 
 TODO = "keep a run's files together, or make it anew"
 NUMBERS = (
@@ -39,30 +45,80 @@ SUMMARY = {
 
 @dataclass(frozen=True)
 class SavedRun:
-    """What a stopped run has left."""
+    """What a stopped or killed run has left; s steps, k beams."""
 
     trial: TrialConfig
-    recording: Recording
+    outcome: Outcome | None
+    """What the saved results say; None where they are not all there."""
+    kept: Kept | None
+    """The stream of a run that was killed, None where all results were written."""
+    time_s: Float[np.ndarray, " s"]
+    ranges_m: Float[np.ndarray, "s k"]
+    odometry: Float[np.ndarray, "s 3"]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
 
     def check(self, step: Step) -> None:
         """Raise UsageError where a step differs from the saved one of the same number."""
-        if step.index >= len(self.recording):
+        if step.index >= len(self):
             return
-        same = np.array_equal(step.scan.ranges_m, self.recording.ranges_m[step.index], equal_nan=True)
-        if not same or not np.array_equal(step.odometry.motion, self.recording.odometry[step.index]):
+        same = np.array_equal(step.scan.ranges_m, self.ranges_m[step.index], equal_nan=True)
+        if not same or not np.array_equal(step.odometry.motion, self.odometry[step.index]):
             raise UsageError(
                 f"expected the saved run again, found another from step {step.index} on (the world, the software or"
                 " the machine has changed): explore anew"
             )
 
+    def is_finished(self, trial: TrialConfig) -> bool:
+        """Return whether driving again with these settings would leave what is there already."""
+        if self.kept is not None or self.outcome is None or self.outcome in (Outcome.INTERRUPTED, Outcome.FAILED):
+            return False
+        if self.outcome.status == "complete":
+            # It ended by itself: no other limit makes it longer.
+            saved = self.trial
+            trial = replace(
+                trial, max_steps=saved.max_steps, max_path_m=saved.max_path_m, time_limit_s=saved.time_limit_s
+            )
+        return trial == self.trial
+
+    def outlasts(self, limits: Limits) -> bool:
+        """Return whether the saved results go further than these limits would let the run go."""
+        if self.outcome is None or not len(self):
+            return False
+        way_m = np.cumsum(np.hypot(self.odometry[:-1, 0], self.odometry[:-1, 1]))
+        return (
+            (limits.steps is not None and limits.steps < len(self))
+            or (limits.path_m is not None and bool(np.any(way_m >= limits.path_m)))
+            or (limits.time_s is not None and bool(np.any(self.time_s[:-1] >= limits.time_s)))
+        )
+
 
 def read_saved(folder: Path) -> SavedRun:
-    """Read `config.json` and `log.npz` of a run; raises UsageError, in one line, for anything else."""
-    trial = read_trial(folder / "config.json")
+    """Read what a run left in its folder, whatever ended it; raises UsageError where none can go on."""
+    kept = read_running(folder)
+    trial = read_trial(folder / "config.json") if kept is None else _trial_of(kept, folder / RUNNING)
+    if trial.strategy == STRATEGY_OF_REPLAYS:
+        raise UsageError(f"expected the folder of a run that drove, found that of a replay in {folder}: replay again")
+    time_s, ranges_m, odometry = np.empty(0), np.empty((0, 0)), np.empty((0, 3))
+    outcome = None
+    if (folder / LOG).exists():
+        outcome = _outcome(folder / "summary.json")
+        try:
+            log = recording_of(read_log(folder / LOG))
+        except RecordingError as error:
+            raise UsageError(str(error)) from error
+        time_s, ranges_m, odometry = log.time_s, log.ranges_m, log.odometry
+    if kept is not None and len(kept.time_s) > len(time_s):
+        time_s, ranges_m, odometry = kept.time_s, kept.ranges_m, kept.odometry
+    return SavedRun(trial, outcome, kept, time_s, ranges_m, odometry)
+
+
+def _outcome(summary: Path) -> Outcome | None:
     try:
-        return SavedRun(trial, recording_of(read_log(folder / "log.npz")))
-    except RecordingError as error:
-        raise UsageError(str(error)) from error
+        return Outcome(read_json(summary, {"outcome": str}, TODO)["outcome"])
+    except ValueError:
+        return None
 
 
 @dataclass(frozen=True)
@@ -81,7 +137,16 @@ CONFIG = {"trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "
 
 def read_config(path: Path) -> SavedConfig:
     """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
-    said = read_json(path, CONFIG, TODO)
+    return _config_of(read_json(path, CONFIG, TODO), path)
+
+
+def _trial_of(kept: Kept, path: Path) -> TrialConfig:
+    with told(path, TODO):
+        said = parse_json(kept.config, CONFIG)
+    return _config_of(said, path).trial
+
+
+def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
     with told(path, TODO):
         for key in said.keys() - {"format", *(key.removesuffix("?") for key in CONFIG)}:
             raise UnfitError(f"an unknown {key[:40]!r}")

@@ -34,6 +34,9 @@ STRATEGY_OF_REPLAYS = "none"
 class UsageError(ValueError):
     """Bad usage or bad input, told in one line: what was expected, what was found, what to do."""
 
+    exit_status = 2
+    """What the command ends in."""
+
 
 @dataclass(frozen=True)
 class TrialConfig:

@@ -68,7 +68,7 @@ def table(rows: list[dict[str, Any]], by_world: bool) -> Table:
     shown = Table(title=f"{len(rows)} trials", title_justify="left")
     shown.add_column("world", overflow="fold")
     columns = "complete|coverage min|mean|own frame|closed|false|duplicates|collisions|path m"
-    columns += "|pose ANEES|in band|map ANEES|wheels m|step ms|planning ms|growth|MiB"
+    columns += "|pose ANEES|in band|map ANEES|without: pose, map|wheels m|step ms|planning ms|growth|MiB"
     for column in columns.split("|"):
         shown.add_column(column, justify="right")
     if by_world:
@@ -92,11 +92,19 @@ def _cells(rows: list[dict[str, Any]]) -> list[str]:
         f"{closed}/{len(rows)}",
         *(str(sum(int(row[key]) for row in scored)) for key in ("false_matches", "duplicate_lines", "collisions")),
         _mean(scored, "path_length_m", 1),
-        *(_mean(scored, key, 2) for key in ("pose_anees", "pose_nees_in_band", "map_anees", "odometry_max_m")),
+        *(_mean(scored, key, 2) for key in ("pose_anees", "pose_nees_in_band", "map_anees")),
+        _without(scored),
+        _mean(scored, "odometry_max_m", 2),
         *(_mean(scored, key, 1) for key in ("step_ms_mean", "planning_ms_mean")),
         f"{_growth(scored):.2f}",
         f"{np.max(_values(scored, 'peak_mib'), initial=0.0):.0f}",
     ]
+
+
+def _without(rows: list[dict[str, Any]]) -> str:
+    """Return how many noisy trials have no pose or map ANEES: a covariance of theirs is not positive definite."""
+    noisy = [row for row in rows if not row["errorless"]]
+    return ", ".join(str(len(noisy) - len(_values(noisy, key))) for key in ("pose_anees", "map_anees"))
 
 
 def _growth(rows: list[dict[str, Any]]) -> float:

@@ -88,8 +88,8 @@ def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
             watch(step)
             if step.outcome is not None:
                 return Ending(step.outcome, step.reason)
-    except KeyboardInterrupt:
-        return Ending(Outcome.INTERRUPTED, "interrupted by Ctrl-C")
+    except KeyboardInterrupt as interrupt:
+        return Ending(Outcome.INTERRUPTED, f"interrupted by {interrupt or 'Ctrl-C'}")
     except UsageError:
         raise
     except Exception as error:  # a run that fails keeps what it has computed; the trace goes beside the results

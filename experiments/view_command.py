@@ -13,9 +13,9 @@ from viz.viewer import Viewer, ViewerError, available
 
 from .campaign.film import record_campaign
 from .campaign.store import read_campaigns
-from .explore_command import prepare
 from .replay import RecordedRun, ReplayOptions, read_options, read_run, replay
 from .results import LOG, RECORDING
+from .run_folder import prepare
 from .scenario import UsageError, load_world
 from .timelines import Recording
 

@@ -24,14 +24,16 @@ RESULTS = ROOT / "results" / "mutants"
 ROOMS = ("slam", "explore", "sim", "viz", "experiments")
 BUDGET_S = 900.0
 """What a module may take; what was not tried by then is counted as such, and the next run goes on with it."""
-KILLED, SURVIVED = {1, 3, 24, 36, 152, 255, -24, -9, -11}, {0, 5, 33}
-"""Exit codes that mutmut keeps: a test failed, or never ended; none failed, or none comes by."""
+FAILED, ENDLESS, SURVIVED = {1, 3}, {24, 36, 152, 255, -24, -9, -11}, {0, 5, 33}
+"""Exit codes that mutmut keeps: a test failed; none came to its end; none failed, or none comes by."""
+KILLED = FAILED | ENDLESS
 CONFIG = """
 [tool.mutmut]
 source_paths = {rooms}
 only_mutate = ["{path}"]
 pytest_add_cli_args_test_selection = {tests}
 timeout_multiplier = 5.0
+timeout_constant = 10.0
 use_git_change_detection = false
 use_setproctitle = false
 
@@ -136,7 +138,7 @@ def copy(source: Path, target: Path) -> None:
 
 
 def forget_survivors(folder: Path, path: str) -> None:
-    """Have those tried again that survived, where anything but times has changed since."""
+    """Have those tried again that survived or did not end, where anything but times has changed since."""
     digest, seen = hashlib.sha256(), folder / "digest"
     for file in sorted(file for room in (*ROOMS, "tests") for file in (folder / room).rglob("*.*")):
         digest.update(file.read_bytes())
@@ -144,7 +146,7 @@ def forget_survivors(folder: Path, path: str) -> None:
     if meta.exists() and (not seen.exists() or seen.read_text() != digest.hexdigest()):
         kept = json.loads(meta.read_text())
         codes = kept["exit_code_by_key"]
-        kept["exit_code_by_key"] = {name: code if code in KILLED else None for name, code in codes.items()}
+        kept["exit_code_by_key"] = {name: code if code in FAILED else None for name, code in codes.items()}
         meta.write_text(json.dumps(kept))
         (folder / "mutants" / "mutmut-stats.json").unlink(missing_ok=True)
     seen.write_text(digest.hexdigest())

@@ -43,6 +43,9 @@ MEANS = (
     *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "heading_rmse_rad"),
     *("nis_mean", "nis_whiteness"),
 )
+MAY_LACK = ("pose_anees", "map_anees", "joint_anees", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far")
+"""Columns that a run may lack: one covariance that is not positive definite has no NEES, a map without a wall no error.
+Means leave such runs out, and `without` beside them says how many."""
 AT_MARKS = (
     *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),
     "duplicate_lines",
@@ -171,6 +174,7 @@ def cell_scores(rows: Sequence[Row]) -> Row:
         runs = runs_of(complete, Measure(name, False))
         found = estimate(runs)
         scores[name] = None if found is None else asdict(found) | {"median": float(np.median(list(runs.values())))}
+    scores["without"] = without(complete, MEANS)
     for name in SUMS:
         scores[name] = sum(row.get(name) or 0 for row in sound)
     scores["distances"] = sum(row.get("distances") or 0 for row in complete)
@@ -187,6 +191,15 @@ def cell_scores(rows: Sequence[Row]) -> Row:
         scores[f"{name}_median"] = float(np.median([row[name] for row in below])) if below else None
     scores["pose_nees_in_band"] = _mean([row.get("pose_nees_in_band") for row in complete])
     return scores
+
+
+def without(rows: Sequence[Row], names: Sequence[str]) -> dict[str, int]:
+    """Return, by column, how many rows have no value in it; only those of `names` that a run may lack."""
+    return {name: sum(not _is_told(row.get(name)) for row in rows) for name in names if name in MAY_LACK}
+
+
+def _is_told(value: float | None) -> bool:
+    return value is not None and math.isfinite(value)
 
 
 def _mean(values: Iterable[float | int | None]) -> float | None:
@@ -225,6 +238,7 @@ def _interaction(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
         if backend == BASELINE_BACKEND or strategy == BASELINE_STRATEGY:
             continue
         gains = []
+        runs = {(row["world"], row["seed"]) for row in select(rows, arm=arm)}
         for name in (backend, BASELINE_BACKEND):
             mine = select(rows, arm=arm, backend=name)
             pair = (runs_of(select(mine, strategy=s), measure) for s in (strategy, BASELINE_STRATEGY))
@@ -232,7 +246,7 @@ def _interaction(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
         yield {
             "arm": arm, "backend": backend, "strategy": strategy, "measure": measure.name,
             "kind": "ratio of ratios" if measure.is_ratio else "difference of differences",
-            **_told(paired(*gains), measure),
+            **_told(paired(*gains), measure), "pairs_without_value": len(runs) - len(paired(*gains)),
         }  # fmt: skip
 
 
@@ -250,5 +264,6 @@ def _marks(rows: Sequence[Row]) -> list[Row]:
             dict(zip(("world", "strategy", "backend", "arm", "metres"), cell, strict=True))
             | {state: states.count(state) for state in ("driving", "finished", "failed")}
             | scores
+            | {"without": without(alive, AT_MARKS)}
         )
     return found

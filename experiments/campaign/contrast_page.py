@@ -101,16 +101,29 @@ def _counts(said: dict[str, Any]) -> Sequence[str]:
 
 
 def _differences(rows: Sequence[Row]) -> PageTable:
-    header = ("back end", "arm", "measure", "kind", "value", "95 % interval", "effect size", "runs", "clear")
+    header = (
+        "back end",
+        "arm",
+        "measure",
+        "kind",
+        "value",
+        "95 % interval",
+        "effect size",
+        "runs",
+        "left out",
+        "clear",
+    )
     told = tuple(
         (
             row["backend"], ARMS_SHORT[arm_of(row)], MEASURE_WORDS[row["measure"]], row["kind"], *_value(row),
-            number(row.get("effect_size"), 2), number(row["runs"]), "yes" if _is_clear(row) else "",
+            number(row.get("effect_size"), 2), number(row["runs"]),
+            number(row["pairs_without_value"]), "yes" if _is_clear(row) else "",
         )
         for row in rows
         if row["value"] is not None
     )  # fmt: skip
-    return PageTable("Second against first", header, told)
+    note = "Left out: runs that did not complete in both, or for which one has no such value."
+    return PageTable("Second against first", header, told, note)
 
 
 def _trials(rows: Sequence[Row]) -> list[Section]:

@@ -55,6 +55,11 @@ def _below(found: Row) -> str:
     )
 
 
+def _anees(found: Row) -> str:
+    left_out = f"; {number(found['without'])} complete runs have none" if found["without"] else ""
+    return (f"{number(found['mean'])} ({interval(found)})" if "mean" in found else NONE) + left_out
+
+
 def _held(found: Row) -> str:
     if "mean" not in found:
         return NONE
@@ -79,7 +84,7 @@ SAYS: dict[str, Callable[[Row], str]] = {
     "trace": _trace,
     "margin": lambda found: f"margin {number(found['margin'], 2)}",
     "below": _below,
-    "anees": lambda found: f"{number(found['mean'])} ({interval(found)})" if "mean" in found else NONE,
+    "anees": _anees,
     "held": _held,
     "doubles": _doubles,
 }

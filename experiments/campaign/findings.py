@@ -94,7 +94,7 @@ def _below(row: Row) -> tuple[Row, bool | None]:
 
 def _anees(row: Row) -> tuple[Row, bool | None]:
     pose = row["pose_anees"]
-    return dict(pose or {}), _inside(pose, ANEES_AIM)
+    return dict(pose or {}) | {"without": row["without"]["pose_anees"]}, _inside(pose, ANEES_AIM)
 
 
 def _held(row: Row) -> tuple[Row, bool | None]:

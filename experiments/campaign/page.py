@@ -100,25 +100,28 @@ def _estimators(campaign: Campaign, said: dict[str, Any]) -> list[Section]:
 
 
 _HONESTY_HEADER = (
-    *("back end", "complete", "pose ANEES (95 % interval)", "median", "map ANEES", "steps outside the band %"),
+    *("back end", "complete", "pose ANEES (95 % interval)", "median", "map ANEES", "without: pose, map"),
+    "steps outside the band %",
     *("distances held % (95 % interval)", "least trace", "bound margin"),
 )
 _NIS_HEADER = ("NIS", "whiteness")
 _HONESTY_WORDS = (
     "Over all worlds and strategies. ANEES: mean squared error over what the estimator expects; 1 is ideal, above it is"
-    " overconfident. Distances held: share of the 95 % intervals of corner distances that hold the truth. Least trace:"
-    " of the pose's covariance, over the initial one. Bound margin: negative where an estimator claims to know where"
-    " the world lies, which no scan tells. On true matches also the NIS and its correlation from scan to scan,"
-    " ideally 1 and 0.",
+    " overconfident. Without: complete runs that have no pose or map ANEES, since a covariance was not positive"
+    " definite (or the map has no wall): they are in no mean of it. Distances held: share of the 95 % intervals of"
+    " corner distances that hold the truth. Least trace: of the pose's covariance, over the initial one. Bound margin:"
+    " negative where an estimator claims to know where the world lies, which no scan tells. On true matches also the"
+    " NIS and its correlation from scan to scan, ideally 1 and 0.",
 )
 _ERROR_HEADER = (
-    *("back end", "walls, cm", "shape, cm", "path, cm", "heading, degrees", "entered twice", "of these merged"),
+    *("back end", "walls, cm", "shape, cm", "without", "path, cm", "heading, degrees", "entered twice"),
+    "of these merged",
     *("false matches", "missed matches %", "sightings"),
 )
 _ERROR_WORDS = (
     "Over all worlds and strategies, rms. Walls: after undoing the error of the start; shape: after the best shift and"
-    " turn of the whole map. Matches are held against the truth; a gate of 99 % misses 1 % of them where the estimate"
-    " is honest.",
+    " turn of the whole map; without: complete runs with no wall to hold against the truth. Matches are held against"
+    " the truth; a gate of 99 % misses 1 % of them where the estimate is honest.",
 )
 
 
@@ -129,6 +132,7 @@ def _honesty_row(row: dict[str, Any]) -> tuple[str, ...]:
         f"{row['complete']} of {row['trials']}",
         *((f"{number(pose['mean'])} ({interval(pose)})", number(pose["median"])) if pose else (NONE, NONE)),
         mean(row["map_anees"]),
+        ", ".join(number(row["without"].get(name, 0)) for name in ("pose_anees", "map_anees")),
         percent(row["steps_outside_band"]),
         share(row["distances_in_95"]),
         number(row["trace_least"]),
@@ -143,7 +147,9 @@ def _nis_row(row: dict[str, Any]) -> tuple[str, ...]:
 def _error_row(row: dict[str, Any]) -> tuple[str, ...]:
     return (
         row["backend"],
-        *(mean(row[name], scale=100.0) for name in ("wall_rmse_m", "wall_shape_m", "ate_m")),
+        *(mean(row[name], scale=100.0) for name in ("wall_rmse_m", "wall_shape_m")),
+        number(row["without"].get("wall_rmse_m", 0)),
+        mean(row["ate_m"], scale=100.0),
         mean(row["heading_rmse_rad"], scale=180.0 / pi),
         *(number(row[name]) for name in ("double_entries", "merges", "matches_false")),
         percent(row["missed_share"] and row["missed_share"]["mean"]),
@@ -153,7 +159,7 @@ def _error_row(row: dict[str, Any]) -> tuple[str, ...]:
 
 def _differences(rows: Sequence[dict[str, Any]]) -> tuple[PageTable, ...]:
     kept = [row for row in rows if row["measure"] in ("pose_anees", "wall_rmse_m", "ate_m", "double_entries")]
-    header = ("back end", "arm", "measure", "kind", "value", "95 % interval", "effect size", "runs", "better in %")
+    header = ("back end", "arm", "measure", "kind", "value", *_TOLD_HEADER)
     return (
         PageTable(
             "Back ends against full-ekf",
@@ -162,14 +168,19 @@ def _differences(rows: Sequence[dict[str, Any]]) -> tuple[PageTable, ...]:
                 (row["first"], ARMS_SHORT[row["arm"]], MEASURE_WORDS[row["measure"]], row["kind"], *_told(row))
                 for row in kept
             ),
-            "Effect size: mean paired difference over its standard deviation. Better: share of runs; a failure loses.",
+            "Effect size: mean paired difference over its standard deviation. Left out: runs that did not complete with"
+            " both, or for which one has no such value. Better: share of runs; a failure loses.",
         ),
     )
 
 
+_TOLD_HEADER = ("95 % interval", "effect size", "runs", "left out", "better in %")
+
+
 def _told(row: dict[str, Any]) -> tuple[str, ...]:
     better = row.get("first_better")
-    words = (number(row["value"]), interval(row), number(row.get("effect_size"), 2), number(row["runs"]))
+    counts = (number(row["runs"]), number(row["pairs_without_value"]))
+    words = (number(row["value"]), interval(row), number(row.get("effect_size"), 2), *counts)
     return (*words, number(None if better is None else 100 * better))
 
 
@@ -179,7 +190,7 @@ def _strategies(said: dict[str, Any]) -> PageTable:
         for row in said["strategies"]
         if row["arm"] == CLOSED and row["measure"] in ("pose_anees", "wall_rmse_m", "path_length_m")
     ]
-    header = ("strategy", "back end", "measure", "ratio", "95 % interval", "effect size", "runs", "better in %")
+    header = ("strategy", "back end", "measure", "ratio", *_TOLD_HEADER)
     rows = tuple((row["first"], row["backend"], MEASURE_WORDS[row["measure"]], *_told(row)) for row in kept)
     return PageTable("Strategies against nearest-robot, closed loop", header, rows)
 
@@ -190,7 +201,7 @@ def _interaction(said: dict[str, Any]) -> PageTable:
         for row in said["interaction"]
         if row["arm"] == CLOSED and row["measure"] in ("pose_anees", "wall_rmse_m", "path_length_m")
     ]
-    header = ("strategy", "back end", "measure", "ratio of ratios", "95 % interval", "effect size", "runs")
+    header = ("strategy", "back end", "measure", "ratio of ratios", *_TOLD_HEADER[:-1])
     rows = tuple((row["strategy"], row["backend"], MEASURE_WORDS[row["measure"]], *_told(row)[:-1]) for row in kept)
     return PageTable("Interaction of strategy and back end, closed loop", header, rows)
 
@@ -198,7 +209,7 @@ def _interaction(said: dict[str, Any]) -> PageTable:
 def _marks(said: dict[str, Any]) -> PageTable:
     header = (
         *("world", "strategy", "back end", "metres", "driving", "finished", "failed", "pose, cm", "walls, cm"),
-        *("pose ANEES so far", "coverage %"),
+        *("pose ANEES so far", "without: walls, ANEES", "coverage %"),
     )
     rows = tuple(
         (
@@ -206,6 +217,7 @@ def _marks(said: dict[str, Any]) -> PageTable:
             *(number(row[key]) for key in ("driving", "finished", "failed")),
             *(number(None if row[key] is None else 100 * row[key]) for key in ("pose_error_m", "wall_rmse_m")),
             number(row["pose_anees_so_far"]),
+            ", ".join(number(row["without"].get(name, 0)) for name in ("wall_rmse_m", "pose_anees_so_far")),
             number(None if row["coverage"] is None else 100 * row["coverage"]),
         )
         for row in said["marks"]

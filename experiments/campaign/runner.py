@@ -1,11 +1,13 @@
 """Runs what is missing of a campaign, on the cores of this machine or on a cluster; the results are the same."""
 
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from time import monotonic
 
 from joblib import Parallel, delayed
+from joblib.externals.loky.backend.resource_tracker import ensure_running
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -88,6 +90,7 @@ def on_cores(count: int | None) -> Executor:
     workers = count or len(os.sched_getaffinity(0))
 
     def execute(jobs: Iterable[Job]) -> Iterator[Done]:
+        deaf_tracker()
         waiting, strikes = iter(jobs), dict[Trial, int]()
         again: list[Job] = []
         while True:
@@ -114,6 +117,18 @@ def on_cores(count: int | None) -> Executor:
                         yield lost(job, f"its process died {STRIKES} times")
 
     return execute
+
+
+def deaf_tracker() -> None:
+    """Start loky's resource tracker deaf to SIGHUP, as it is to Ctrl-C and SIGTERM: it cleans up after its parent.
+
+    Killed with its terminal it would be begun anew, and complain about all that it knows nothing of.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])
+    try:
+        ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def lost(job: Job, reason: str) -> Done:

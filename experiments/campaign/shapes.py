@@ -20,14 +20,14 @@ TOLD: Shape = All(
         {"value": Word(None), "low": Word(None), "high": Word(None), "runs": Word(0)},
     ),
     ENDS,
-    {"measure": Word(*MEASURE_WORDS)},
+    {"measure": Word(*MEASURE_WORDS), "pairs_without_value": int},
 )
-DIFFERENCE: Shape = All(TOLD, {"kind": Word("ratio", "difference"), "pairs_without_value": int, "first_better": NUMBER})
+DIFFERENCE: Shape = All(TOLD, {"kind": Word("ratio", "difference"), "first_better": NUMBER})
 ARM = {"arm": Word(*ARMS)}
 STATES = dict.fromkeys(("driving", "finished", "failed"), int)
 CELL: Shape = All(
     ARM,
-    {"backend": str, **dict.fromkeys(("trials", "complete", "sound", "distances", *SUMS), int)},
+    {"backend": str, "without": Each(int), **dict.fromkeys(("trials", "complete", "sound", "distances", *SUMS), int)},
     dict.fromkeys(MEANS, Maybe(All(ESTIMATE, {"median": float}))),
     dict.fromkeys(("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"), Maybe(ESTIMATE)),
     dict.fromkeys(("trace_least", "bound_margin", "steps_outside_band"), NUMBER),
@@ -53,7 +53,7 @@ FOUND: dict[str, Shape] = {
         {"bound_runs_below": int, "sound": int, "bound_margin": float, "bound_margin_median": float,
          "bound_first_m_median": float, "bound_worst_m_median": float},
     ),
-    "anees": OneOf(ESTIMATE, {"mean!": None}),
+    "anees": All(OneOf(ESTIMATE, {"mean!": None}), {"without": int}),
     "held": All(OneOf(ESTIMATE, {"mean!": None}), {"distances": int, "replays": int}),
     "doubles": {"double_entries": int, "sightings": int, "beyond_a_run": Maybe(ESTIMATE)},
 }  # fmt: skip
@@ -66,7 +66,7 @@ COMPARISON: dict[str, Any] = {
     "interaction": [All(ARM, {"backend": str, "strategy": str, "kind": str}, TOLD)],
     "marks": [
         All(ARM, dict.fromkeys(("world", "strategy", "backend", "metres"), str), STATES,
-            dict.fromkeys(AT_MARKS, NUMBER))
+            {"without": Each(int), **dict.fromkeys(AT_MARKS, NUMBER)})
     ],
     "hypothesis": Maybe({
         "contender": str,

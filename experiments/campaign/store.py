@@ -1,6 +1,5 @@
 """A campaign's folder: a file for each trial, written whole or not at all, so that whatever stops it can go on."""
 
-import fcntl
 import json
 import os
 import sys
@@ -13,16 +12,16 @@ from typing import Any
 from sim.archive import regular
 from sim.replay import FORMAT
 
-from ..explore_command import prepare
 from ..files import json_bytes, write
 from ..reading import Each, UnfitError, fit, read_json, told
 from ..results import config_record
+from ..run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
 from ..scenario import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .score import Record
 from .work import Done, unpack
 
-CONFIG, LOCK = "config.json", ".lock"
+CONFIG = "config.json"
 TODO = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
@@ -46,7 +45,12 @@ class Store:
         return self.path(trial).exists()
 
     def save(self, done: Done) -> None:
-        """Write what a job left, the recording before the record: a record means that all is there."""
+        """Write what a job left, the recording before the record: a record means that all is there.
+
+        Raises FolderGoneError where the campaign's folder is no longer there, and OSError.
+        """
+        if not (self.folder / CONFIG).exists():
+            raise FolderGoneError(self.folder)
         if done.log is not None:
             path = self.path(done.trial.recording)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +74,7 @@ class Store:
 def opened_anew(folder: Path) -> Iterator[None]:
     """Make a folder that must be empty, and keep it to this process; raises UsageError."""
     prepare(folder)
-    with _locked(folder):
+    with held(folder):
         if any(child.name != LOCK for child in folder.iterdir()):
             raise UsageError(f"expected an empty folder, found files in {folder}: name another with --out")
         yield
@@ -83,21 +87,10 @@ def opened(folder: Path, campaign: Campaign) -> Iterator[Store]:
     Raises UsageError for a folder of another campaign, and for one that another process is working in.
     """
     prepare(folder)
-    with _locked(folder):
+    with held(folder):
+        clear_leftovers(folder, "**/.*")
         _settle(folder, campaign)
-        for leftover in folder.rglob(".*.part"):
-            leftover.unlink()
         yield Store(folder, campaign)
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    with (folder / LOCK).open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise UsageError(f"expected a folder to itself, found another campaign at work in {folder}") from error
-        yield
 
 
 @dataclass(frozen=True)

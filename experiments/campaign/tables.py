@@ -125,6 +125,7 @@ def step_rows(records: Sequence[Record]) -> list[Row]:
                 **{key: records[0].summary[key] for key in KEYS},
                 "step": k,
                 "trials": int(going[:, k].sum()),
+                "without_nees": int(going[:, k].sum()) - len(nees),
                 "path_length_m": float(column["path_length_m"].mean()),
                 "pose_anees": anees,
                 "band_low": low / 3.0,
@@ -189,8 +190,11 @@ def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
 
 def write_tables(
     folder: Path, campaign: Campaign, trials: Sequence[Trial], record_of: Callable[[Trial], Record]
-) -> None:
-    """Write every table of some trials, which stand cell by cell, and what they say; `campaign` names the levels."""
+) -> Row:
+    """Write every table of some trials, which stand cell by cell, and return what they say: `comparison.json`.
+
+    `campaign` names the levels.
+    """
     rows, marks, steps, bands = [], [], [], []
     for _, cell in groupby(trials, key=lambda t: (t.world, t.strategy, t.backend, t.arm)):
         records = [record_of(trial) for trial in cell]
@@ -205,3 +209,4 @@ def write_tables(
     said = compare(campaign, rows, marks, bands)
     said |= {"format": FORMAT, "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     write(folder / "comparison.json", json_bytes(said))
+    return said

@@ -135,6 +135,18 @@ def share(found: dict[str, Any] | None) -> str:
     return NONE if found is None else f"{percent(found['mean'])} ({interval(found, 100.0)})"
 
 
+def left_out(said: dict[str, Any]) -> tuple[str, ...]:
+    """Return a line for each measure that complete runs lack, so that its means are those of the others."""
+    lines = []
+    for name, what in (("pose_anees", "pose ANEES"), ("map_anees", "map ANEES"), ("wall_rmse_m", "error of the walls")):
+        count = sum(row["without"][name] for row in said["pooled"])
+        if count:
+            complete = sum(row["complete"] for row in said["pooled"])
+            why = "no wall of known truth" if name == "wall_rmse_m" else "a covariance that is not positive definite"
+            lines.append(f"{count} of {complete} complete runs have no {what} ({why}): they are in no mean of it")
+    return tuple(lines)
+
+
 def command_of(campaign: Campaign) -> str:
     """Return the command that runs a campaign."""
     modes = [mode for mode in (CLOSED, "replay") if any(arm.startswith(mode) for arm in campaign.arms)]

@@ -55,11 +55,14 @@ def resampled(groups, draws, rng, by_building):
 GROUPS = [[0.0, 0.0, 0.0, 9.0], [1.0, 2.0, 30.0], [5.0, 5.5, 6.0, 6.5, 20.0], [3.0, 3.0, 12.0], [8.0, 9.0, 40.0, 41.0]]
 
 
-@pytest.mark.parametrize("by_building", [False, True])
-def test_an_interval_is_that_of_runs_drawn_one_at_a_time(by_building):
-    values = {(f"b{k}", seed): x for k, group in enumerate(GROUPS) for seed, x in enumerate(group)}
+SKEWED = [[0.0, 1.0, 2.0, 0.0, 1.0, 2.0, 0.0, 1.0, 2.0, 40.0]]
+
+
+@pytest.mark.parametrize(("groups", "by_building"), [(GROUPS, False), (GROUPS, True), (SKEWED, False)])
+def test_an_interval_is_that_of_runs_drawn_one_at_a_time(groups, by_building):
+    values = {(f"b{k}", seed): x for k, group in enumerate(groups) for seed, x in enumerate(group)}
     found = estimate(values)
-    low, high = resampled(GROUPS, 4000, np.random.default_rng(7), by_building)
+    low, high = resampled(groups, 4000, np.random.default_rng(7), by_building)
     ours = (found.low_buildings, found.high_buildings) if by_building else (found.low, found.high)
     width = high - low
     # Ends of two bootstraps of 4,000 draws differ by about 2 % of their width; a skewed group shows a mirrored one.

@@ -1,8 +1,7 @@
 """Every number in summary.json, from three steps and a few walls made by hand, against plain arithmetic."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import networkx as nx
 import numpy as np
 import pytest
 import shapely
@@ -10,76 +9,16 @@ from scipy.linalg import logm
 from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
-from experiments.association import Votes
 from experiments.coverage import alignment
-from experiments.records import Log
-from experiments.scenario import TrialConfig, build
-from experiments.scores import Ending, map_anees, nees_of_poses, summarise
+from experiments.scores import Ending, map_anees, nees_of_poses
 from experiments.truth import truth_of
-from explore.free_space import FreeSpace
 from explore.goal import SetAside
 from explore.outcome import Outcome
-from explore.step import Step
 from sim.robot import RobotConfig
 from slam.backend import Joint
 from slam.geometry.lines import through
 from slam.geometry.poses import compose, inverse, to_world
-from slam.matching import NO_MATCHES
-from slam.robot import Odometry, Scan
-from slam.segments import Segments
-
-BEAMS = 36
-TRUE = np.array([[1.0, 1.0, 0.0], [1.1, 1.5, 0.5], [1.2, 1.3, 3.1]])
-OFF = np.array([[0.3, 0.4, 0.1], [0.0, 0.0, -0.1], [0.6, 0.0, 0.2]])
-"""Their mean is far from zero: a score that takes it away tells another number."""
-COVS = np.array([np.diag(d) for d in ([0.01, 0.02, 0.03], [0.3, 0.1, 0.2], [0.2, 0.3, 0.1])])
-ENDING = Ending(Outcome.STEP_LIMIT, "a limit of 3 steps")
-COVS[2, 0, 1] = COVS[2, 1, 0] = 0.05
-
-
-@dataclass
-class Run:
-    """All that a summary is made of; a test changes what it is about."""
-
-    scenario: object
-    log: Log
-    votes: Votes
-    step: Step
-    joint: Joint | None
-    ending: Ending
-
-    def summary(self):
-        return summarise(self.scenario, self.log, self.votes, self.step, self.joint, self.ending)
-
-
-def log_of(estimated=None, **changes):
-    estimated = TRUE + OFF if estimated is None else estimated
-    kept = {
-        "time_s": np.arange(3.0), "bearings_rad": np.linspace(-np.pi, np.pi, BEAMS, endpoint=False),
-        "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": 0.01, "range_max_m": 4.0,
-        "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
-        "estimated_world": estimated, "estimated_cov": COVS, "true_world": TRUE,
-        "face_of_beam": np.full((3, BEAMS), -1), "path_length_m": np.array([0.0, 0.1, 0.25]),
-        "open_ends": np.array([1, 2, 4]), "lines": np.array([3, 3, 3]), "tentative": np.array([0, 0, 1]),
-        "closed_chains": np.array([0, 0, 1]), "set_aside": np.zeros(3, int), "seconds": np.array([0.006, 0.001, 0.002]),
-        "planning_seconds": np.array([0.0005, 0.0001, 0.0003]), "reasons": ("", "", ""),
-    }  # fmt: skip
-    return Log(**(kept | changes))
-
-
-def step_of(walls, chains, **changes):
-    scan = Scan(np.linspace(-np.pi, np.pi, BEAMS, endpoint=False), np.full(BEAMS, 0.5), 0.01, 4.0, 0.0)
-    none = np.zeros((0, 2))
-    segments = Segments(none, np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), none.astype(int), np.zeros(0, int),
-                        none.astype(int), np.zeros(0))  # fmt: skip
-    kept = {
-        "index": 2, "time_s": 2.0, "odometry": Odometry(np.zeros(3), np.zeros((3, 3))), "scan": scan,
-        "segments": segments, "matches": NO_MATCHES, "walls_of_segments": np.zeros(0, int), "map": walls,
-        "chains": chains, "free_space": FreeSpace(), "graph": nx.DiGraph(), "goal": None, "walls_to_follow": (),
-        "set_aside": (), "command": None, "path_length_m": 0.25, "seconds": 0.0, "planning_seconds": 0.0,
-        "outcome": Outcome.STEP_LIMIT, "reason": "",
-    }  # fmt: skip
-    return Step(**(kept | changes))
+from tests.experiments.by_hand import COVS, OFF, TRUE, log_of, true_map
 
 
 @pytest.fixture
@@ -88,14 +27,8 @@ def truth(world):
 
 
 @pytest.fixture
-def run(world, truth, make_map, make_chains):
-    """The true faces as a map, in a frame that is off by the start's error; every line labelled with its own face."""
-    scenario = build(TrialConfig("square", seed=4, p0="large"), world)
-    back = inverse(alignment(scenario.start_estimate, TRUE[0]))
-    walls = make_map(to_world(truth.faces, back), np.array([1.8, 1.3, -3.0]))
-    votes = Votes(truth, {k: 10 * np.eye(len(truth.faces), dtype=np.int64)[k] for k in range(len(truth.faces))})
-    chains = make_chains(truth.faces, truth.rings)
-    return Run(scenario, log_of(), votes, step_of(walls, chains), walls.belief.joint(walls.ids), ENDING)
+def run(world, make_map, make_chains):
+    return true_map(world, make_map, make_chains)
 
 
 def without_noise(run):
@@ -301,11 +234,12 @@ def test_a_wall_that_is_mapped_twice_is_counted_once_beyond_the_first(run, truth
     assert marked(twice, tentative=[9]).summary()["duplicate_lines"] == 1
 
 
-def test_the_distance_of_two_names_has_the_deviation_of_the_walls_along_it(run, make_map, truth):
+def test_the_distance_of_two_names_has_the_deviation_of_the_walls_along_it(run, make_map, make_chains, truth):
     """A and B are the ends of one side: only the two walls across it move them along it, each by its own sigma."""
     walls = make_map(truth.faces, np.zeros(3), cov_line=1e-4)
     scenario = replace(run.scenario, start_estimate=TRUE[0])
-    straight = replace(run, scenario=scenario, step=replace(run.step, map=walls), joint=walls.belief.joint(walls.ids))
+    step = replace(run.step, map=walls, chains=make_chains(truth.faces, truth.rings))
+    straight = replace(run, scenario=scenario, step=step, joint=walls.belief.joint(walls.ids))
     found = straight.summary()["distances"]["A-B"]
     # Each wall is known at its middle, 2.5 m from the corner, and turns about it by its own alpha.
     assert found["sigma_m"] == pytest.approx(np.sqrt(2 * 1e-4 * (1.0 + 2.5**2)))

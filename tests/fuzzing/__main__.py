@@ -40,7 +40,7 @@ def main() -> int:
     wanted = tyro.cli(Fuzzing, prog="tests.fuzzing")
     names = [name for name in MUTATORS if not wanted.only or name in wanted.only]
     ends, faults, began = Counter[int | None](), 0, time.monotonic()
-    slowest = largest = 0.0
+    slowest = largest = computed = 0.0
     with tempfile.TemporaryDirectory(prefix="fuzzing-") as base:
         for number in range(wanted.first, wanted.first + wanted.count):
             name = names[number % len(names)]
@@ -52,6 +52,7 @@ def main() -> int:
             for words in commands:
                 ended = run(words, folder)
                 ends[ended.status] += 1
+                computed += ended.seconds
                 slowest, largest = max(slowest, ended.seconds), max(largest, ended.mib)
                 if ended.faults:
                     faults += 1
@@ -61,7 +62,8 @@ def main() -> int:
     told = ", ".join(f"{times} ended in {status}" for status, times in sorted(ends.items(), key=str))
     print(
         f"{wanted.count} inputs, {len(names)} mutators, seed {wanted.seed}: {faults} not borne; {told}; the slowest"
-        f" took {slowest:.1f} s, the largest held {largest:.0f} MiB more; {time.monotonic() - began:.0f} s in all"
+        f" took {slowest:.1f} s, the largest held {largest:.0f} MiB more; {computed:.0f} s computed,"
+        f" {time.monotonic() - began:.0f} s in all"
     )
     return 1 if faults else 0
 

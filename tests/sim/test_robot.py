@@ -64,6 +64,31 @@ def test_the_body_stops_before_the_wall_and_the_collision_is_counted(heading):
     assert 0.2 <= gap < 0.35
 
 
+@pytest.mark.parametrize("turn_rad", [0.0, 0.1])
+def test_wheels_that_a_wall_stopped_report_the_part_that_was_driven(turn_rad):
+    """From 1.92 m the body of 0.2 m may go on by 0.08 m of the 0.15 m that are left to the wall at 2.2 m."""
+    near = Room(room().faces, np.array([3.72, 2.0, 0.0]))
+    robot = SimulatedRobot(near, seed=1, errorless=True)
+    odometry = robot.drive(MotionCommand(0.15, turn_rad))
+    way = robot.true_pose - near.start
+    assert robot.record.collisions == 1
+    assert 0.075 - 1e-9 <= way[0] <= 0.08
+    np.testing.assert_allclose(odometry.motion, way, atol=1e-12)
+    assert odometry.motion[2] == pytest.approx(turn_rad * np.hypot(*way[:2]) / 0.15, rel=1e-2)
+    # The covariance, the clock and the length are those of this part, too.
+    free = SimulatedRobot(room(), seed=1, errorless=True)
+    share = robot.record.drive_time_s / 0.5 if turn_rad == 0.0 else way[2] / turn_rad
+    expected = free.drive(MotionCommand(0.15 * share, turn_rad * share))
+    np.testing.assert_allclose(odometry.cov, expected.cov, rtol=1e-9)
+    assert robot.record.drive_time_s == pytest.approx(free.record.drive_time_s)
+    assert robot.record.path_length_m == pytest.approx(np.hypot(*way[:2]))
+    # Where nothing is left to go, nothing is reported: the next command finds the body at the wall.
+    again = robot.drive(MotionCommand(0.15, 0.0))
+    assert robot.record.collisions == 2
+    assert np.abs(again.motion).max() <= 0.005 + 1e-9
+    np.testing.assert_allclose(robot.drive(MotionCommand(0.15, 0.0)).motion, 0.0, atol=1e-12)
+
+
 def test_no_collision_far_from_every_wall():
     robot = SimulatedRobot(room(), seed=2)
     for _ in range(72):

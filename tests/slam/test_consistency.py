@@ -3,7 +3,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve
-from scipy.stats import kstest
+from scipy.stats import chi2, kstest
 
 from slam.backend import Joint
 from slam.consistency import (
@@ -188,3 +188,92 @@ def test_knowing_nothing_new_about_the_world_stays_on_the_bound_and_knowing_more
     assert bound_margins(poses, covs, initial).min() == pytest.approx(0.0, abs=1e-12)
     assert bound_margins(poses, covs + 1e-3 * np.eye(3), initial).min() >= -1e-12
     assert bound_margins(poses, 0.99 * covs, initial).min() < -1e-3
+
+
+@pytest.mark.parametrize("confidence", [0.95, 0.5])
+def test_the_share_in_the_band_counts_its_ends_and_goes_by_its_confidence(confidence):
+    low, high = chi2.ppf([0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence], 3)
+    values = np.array([low - 1e-6, low + 1e-6, high - 1e-6, high + 1e-6, 0.0, 100.0, 2.0, 2.5])
+    assert share_in_band(values, 3, confidence) == 0.5
+    assert share_in_band(np.array(chi2_band(3, confidence)), 3, confidence) == 1.0
+
+
+def worth(values):
+    """The sum over lags by plain loops."""
+    n = len(values)
+    off = [v - sum(values) / n for v in values]
+    rho = [sum(off[k] * off[k + lag] for k in range(n - lag)) for lag in range(n)]
+    total = -1.0
+    for lag in range(0, n - 1, 2):
+        pair = (rho[lag] + rho[lag + 1]) / rho[0]
+        if pair <= 0.0:
+            break
+        total += 2.0 * pair
+    return n if total <= 1.0 else n / total
+
+
+def walk(n, rho, seed=0):
+    noise = np.random.default_rng(seed).normal(size=n)
+    values = [noise[0]]
+    for draw in noise[1:]:
+        values.append(rho * values[-1] + draw)
+    return np.array(values)
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 7, 31, 32, 33, 64])
+@pytest.mark.parametrize("rho", [-0.5, 0.3, 0.9])
+def test_what_a_series_is_worth_is_that_of_plain_loops(n, rho):
+    for seed in range(5):
+        values = 7.0 + walk(n, rho, seed)
+        assert effective_samples(values) == pytest.approx(worth(values), rel=1e-9)
+
+
+def test_a_series_that_swings_is_worth_all_its_values_and_no_more():
+    assert effective_samples(np.array([1.0, -1.0] * 4)) == pytest.approx(8.0, rel=1e-12)
+    assert effective_samples(np.array([2.0, 1.0, 2.0, 1.0])) == pytest.approx(4.0, rel=1e-12)
+    assert effective_samples(np.array([1.0, 2.0, 3.0])) == 1.0
+
+
+def test_what_varies_by_rounding_alone_is_constant():
+    swings = np.array([1.0, -1.0] * 8)
+    assert effective_samples(1e3 + 1e-2 * swings) == pytest.approx(16.0)
+    assert effective_samples(1e3 + 1e-4 * swings) == 1.0
+    assert effective_samples(1e-3 + 1e-8 * swings) == pytest.approx(16.0)
+    assert effective_samples(np.zeros(6)) == 1.0
+
+
+def test_the_pooled_band_is_that_of_as_many_draws_as_the_runs_are_worth():
+    swings = np.array([1.0, -1.0] * 8)
+    for runs, draws in (([np.full(9, 2.0)], 1), ([swings, np.full(9, 2.0)], 17), ([], 1)):
+        low, high = chi2.ppf([0.05, 0.95], 3 * draws) / (3 * draws)
+        assert pooled_band(runs, 3, 0.9) == pytest.approx((low, high), rel=1e-9)
+    assert pooled_band([swings], 3) == pytest.approx(tuple(chi2.ppf([0.025, 0.975], 48) / 48), rel=1e-9)
+
+
+def test_the_margin_is_the_least_eigenvalue_beyond_what_the_start_left_open():
+    poses = np.array([[3.0, -2.0, 0.4], [5.0, 1.0, -0.3], [-4.0, 2.0, 2.0]])
+    initial, covs = random_covs(1, 3)[0], random_covs(3, 3)
+    covs[:, 0, 1] += 0.1  # an estimator's rounding may leave it so
+    expected = []
+    for pose, cov in zip(poses, covs, strict=True):
+        A = np.eye(3)
+        A[0, 2], A[1, 2] = -(pose[1] - poses[0, 1]), pose[0] - poses[0, 0]
+        gap = cov - A @ initial @ A.T
+        expected.append(
+            min(np.linalg.eigvals(0.5 * (gap + gap.T)).real) / (initial[0, 0] + initial[1, 1] + initial[2, 2])
+        )
+    np.testing.assert_allclose(bound_margins(poses, covs, initial), expected, rtol=1e-9)
+
+
+def test_the_covariance_of_the_joint_error_moves_with_its_derivative():
+    pose, anchors, lines = random_truth()
+    truth, step = state_of(pose, anchors, lines), 1e-6
+    cov, eye = random_covs(1, len(truth))[0], np.eye(len(truth))
+    columns = []
+    for d in eye:
+        ahead, behind = (joint_error(Joint(truth + s * step * d, eye, anchors), pose, lines)[0] for s in (1, -1))
+        columns.append((ahead - behind) / (2 * step))
+    jacobian = np.stack(columns, axis=-1)
+    np.testing.assert_allclose(
+        joint_error(Joint(truth, cov, anchors), pose, lines)[1], jacobian @ cov @ jacobian.T, atol=1e-5
+    )

@@ -68,3 +68,12 @@ def test_a_line_unseen_for_long_is_forgotten() -> None:
     for _ in range(7):
         faint.see(poses[1], nothing)
     assert not len(faint.see(poses[2], look(face, poses[2], rng)))
+
+
+def test_a_line_longer_than_a_door_end_is_never_believed() -> None:
+    """What shows three or four beams there is mostly a line from one wall's corner to the next wall."""
+    rng = np.random.default_rng(5)
+    for half_m, is_believed in ((0.08, True), (0.1, False)):
+        faint, face = FaintLines(), np.array([[1.0, -half_m], [1.0, half_m]])
+        poses = [np.array([0.0, 0.1 * k, 0.0]) for k in range(4)]
+        assert any(len(faint.see(pose, look(face, pose, rng, 4))) for pose in poses) == is_believed

@@ -1,7 +1,10 @@
 """The gate itself, against numbers worked out by hand: two degrees of freedom, and what pose and line share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from slam.backend import Joint
 from slam.consensus import agree
@@ -84,3 +87,37 @@ def test_a_short_segment_that_lies_on_a_wall_is_no_new_one_however_it_is_turned(
     matches = match(segment, WALL, known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5]))
     assert matches.unmatched.tolist() == [0]
     assert matches.doubtful.tolist() == [0] * is_doubtful
+
+
+@pytest.mark.parametrize(("overlap_m", "is_matched"), [(0.01, False), (0.03, True)])
+def test_a_segment_and_its_wall_overlap_by_more_than_a_touch(overlap_m, is_matched):
+    """Two rooms' walls on one line stand no farther apart than the wall between is thick."""
+    cov = np.array([[1.0, 2.0], [2.0, 4.0]]) * 0.01**2 + np.diag([0.0, 0.01**2])
+    ends = np.array([[[2.0, 2.0 - overlap_m], [2.0, 3.0]]])
+    segment = Segments(
+        np.array([[0.0, 2.0]]), cov[None], ends, np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1)
+    )
+    for clear_only in (True, False):
+        found = match(segment, WALL, known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5]), clear_only=clear_only)
+        assert len(found.pairs) == is_matched
+
+
+@pytest.mark.parametrize(("turn_rad", "is_matched"), [(0.9, True), (-0.9, True), (1.2, False), (-1.2, False)])
+def test_a_line_that_faces_another_way_is_no_candidate_however_vague_its_direction(turn_rad, is_matched):
+    assert len(match(seen(turn_rad, sigma_rad=0.6), WALL, known([0.5, 0.5, 0.1], [0.1, 0.1])).pairs) == is_matched
+
+
+@pytest.mark.parametrize("beams", [4, 5])
+def test_few_beams_alone_do_not_say_where_the_robot_is_but_belong_to_their_wall(beams):
+    segment, joint = replace(seen(), beam_counts=np.array([beams])), known([0.01, 0.01, 0.01], [0.01, 0.01])
+    assert len(match(segment, WALL, joint, clear_only=True).pairs) == (beams >= 5)
+    assert len(match(segment, WALL, joint).pairs) == 1
+
+
+@pytest.mark.parametrize("squared", [7.0, 8.0, 9.0])
+def test_sightings_of_which_each_passes_are_dropped_until_all_together_do(squared):
+    count = 16
+    e = np.tile([np.sqrt(squared), 0.0], count)
+    within = [k for k in range(2, count + 1) if k * squared <= chi2.ppf(0.999999, 2 * k)]
+    kept = compatible(JointSightings(e, np.zeros((3, 2 * count)), np.eye(2 * count)), 0.99, 0.999999)
+    assert len(kept) == max(within)

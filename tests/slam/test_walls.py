@@ -164,3 +164,15 @@ def test_a_corner_seen_more_sharply_moves_the_end_back():
     assert walls.map(belief_of([BEFORE_BEND], near)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
     see(walls, [BEFORE_BEND], [[[0.0, 0.0], [1.95, 0.0]], [[1.95, 0.0], [1.95, 1.5]]], [0, -1], far)
     assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("length_m", "is_kept"), [(0.04, False), (0.06, True)])
+def test_a_wall_shorter_than_its_ends_are_known_is_none(length_m, is_kept):
+    walls, pose, face = Walls(), [0.8, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
+    scan = scan_of([face], pose)
+    segments = extract(scan)
+    assert len(segments) == 1
+    segments.ends[0, :, 1] = [-0.5 * length_m, 0.5 * length_m]
+    nothing = np.zeros(0, dtype=np.int64)
+    forgotten = walls.see(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64), nothing)
+    assert forgotten.tolist() == ([] if is_kept else [0])

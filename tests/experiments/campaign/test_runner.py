@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,17 +42,32 @@ def tables(folder):
     return found | {f"{name}.parquet": (folder / f"{name}.parquet").read_bytes() for name in ("marks", "steps")}
 
 
-def start(folder, *more):
+STRUCK = """
+import os, signal, sys, time
+from experiments import cli
+from experiments.campaign.store import Store
+
+number, left, save = int(sys.argv.pop(1)), int(sys.argv.pop(1)), Store.save
+
+def save_and_be_struck(store, done):
+    global left
+    save(store, done)
+    left -= done.trial.arm != "recording"
+    if not left:
+        os.killpg(0, number)
+        time.sleep(60.0)
+
+Store.save = save_and_be_struck
+sys.exit(cli.main())
+"""
+"""A campaign whose processes all get a signal once so many trials are saved: told from outside, it might be over."""
+
+
+def start(folder, *more, struck=None):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "experiments.cli", "compare", *WORDS, "--out", str(folder), *more]
+    program = ["-m", "experiments.cli"] if struck is None else ["-c", STRUCK, *map(str, map(int, struck))]
+    command = [sys.executable, *program, "compare", *WORDS, "--out", str(folder), *more]
     return subprocess.Popen(command, env=environment, start_new_session=True, stdout=subprocess.DEVNULL)
-
-
-def wait_for(folder, files):
-    deadline = time.monotonic() + 120.0
-    while len(list(folder.rglob("trials/**/*.npz"))) < files:
-        assert time.monotonic() < deadline, "expected some trials in two minutes"
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")
@@ -63,11 +77,9 @@ def undisturbed(tmp_path_factory):
 
 def test_killed_and_resumed_it_leaves_the_same_table_and_redoes_only_what_is_missing(undisturbed, tmp_path):
     folder = tmp_path / "campaign"
-    process = start(folder, "--jobs", "2")
-    wait_for(folder, 2)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    assert start(folder, "--jobs", "2", struck=(signal.SIGKILL, 2)).wait() == -signal.SIGKILL
     done = {path: path.stat().st_mtime_ns for path in folder.rglob("*.npz")}
+    assert len(list(folder.rglob("trials/**/*.npz"))) == 2
     assert not (folder / "trials.csv").exists()
     (folder / "trials" / ".00001.npz.1.part").write_bytes(b"half")
     assert start(folder, "--jobs", "2").wait() == 0
@@ -76,12 +88,12 @@ def test_killed_and_resumed_it_leaves_the_same_table_and_redoes_only_what_is_mis
     assert not list(folder.rglob(".*.part"))
 
 
-def test_interrupted_it_says_so_and_keeps_what_is_done(undisturbed, tmp_path):
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, *(pytest.param(n, marks=pytest.mark.long) for n in (signal.SIGTERM, signal.SIGHUP))]
+)
+def test_interrupted_it_says_so_and_keeps_what_is_done(number, undisturbed, tmp_path):
     folder = tmp_path / "campaign"
-    process = start(folder, "--jobs", "2")
-    wait_for(folder, 1)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.wait() == 130
+    assert start(folder, "--jobs", "2", struck=(number, 1)).wait() == 130
     assert list(folder.rglob("trials/**/*.npz"))
     assert tables(run(folder, CAMPAIGN)) == tables(undisturbed)
 

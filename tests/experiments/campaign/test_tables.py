@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from experiments.campaign.plan import Campaign, Trial
 from experiments.campaign.score import Record
@@ -25,6 +25,7 @@ from experiments.campaign.tables import (
     write_table,
     write_tables,
 )
+from experiments.measurements import Z_95
 
 NAMES = {
     "world": "w", "strategy": "nearest-robot", "backend": "full-ekf", "mode": "closed", "association": "own", "seed": 1,
@@ -79,6 +80,7 @@ def test_a_step_without_a_covariance_is_in_no_nees_but_goes_on():
     one = chi2.ppf([0.025, 0.975], 3) / 3.0
     assert [(row["band_low"], row["band_high"]) for row in rows] == [pytest.approx(tuple(one))] * 2
     assert step_rows([]) == step_rows([record()]) == []
+    assert len(step_rows([run([3.0])])) == 1
 
 
 def test_a_trial_without_steps_is_beside_those_that_have_some():
@@ -129,13 +131,15 @@ def test_a_trial_is_a_row_of_plain_values_and_of_how_its_distances_fared():
         "coverage": 0.5, "pose_anees": None, "set_aside": [1, 2, 3], "marks": {}, "traceback": "at line 3",
         "step_ms": {"mean": 2.0, "max": 9.0},
     }  # fmt: skip
-    off = [0.0, 1.9, -1.9, 2.0, -2.0]
-    row = trial_row(record(summary, distance_m=np.add(10.0, off), distance_true_m=5 * [10.0], distance_sigma_m=5 * [1]))
+    off = [0.0, 0.95, -0.95, 1.0, -1.0]
+    row = trial_row(record(summary, distance_m=np.add(9.0, off), distance_true_m=5 * [9.0], distance_sigma_m=5 * [0.5]))
     assert (row["coverage"], row["pose_anees"], row["set_aside"]) == (0.5, None, 3)
     assert (row["distances"], row["distances_in_95"]) == (5, pytest.approx(0.6))
     assert (row["step_ms_mean"], row["step_ms_max"]) == (2.0, 9.0)
     assert row["double_entries"] == 9
     assert not {"traceback", "marks", "step_ms"} & row.keys()
+    edge = trial_row(record(distance_m=[Z_95], distance_true_m=[0.0], distance_sigma_m=[1.0]))
+    assert (Z_95, edge["distances_in_95"]) == (pytest.approx(norm.ppf(0.975), abs=1e-12), 1.0)
     bare = trial_row(record())
     assert (bare["set_aside"], bare["distances"], bare["distances_in_95"]) == (0, 0, None)
 
