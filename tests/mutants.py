@@ -39,11 +39,12 @@ use_setproctitle = false
 
 [tool.pytest.ini_options]
 pythonpath = ["."]
-addopts = ["--import-mode=importlib", "-p", "no:cacheprovider", "-p", "no:benchmark", "-m", "not long"]
+addopts = ["--import-mode=importlib", "-p", "no:cacheprovider", "-p", "no:unraisableexception", "-m", "not long"]
 filterwarnings = ["error"]
 markers = ["long: takes minutes"]
 """
-"""Shape checks, which cost more than all else, are off: `--jaxtyping-packages` is not among the options."""
+"""What costs more than the tests is off: shape checks (`--jaxtyping-packages` is not among the options), and the ten
+collections of garbage at the end of each run that would find exceptions in destructors."""
 DIFFS = """
 import sys
 from mutmut.mutation.diff_apply import get_diff_for_mutant
