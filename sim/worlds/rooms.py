@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from .drawing import WorldError
 from .world import ROBOT_RADIUS_M
 
 Kind = Literal["room", "solid"]
@@ -27,6 +28,8 @@ SHUT_M = 0.02
 """Rooms nearer to each other than this are meant to touch."""
 NEAR_M = 1e-3
 MITRE = 10.0
+APART_MAX = 300
+"""Each is held against all others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class Plan:
 
 
 def plan_of(outlines: Sequence[Outline], lines: Sequence[shapely.LineString]) -> Plan:
-    """Return what the polygons of a drawing mean beside the walls drawn as lines."""
+    """Return what the polygons of a drawing mean beside the walls drawn as lines; raises WorldError for too many."""
     drawn = [(part, outline.kind) for outline in outlines for part in areas(shapely.make_valid(outline.polygon))]
     said: dict[Kind | None, list[shapely.Polygon]] = {None: [], "room": [], "solid": []}
     for part, kind in drawn:
@@ -57,9 +60,16 @@ def plan_of(outlines: Sequence[Outline], lines: Sequence[shapely.LineString]) ->
     inner, outer = _nested(said[None], said["room"])
     rooms, solids = list(said["room"]), [*said["solid"], *inner]
     pieces = areas(shapely.union_all(outer))
-    for k, piece in enumerate(pieces):
-        others = shapely.union_all([walls, *pieces[:k], *pieces[k + 1 :]]) if len(pieces) > 1 else walls
-        (rooms if _is_room(piece, others) else solids).append(piece)
+    if len(pieces) > APART_MAX:
+        raise WorldError(
+            f"expected at most {APART_MAX} polygons apart from each other that do not say what they are, found"
+            f" {len(pieces)}: give them a property kind, room or solid"
+        )
+    drawn_all = shapely.union_all([walls, *pieces])
+    enclosures = [_Enclosure.of(part, drawn_all) for part in areas(drawn_all)]
+    for piece in pieces:
+        stands_there = any(_has_floor_beside(piece, part, drawn_all) for part in enclosures)
+        (rooms if not stands_there and 2 * _opened_area(piece) > piece.area else solids).append(piece)
     among = shapely.STRtree(rooms)
     count = sum(bool(len(among.query(part.representative_point(), "intersects"))) for part in [*said["room"], *outer])
     return Plan((*solids, *_around(rooms, walls)), count)
@@ -87,13 +97,31 @@ def _nested(
             [p for p, is_in in zip(unsaid, inside, strict=False) if not is_in])  # fmt: skip
 
 
-def _is_room(piece: shapely.Polygon, others: BaseGeometry) -> bool:
-    """Return whether an outline that lies in no other is floor, given the walls and all other such outlines."""
-    within = shapely.union_all([_filled(part) for part in areas(others)])
-    beside = within.difference(others).difference(_filled(piece)).buffer(-ROBOT_RADIUS_M)
-    if within.buffer(NEAR_M).covers(piece) and not beside.is_empty:
+@dataclass(frozen=True, eq=False)
+class _Enclosure:
+    """A connected part of all that is drawn, and the room to drive inside its outline."""
+
+    part: shapely.Polygon
+    hull: BaseGeometry
+    room: BaseGeometry
+
+    @classmethod
+    def of(cls, part: shapely.Polygon, drawn: BaseGeometry) -> "_Enclosure":
+        hull = _filled(part)
+        # A lone block encloses nothing, and most parts are lone blocks.
+        room = hull.difference(drawn).buffer(-ROBOT_RADIUS_M) if part.interiors else shapely.Polygon()
+        return cls(part, hull.buffer(NEAR_M, quad_segs=1), room)
+
+
+def _has_floor_beside(piece: shapely.Polygon, around: _Enclosure, drawn: BaseGeometry) -> bool:
+    """Return whether a piece lies inside an enclosure, which need not be its own, that has floor beside it."""
+    if not around.hull.covers(piece):
         return False
-    return 2 * _opened_area(piece) > piece.area
+    if not around.part.covers(piece.representative_point()):
+        return not around.room.difference(_filled(piece)).is_empty
+    # Walls touch the piece: they enclose it only if they do so without it.
+    others = [_Enclosure.of(part, drawn) for part in areas(around.part.difference(piece))]
+    return any(part.hull.covers(piece) and not part.room.difference(_filled(piece)).is_empty for part in others)
 
 
 def _opened_area(piece: shapely.Polygon) -> float:

@@ -15,6 +15,12 @@ GRID = np.add.outer(np.arange(1024), np.arange(1024))
 RANDOM = np.random.default_rng(1)
 CROSSING = [[0, float(y), 9, float(z)] for y, z in RANDOM.uniform(0, 9, (700, 2))]
 
+
+def square(x: float, y: float) -> list[list[float]]:
+    """Return a ring of half a metre."""
+    return [[x, y], [x + 0.5, y], [x + 0.5, y + 0.5], [x, y + 0.5], [x, y]]
+
+
 LARGE = {
     "checkerboard": ("a.png", GRID % 2 == 0, "sides of pixels"),
     "noise": ("a.png", RANDOM.random((1100, 1100)) < 0.5, "sides of pixels"),
@@ -31,6 +37,11 @@ LARGE = {
         "straight pieces",
     ),
     "far": ("a.geojson", json.dumps({"type": "LineString", "coordinates": [[0, 0], [1e300, 5]]}), "from the origin"),
+    "islands": (
+        "a.geojson",
+        json.dumps({"type": "MultiPolygon", "coordinates": [[square(x, y)] for x in range(20) for y in range(20)]}),
+        "say what they are",
+    ),
     "yaml": ("a.yaml", "a: " + "x" * 70_000, "65536 bytes"),
     "yaml deep": ("a.yaml", "a: " + "[" * 30_000, "deep"),
     "yaml wide": ("a.yaml", "\n".join(f"k{i}: {i}" for i in range(5000)), "image"),
