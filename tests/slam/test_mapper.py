@@ -131,6 +131,17 @@ def test_an_extractor_given_in_its_place_is_believed_also_at_bends():
     assert any(asked)
 
 
+def test_a_segment_of_few_beams_stretches_no_wall_though_it_lies_on_one():
+    def few_first(scan, **bends):
+        segments = extract(scan, **bends)
+        counts = np.where(np.arange(len(segments)) == 0, 4, segments.beam_counts)
+        return replace(segments, beam_counts=counts) if scan.time_s > 0.15 else segments
+
+    *_, last = walk(SQUARE, PLACES[:3], extractor=few_first)
+    assert 0 in last.matches.pairs[:, 0]
+    assert [owner < 0 for owner in last.walls_of_segments] == [True] + [False] * (len(last.segments) - 1)
+
+
 def test_a_wall_that_was_there_and_is_gone_is_cut_back():
     """A pillar stands at first; then beams pass where it stood, in scan after scan."""
     room = shapely.box(0, 0, 3.4, 3.4)

@@ -9,7 +9,7 @@ from slam.extraction import extract
 from slam.geometry.lines import normals, through
 from slam.pieces import PiecesConfig, owners_of_beams, sure_pieces
 from slam.robot import Scan
-from slam.segments import Segments
+from slam.segments import EndKind, Segments
 from slam.sightlines import sightlines
 
 
@@ -95,6 +95,19 @@ def test_a_wall_seen_at_a_grazing_angle_is_sure_only_where_its_beams_stand_close
     bearing = np.arctan2(end[1], end[0])
     beyond = 0.5 / np.tan(-(bearing + step))
     assert beyond - end[0] == pytest.approx(config.sure_gap_m, rel=0.2)
+
+
+@pytest.mark.parametrize(("leap_m", "is_believed"), [(0.05, True), (0.1, False)])
+def test_a_corner_far_beyond_the_last_beam_was_not_seen(leap_m, is_believed):
+    """The lines of two walls cross there, and something may hide between two beams."""
+    scan = scan_from(np.array([[[1.0, -0.6], [1.0, 0.6]]]), [0.0, 0.0, 0.0])
+    segments = extract(scan)
+    last = np.tan(scan.bearings_rad[segments.beams[0, 1]])
+    segments.ends[0, 1] = [1.0, last + leap_m]
+    segments.end_kinds[0, 1] = EndKind.CORNER
+    sure = sure_pieces(segments, scan, PiecesConfig())
+    np.testing.assert_allclose(sure.ends[0, 1], [1.0, last + leap_m * is_believed], atol=1e-6)
+    assert sure.end_kinds[0, 1] == (EndKind.CORNER if is_believed else EndKind.OPEN)
 
 
 def segments_with(beams):
