@@ -432,3 +432,12 @@ def test_an_interrupted_replay_keeps_whole_steps_and_goes_no_further(whole, tmp_
     assert ended.returncode == 130, ended.stderr
     assert json.loads((tmp_path / "out" / "block-ekf" / "summary.json").read_text())["steps"] == 3
     assert not list((tmp_path / "out" / "full-ekf").iterdir())
+
+
+@pytest.mark.long
+def test_runs_and_campaigns_killed_at_random_moments_come_to_the_same_bytes():
+    command = [sys.executable, "-m", "studies.kills", "--explore", "3", "--compare", "2", "--steps", "20"]
+    told = subprocess.run(command, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert told.returncode == 0, told.stdout + told.stderr
+    assert told.stdout.splitlines()[-1] == "nothing was lost"
+    assert told.stdout.count("the same bytes") == 5
