@@ -43,12 +43,12 @@ class Subject:
     """How it goes on in a folder, the folder included."""
 
 
-def subjects(steps: int) -> dict[str, Subject]:
-    """Return what is killed, with runs of so many steps."""
+def subjects(steps: int, jobs: int) -> dict[str, Subject]:
+    """Return what is killed, with runs of so many steps and campaigns of so many processes."""
     explore = ("explore", "paper-fig8", "--seed", "3", "--max-steps", str(steps))
     compare = (
         *("compare", "--worlds", "paper-fig4", "--backends", "block-ekf", "--strategies", "nearest-robot"),
-        *("--trials", "2", "--max-steps", "12", "--jobs", "2"),
+        *("--trials", "2", "--max-steps", "12", "--jobs", str(jobs)),
     )
     return {
         "explore": Subject("explore", explore, lambda folder: ("explore", "--resume", str(folder))),
@@ -165,10 +165,11 @@ def main() -> int:
     parser.add_argument("--explore", type=int, default=20, help="how many kills of `explore`")
     parser.add_argument("--compare", type=int, default=20, help="how many kills of `compare`")
     parser.add_argument("--steps", type=int, default=60, help="steps of the run that is explored")
+    parser.add_argument("--jobs", type=int, default=2, help="processes of the campaign")
     parser.add_argument("--seed", type=int, default=1, help="of the moments")
     options = parser.parse_args()
     bad = 0
-    for subject in subjects(options.steps).values():
+    for subject in subjects(options.steps, options.jobs).values():
         kills = getattr(options, subject.name)
         draws, states = np.random.default_rng([options.seed, len(subject.words)]), Counter[str]()
         for k in range(kills):
