@@ -14,7 +14,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from experiments import run_folder
+from experiments import run_folder, running_log
 from experiments.cli import main
 from experiments.results import RUN_FILES, config_record, write_results
 from experiments.run_folder import LOCK, FolderGoneError, held, refuse_others, settle
@@ -402,6 +402,20 @@ def test_the_stream_holds_every_step_bit_for_bit_and_drops_what_was_cut_short(tm
     (tmp_path / "log.arrow").write_bytes(b"none of ours")
     with pytest.raises(UsageError, match=r"^expected the log of a run under way, found .*: .*$"):
         read_running(tmp_path)
+
+
+def test_a_step_that_was_written_in_part_is_taken_back_and_ends_the_stream(tmp_path, monkeypatch):
+    log, steps = RunningLog(tmp_path, {"trial": 1}), []
+    run_trial(TrialConfig("paper-fig4", seed=2, max_steps=3), steps.append)
+    log.add(steps[0])
+    before, write = (tmp_path / "log.arrow").read_bytes(), os.write
+    monkeypatch.setattr(running_log.os, "write", lambda descriptor, content: write(descriptor, content[:900]))
+    log.add(steps[1])
+    monkeypatch.undo()
+    # There is room again, but behind a gap no step can be read.
+    log.add(steps[2])
+    assert (tmp_path / "log.arrow").read_bytes() == before
+    assert len(read_running(tmp_path).time_s) == 1
 
 
 def test_a_stream_that_was_taken_away_is_noticed_at_the_next_step(tmp_path):
