@@ -3,6 +3,7 @@
 import pytest
 
 from experiments.scenario import TrialConfig
+from experiments.smoothing import smooth
 from experiments.trial import run_trial
 from slam.backends.graph_isam import Isam
 
@@ -28,3 +29,20 @@ def test_a_run_that_no_solver_can_go_on_with_keeps_all_its_results(backend, monk
     assert result.summary["lines"] > 0
     assert len(result.scenario.backend.belief.ids) > 0
     assert len(result.scenario.backend.trajectory()) >= len(result.log)
+
+
+class Broken:
+    """A smoother that does not even tell what it believes."""
+
+    @property
+    def belief(self):
+        raise RuntimeError("no solution")
+
+    def finish(self):
+        raise RuntimeError("no solution")
+
+    predict = update = grow = merge = remove = finish
+
+
+def test_a_smoother_that_broke_down_costs_no_results():
+    assert smooth(Broken(), None, 3) is None
