@@ -21,7 +21,7 @@ from .graph_isam import GraphConfig
 from .graph_loose import wrapped
 from .graph_optimum import solve_anew
 from .graph_record import LineRecord, Record
-from .graph_solver import Solver
+from .graph_solver import DivergedError, Solver
 
 DEFAULTS = GraphConfig()
 G = TypeVar("G", bound="Graph")
@@ -205,7 +205,8 @@ class Graph:
 
     def _recover(self, error: Exception) -> None:
         self.recoveries += 1
-        self._config = replace(self._config, careful=True)
+        if not isinstance(error, DivergedError):
+            self._config = replace(self._config, careful=True)
         start = self._solver.start()
         try:
             self._solver = solve_anew(self._config, self._record, *start)
