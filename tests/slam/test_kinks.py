@@ -29,7 +29,8 @@ def scans(faces, poses, rng, sigma_m=SIGMA_M):
     finder = RangeFinder(faces, LidarConfig())
     for k, pose in enumerate(poses):
         ranges = finder.cast(pose)[0]
-        yield Scan(finder.bearings_rad, ranges + sigma_m * rng.standard_normal(len(ranges)), SIGMA_M, 4.0, 0.1 * k)
+        noise = sigma_m * rng.standard_normal(len(ranges)) if sigma_m else 0.0
+        yield Scan(finder.bearings_rad, ranges + noise, SIGMA_M, 4.0, 0.1 * k)
 
 
 def belief_of(pose):
@@ -135,6 +136,19 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_be
         ranges[last] += 0.03
         taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
         found |= kinks.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
+    assert found == is_bend
+
+
+@pytest.mark.parametrize(("turn_deg", "is_bend"), [(0.05, False), (0.1, False), (0.3, True), (8.0, True)])
+def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg, is_bend):
+    """However sure the turn is after 1,500 scans from one place, all taken for one straight wall."""
+    pose, kinks, found = np.array([0.0, -1.0, 0.0]), Kinks(), False
+    straight, bending = (next(scans(bent(np.deg2rad(turn)), [pose], None, 0.0)) for turn in (0.0, turn_deg))
+    segments = extract(straight)
+    for _ in range(1500):
+        found |= kinks.see(belief_of(pose), bending, segments, np.array([[0, WALL]])) is not None
+        if found:
+            break
     assert found == is_bend
 
 
