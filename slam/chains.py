@@ -72,20 +72,22 @@ def connect(
     walls: StochasticMap,
     set_aside: Collection[tuple[int, int]] = (),
     passed: Collection[tuple[int, int]] = (),
+    cut_off: Collection[tuple[int, int]] = (),
     config: ChainConfig = ChainConfig(),
 ) -> tuple[Chain, ...]:
     """Join heads to tails, nearest first, and return the chains in the order of their oldest wall.
 
     Free side on the left throughout, so a head joins only a tail. `set_aside` holds (wall id, side) of ends that
     were looked at closely: two of these may join across a wider gap (a missed short face), unless it is among those
-    that beams have `passed`, (id of the head's wall, id of the tail's).
+    that beams have `passed`, (id of the head's wall, id of the tail's). Where beams have `cut_off` the corner in
+    which two lines cross, their ends do not join however near they are: a face between them was missed.
     """
     rows = np.flatnonzero(~walls.tentative)
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
     often = walls.sightings[rows] >= config.bend_sightings
-    successor = _links(ends, lines, ids, often, set_aside, passed, config)
+    successor = _links(ends, lines, ids, often, set_aside, passed, cut_off, config)
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
     corners = np.full((len(rows), 2), np.nan)
@@ -102,6 +104,7 @@ def _links(
     often: Bool[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
     passed: Collection[tuple[int, int]],
+    cut_off: Collection[tuple[int, int]],
     config: ChainConfig,
 ) -> Int[np.ndarray, " n"]:
     """Return the row of each wall's successor, -1 for none: greedily, nearest ends first."""
@@ -121,6 +124,8 @@ def _links(
         & (often[head] & often[tail])
         & _overlap_at_a_bend(ends[head], ends[tail], lines[head, 0], lines[tail, 0], config)
     )
+    for k in np.flatnonzero(allowed) if cut_off else ():
+        allowed[k] = (ids[head[k]], ids[tail[k]]) not in cut_off
     order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
     successor, taken = [-1] * len(ids), [False] * len(ids)
     for before, after in zip(head[order].tolist(), tail[order].tolist(), strict=True):

@@ -123,7 +123,7 @@ class Mapper:
         walls, merged = self._merge(owners, self._ended(scan))
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._gaps.see(walls, scan)
-        chains = connect(walls, set_aside, self._gaps.passed, self.config.chains)
+        chains = connect(walls, set_aside, self._gaps.passed, self._gaps.cut_off, self.config.chains)
         return MapUpdate(segments, matches, owners, walls, chains, merged)
 
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
