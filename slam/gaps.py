@@ -63,6 +63,8 @@ class Gaps:
         lengths = np.hypot(pieces[..., 0], pieces[..., 1])
         supposed = ~parallel & np.all(lengths <= config.corner_m, axis=0)
         supposed &= np.any(lengths > 2.0 * config.margin_m, axis=0)
+        # Ends that have come to meet where the lines cross suppose nothing any more.
+        self.cut_off.difference_update((int(h), int(t)) for h, t in walls.ids[rows][pairs[~supposed]].tolist())
         pairs, corners = pairs[supposed], corners[supposed]
         if len(pairs):
             ends = ((heads[pairs[:, 0]], corners), (corners, tails[pairs[:, 1]]))

@@ -107,6 +107,9 @@ def test_a_pillar_is_not_closed_in_a_corner_that_beams_have_cut_off(turn: float)
     gaps.see(walls, scan_past(faces, pose))
     (chain,) = connect(walls, cut_off=gaps.cut_off)
     assert len(chain.open_ends) == 2
+    met = map_of(ring_of([(0.0, 0.0), (0.045, 0.32), (0.09, 0.0)])[[2, 0, 1]], pose)
+    gaps.see(met, scan_past(faces, pose))
+    assert not gaps.cut_off, "ends that meet by now in a corner suppose nothing there"
     gaps = Gaps()
     gaps.see(whole, scan_past(faces, pose))
     (chain,) = connect(whole, cut_off=gaps.cut_off)
