@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 import tyro
 from jaxtyping import Float
+from shapely.geometry.polygon import orient
 
 from sim.worlds import World
 
@@ -34,8 +35,9 @@ class PillarsStudy:
         wrong = 0
         for k in range(self.pillars):
             corners = pillar(k)
-            free = shapely.orient_polygons(shapely.box(0.0, 0.0, *ROOM_M).difference(shapely.Polygon(corners)))
-            world = World(f"pillar-{k}", free, np.array(START), {})
+            ring = [(0.0, 0.0), (ROOM_M[0], 0.0), ROOM_M, (0.0, ROOM_M[1])]
+            room = orient(shapely.Polygon(ring, [corners]))
+            world = World(f"pillar-{k}", room, np.array(START), {})
             summary = run_trial(TrialConfig(world.name, self.backend, seed=k, max_steps=500), world=world).summary
             contours = summary["certificate"]["contours"]
             off_m = [
