@@ -139,6 +139,12 @@ def test_a_block_that_fills_a_hall_is_solid_but_one_that_leaves_no_floor_is_the_
     same(world_of(tmp_path, [hall, feature(ROOM.difference(HOLE))]), inside.difference(HOLE))
 
 
+def test_a_room_built_onto_a_house_drawn_in_lines_is_a_room(tmp_path):
+    house = feature(shapely.LineString(shapely.box(0, 0, 9, 7).exterior.coords))
+    annex = shapely.box(9.05, 0, 14, 7)
+    same(world_of(tmp_path, [house, feature(annex), start(12, 3)]), annex)
+
+
 def test_doors_between_said_rooms_inside_drawn_walls_stay_open(tmp_path):
     outer = shapely.LineString(shapely.box(0, 0, 9, 4).exterior.coords)
     wall = shapely.MultiLineString([[(4, 0), (4, 1)], [(4, 2), (4, 4)]])
