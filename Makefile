@@ -5,7 +5,7 @@ PLANS ?= ../shared/data/plans
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup demo test test-long mutants check bench docs smoke compare random courts schools strategies bias heading rules rules-held rules-table
+.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -44,6 +44,10 @@ check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# 10,000 mutated inputs through every reader; those that are not borne are kept in results/fuzzing.
+fuzz: setup
+	$(BIN)/python -m tests.fuzzing --count 10000 --seed 1
 
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only

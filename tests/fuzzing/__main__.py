@@ -3,6 +3,7 @@
 .venv/bin/python -m tests.fuzzing --count 10000 --seed 1
 """
 
+import contextlib
 import gc
 import shutil
 import sys
@@ -15,7 +16,8 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from .child import run
+from .child import run_all
+from .intact import intact
 from .registry import MUTATORS
 
 
@@ -35,30 +37,36 @@ class Fuzzing:
     """Where inputs that fail are kept, each with what was said."""
 
 
+BATCH = 50
+"""Inputs that one process reads, one after the other."""
+
+
 def main() -> int:
     """Run what the command line says and return the exit status: 0 where every input was borne."""
     wanted = tyro.cli(Fuzzing, prog="tests.fuzzing")
     names = [name for name in MUTATORS if not wanted.only or name in wanted.only]
     ends, faults, began = Counter[int | None](), 0, time.monotonic()
     slowest = largest = computed = 0.0
-    with tempfile.TemporaryDirectory(prefix="fuzzing-") as base:
-        for number in range(wanted.first, wanted.first + wanted.count):
-            name = names[number % len(names)]
-            folder = Path(base) / f"{wanted.seed}-{number}-{name}"
-            folder.mkdir()
-            commands = MUTATORS[name](np.random.default_rng([wanted.seed, number]), folder)
-            if number == wanted.first:
-                gc.freeze()
-            for words in commands:
-                ended = run(words, folder)
+    intact()
+    gc.freeze()
+    for first in range(wanted.first, wanted.first + wanted.count, BATCH):
+        with tempfile.TemporaryDirectory(prefix="fuzzing-", ignore_cleanup_errors=True) as base:
+            tasks = []
+            for number in range(first, min(first + BATCH, wanted.first + wanted.count)):
+                name = names[number % len(names)]
+                folder = Path(base) / f"{wanted.seed}-{number}-{name}"
+                folder.mkdir()
+                commands = MUTATORS[name](np.random.default_rng([wanted.seed, number]), folder)
+                tasks += [(words, folder) for words in commands]
+            for (words, folder), ended in zip(tasks, run_all(tasks), strict=True):
                 ends[ended.status] += 1
                 computed += ended.seconds
                 slowest, largest = max(slowest, ended.seconds), max(largest, ended.mib)
                 if ended.faults:
                     faults += 1
                     _keep(wanted.keep / folder.name, folder, words, ended.said)
-                    print(f"{folder.name}: {', '.join(ended.faults)}: {' '.join(words)}", flush=True)
-            shutil.rmtree(folder, ignore_errors=True)
+                    print(f"{folder.name}: {', '.join(ended.faults)}: {' '.join(words)[:200]}", flush=True)
+        print(f"{first + BATCH - wanted.first} inputs, {faults} not borne", file=sys.stderr)
     told = ", ".join(f"{times} ended in {status}" for status, times in sorted(ends.items(), key=str))
     print(
         f"{wanted.count} inputs, {len(names)} mutators, seed {wanted.seed}: {faults} not borne; {told}; the slowest"
@@ -71,7 +79,9 @@ def main() -> int:
 def _keep(place: Path, folder: Path, words: list[str], said: str) -> None:
     shutil.rmtree(place, ignore_errors=True)
     place.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copytree(folder, place, symlinks=True, ignore_dangling_symlinks=True)
+    with contextlib.suppress(OSError):
+        shutil.copytree(folder, place, symlinks=True)
+    place.mkdir(exist_ok=True)
     (place / "fuzzing.txt").write_text(f"chainslam {' '.join(words)}\n\n{said}", errors="backslashreplace")
 
 
