@@ -85,6 +85,7 @@ def _work(tasks: list[tuple[list[str], Path]], results: Connection) -> None:
     """Perform tasks and send how each ended; never returns."""
     try:
         os.setsid()
+        sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         bound = (_virtual_mib() + 2 * MEMORY_MIB) << 20
         resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
