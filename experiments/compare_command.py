@@ -99,11 +99,12 @@ class Compare:
             raise UsageError(
                 f"expected 1 to {most} processes on this machine, found --jobs {self.jobs}: choose another"
             )
-        for world in campaign.worlds:
-            echo_world(load_world(world))
+        worlds = [load_world(world) for world in campaign.worlds]
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
         with opened(self.out, campaign) as store:
             try:
+                for world in worlds:
+                    echo_world(world)
                 tally = run_campaign(store, executor)
             except KeyboardInterrupt:
                 print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",

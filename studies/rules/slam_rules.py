@@ -216,7 +216,7 @@ UPKEEP = (
            NO, "the sighting of the best direction is kept"),
     Switch("gaps.passed", "slam.chains", "both_aside[k] = «(ids[head[k]], ids[tail[k]]) not in passed»",
            "True", "ends are not joined across a gap that beams passed"),
-    Switch("gaps.beams", "slam.gaps", "through = pairs[«np.count_nonzero(beams, axis=1) >= config.beams»]",
+    Switch("gaps.beams", "slam.gaps", "through = pairs[«np.count_nonzero(beams, axis=1) >= self._config.beams»]",
            "np.count_nonzero(beams, axis=1) >= 1", "by two beams of one scan"),
     Switch("chains.set_aside", "slam.chains", "both_aside = «aside[head, HEAD] & aside[tail, TAIL]»",
            NO, "ends looked at in vain join farther apart"),

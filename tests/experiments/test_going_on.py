@@ -9,6 +9,7 @@ import pytest
 from experiments.saved import SavedRun
 from experiments.scenario import TrialConfig, UsageError
 from experiments.trial import run_trial
+from explore.outcome import Outcome
 from sim.replay import Recording
 
 
@@ -23,7 +24,8 @@ def drive(world, scripted_mission):
 
 def told(steps, recording):
     """At which step a saved run is found to be another one, if at any."""
-    saved = SavedRun(TrialConfig("square"), recording)
+    log = recording.time_s, recording.ranges_m, recording.odometry
+    saved = SavedRun(TrialConfig("square"), Outcome.STEP_LIMIT, None, *log)
     for step in steps:
         try:
             saved.check(step)

@@ -111,7 +111,9 @@ def test_the_files_hold_what_they_promise(world, scripted_mission, tmp_path):
         assert map_file["lines"].shape == map_file["anchors"].shape == (8, 2)
     collection = json.loads((tmp_path / "map.geojson").read_text())
     kinds = [feature["properties"]["kind"] for feature in collection["features"]]
-    assert {kind: kinds.count(kind) for kind in set(kinds)} == {"wall": 8, "corner": 8, "chain": 2, "trajectory": 1}
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {
+        "wall": 8, "corner": 8, "chain": 2, "trajectory": 1, "start": 1,
+    }  # fmt: skip
     rows = [line.split() for line in (tmp_path / "trajectory_true.tum").read_text().splitlines()]
     assert {len(row) for row in rows} == {8}
     times = [float(row[0]) for row in rows]
