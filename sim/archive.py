@@ -58,7 +58,9 @@ def read_archive(
     try:
         with zipfile.ZipFile(source if isinstance(source, Path) else BytesIO(source)) as archive:
             return _read(archive, needed, welcome or {}, others)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeError) as error:
+    except ArchiveError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         raise ArchiveError("no archive of arrays, or one that was cut short") from error
 
 

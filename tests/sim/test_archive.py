@@ -131,3 +131,12 @@ def test_what_is_no_archive_of_arrays_is_told(tmp_path):
     for place in (tmp_path, tmp_path / "pipe", tmp_path / "nowhere"):
         with pytest.raises(OSError, match=r"folder|plain|No such"):
             read_archive(place, LAYOUT)
+
+
+def test_an_archive_without_its_first_bytes_is_told(tmp_path):
+    path = npz(tmp_path / "a.npz")
+    path.write_bytes(path.read_bytes()[62:])
+    with pytest.raises(ArchiveError, match="no archive of arrays"):
+        read_archive(path.read_bytes(), LAYOUT)
+    with pytest.raises(OSError, match="Invalid argument"):
+        read_archive(path, LAYOUT)
