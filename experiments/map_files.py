@@ -28,7 +28,7 @@ CORNER = {
     "properties": {"chain": int, "walls": tuple[int, int], "covariance_xy_m2": tuple[PAIR, PAIR] | None},
 }
 CHAIN = {"properties": {"closed": bool, "chain": int, "walls": [int]}, "geometry": {"coordinates": list}}
-TODO = "name the folder of a run"
+REMEDY = "name the folder of a run"
 
 
 def read_map(folder: Path) -> dict[str, np.ndarray]:
@@ -37,10 +37,10 @@ def read_map(folder: Path) -> dict[str, np.ndarray]:
     The covariance is NaN throughout where the back end had lost it.
     """
     path = folder / "map.npz"
-    arrays = read_arrays(path, LAYOUT, TODO)
+    arrays = read_arrays(path, LAYOUT, REMEDY)
     ids, cov = arrays["ids"], arrays["cov"]
     lost = bool(np.all(np.isnan(cov)))
-    with told(path, TODO):
+    with told(path, REMEDY):
         if len(cov) != 3 + 2 * len(ids):
             raise ArchiveError(f"a covariance of {len(cov)} columns for {len(ids)} walls")
         if np.any(np.diff(ids) <= 0) or np.any(ids < 0):
@@ -59,10 +59,10 @@ def read_features(folder: Path, ids: np.ndarray) -> dict[str, list[dict[str, Any
     `ids` are those of the map: whatever names another wall belongs to another map.
     """
     path = folder / "map.geojson"
-    said = read_json(path, {"features": [{"properties": {"kind": str}}]}, TODO)
+    said = read_json(path, {"features": [{"properties": {"kind": str}}]}, REMEDY)
     features = {kind: [f for f in said["features"] if f["properties"]["kind"] == kind] for kind in ("corner", "chain")}
     known = set(ids.tolist())
-    with told(path, TODO):
+    with told(path, REMEDY):
         for feature in fit([CORNER], features["corner"], "corners"):
             if not within(np.array(feature["geometry"]["coordinates"]), MOST_M):
                 raise UnfitError(f"a corner beyond {MOST_M:g} m")

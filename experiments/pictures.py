@@ -29,7 +29,7 @@ from .reading import UnfitError, told
 from .replay import read_run
 from .results import LOG
 from .run_folder import prepare
-from .saved import TODO, read_trial
+from .saved import REMEDY, read_trial
 from .saved_map import saved_map
 from .scenario import TrialConfig, UsageError, load_world
 from .scores import wheels_path
@@ -90,7 +90,7 @@ def read_pictured(folder: Path) -> PicturedRun:
 def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
     """Return the estimated poses (m, m, rad) and the pose's NEES from a run's `steps.csv`; raises UsageError."""
     path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad", "pose_nees")
-    with told(path, TODO):
+    with told(path, REMEDY):
         try:
             with regular(path).open(newline="") as stream:
                 rows = [[float(row[name] or "nan") for name in columns] for row in csv.DictReader(stream)]

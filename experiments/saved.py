@@ -23,7 +23,7 @@ from .results import LOG, RUNNING
 from .running_log import Kept, read_running
 from .scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
 
-TODO = "keep a run's files together, or make it anew"
+REMEDY = "keep a run's files together, or make it anew"
 NUMBERS = (
     *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
     *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
@@ -116,7 +116,7 @@ def read_saved(folder: Path) -> SavedRun:
 
 def _outcome(summary: Path) -> Outcome | None:
     try:
-        return Outcome(read_json(summary, {"outcome": str}, TODO)["outcome"])
+        return Outcome(read_json(summary, {"outcome": str}, REMEDY)["outcome"])
     except ValueError:
         return None
 
@@ -137,17 +137,17 @@ CONFIG = {"trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "
 
 def read_config(path: Path) -> SavedConfig:
     """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
-    return _config_of(read_json(path, CONFIG, TODO), path)
+    return _config_of(read_json(path, CONFIG, REMEDY), path)
 
 
 def _trial_of(kept: Kept, path: Path) -> TrialConfig:
-    with told(path, TODO):
+    with told(path, REMEDY):
         said = parse_json(kept.config, CONFIG)
     return _config_of(said, path).trial
 
 
 def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
-    with told(path, TODO):
+    with told(path, REMEDY):
         for key in said.keys() - {"format", *(key.removesuffix("?") for key in CONFIG)}:
             raise UnfitError(f"an unknown {key[:40]!r}")
         trial: TrialConfig = fit(TrialConfig, said["trial"], "trial")
@@ -161,4 +161,4 @@ def read_trial(path: Path) -> TrialConfig:
 
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a run's `summary.json`; raises UsageError."""
-    return read_json(folder / "summary.json", SUMMARY, TODO)
+    return read_json(folder / "summary.json", SUMMARY, REMEDY)

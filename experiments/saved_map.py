@@ -16,7 +16,7 @@ from viz.figures import Picture
 from .map_files import read_features
 from .picture import over_truth
 from .reading import fit, told
-from .saved import TODO, read_summary
+from .saved import REMEDY, read_summary
 from .scenario import TrialConfig, load_world
 
 _TOLD = ("path_length_m", "coverage_own_frame", "pose_rmse_m", "odometry_rmse_m")
@@ -34,7 +34,7 @@ def saved_map(
     """Return the picture of a run's map from its folder and its arrays; raises UsageError where a file is missing."""
     features = read_features(folder, walls["ids"])
     summary = read_summary(folder)
-    with told(folder / "summary.json", TODO):
+    with told(folder / "summary.json", REMEDY):
         fit({**dict.fromkeys(_TOLD, float), **dict.fromkeys(_COUNTED, int)}, summary)
     covs = [
         (np.array(feature["geometry"]["coordinates"]), np.array(feature["properties"]["covariance_xy_m2"]))

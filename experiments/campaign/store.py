@@ -22,7 +22,7 @@ from .score import Record
 from .work import Done, unpack
 
 CONFIG = "config.json"
-TODO = "name the folder of a campaign, what `compare --out` made"
+REMEDY = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
 
@@ -114,8 +114,8 @@ def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
 
 def read_config(folder: Path) -> Settled:
     """Return the config of a campaign's folder; raises UsageError where it has none."""
-    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, TODO)
-    with told(folder / CONFIG, TODO):
+    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY)
+    with told(folder / CONFIG, REMEDY):
         if MERGED in said:
             fit({MERGED: [dict], "from": [dict]}, said)
         campaigns = tuple(fit(Campaign, each, "campaign") for each in said.get(MERGED, [said.get("campaign")]))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 
 from explore.coast import look_outs_on_coast
@@ -65,6 +66,7 @@ def test_looks_from_the_coast_come_first_and_each_once_then_visits_and_then_an_e
     assert len(sweep.left) == len(on_the_coast) - first_visit, "a look from afar is no visit"
 
 
+@pytest.mark.long
 def test_amid_a_hall_the_robot_drives_little_without_a_wall_in_sight():
     """Where it went to the nearest unseen floor first it drove 9.4 m so."""
     room = shapely.orient_polygons(shapely.box(0, 0, 18, 16.7))
