@@ -102,6 +102,9 @@ class Compare:
         worlds = [load_world(world) for world in campaign.worlds]
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
         with opened(self.out, campaign) as store:
+            # A result that cannot be read is told now, not after hours of computing.
+            for trial in filter(store.has, trials(campaign)):
+                store.record(trial)
             try:
                 for world in worlds:
                     echo_world(world)
