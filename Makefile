@@ -53,24 +53,24 @@ bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
 
 random: setup
-	$(BIN)/python -m experiments.random_study --buildings 1000 --out results/random.jsonl
+	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
 
 # 312 runs of 1,500 noisy steps, about two hours of one core; begun again, it goes on where it was.
 schools: setup
-	$(BIN)/python -m experiments.schools_study --plans $(PLANS) --out results/schools-short.jsonl
+	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --out results/schools-short.jsonl
 
 bias: setup
-	$(BIN)/python -m experiments.bias_study --strategies nearest-robot nearest-start --out results/bias.csv
-	$(BIN)/python -m experiments.bias_study --association own --out results/bias-own.csv
+	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.csv
+	$(BIN)/python -m studies.consistency.bias --association own --out results/bias-own.csv
 
 heading: setup
-	$(BIN)/python -m experiments.heading_study --out results/heading.csv --picture results/heading.png
+	$(BIN)/python -m studies.consistency.heading --out results/heading.csv --picture results/heading.png
 
 courts: setup
-	$(BIN)/python -m experiments.courts_study --out results/courts.jsonl
+	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl
 
 strategies: setup
-	$(BIN)/python -m experiments.strategy_study --seeds 20 --out results/strategies.csv
+	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.csv
 
 rules: setup
 	$(BIN)/python -m studies.rules.study --plans $(PLANS) --out studies/rules/rows.jsonl

@@ -12,7 +12,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.worlds import load
-from slam.extraction import extract
+from slam.extraction.extract import extract
 from slam.robot import Scan
 
 PLANS = Path(__file__).parents[1] / "tests" / "data" / "plans"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from slam.backend import Observations
 from slam.backends.full_ekf import FullEkf
+from slam.estimation.backend import Observations
 from slam.geometry.lines import normals
 from slam.robot import Odometry
 

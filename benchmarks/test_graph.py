@@ -12,8 +12,8 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from slam.backend import Backend, Observations
 from slam.backends import BACKENDS
+from slam.estimation.backend import Backend, Observations
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import compose, to_robot, wrap
 from slam.robot import Odometry

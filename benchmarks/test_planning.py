@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from explore.explorer import Explorer
+from explore.goals.explorer import Explorer
 from explore.mission import explore_mission
 from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot

@@ -14,8 +14,8 @@ from explore.strategies import Strategy, make_strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
-from slam.backend import Backend
 from slam.backends import BACKENDS
+from slam.estimation.backend import Backend
 from slam.robot import Robot
 
 P0 = Literal["zero", "small", "large"]

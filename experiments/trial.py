@@ -11,15 +11,15 @@ from explore.mission import explore_mission
 from explore.outcome import Outcome
 from explore.step import Step
 from sim.worlds import World
-from slam.backend import Joint
+from slam.estimation.backend import Joint
 
-from .association import Votes
-from .certificate import certificate_record
-from .records import Log, Recorder
 from .scenario import Scenario, TrialConfig, UsageError, build
-from .scores import Ending, run_keys, summarise
-from .smoothing import Smoothed, smooth
-from .truth import truth_of
+from .scoring.association import Votes
+from .scoring.certificate import certificate_record
+from .scoring.records import Log, Recorder
+from .scoring.smoothing import Smoothed, smooth
+from .scoring.summary import Ending, run_keys, summarise
+from .scoring.truth import truth_of
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,18 @@ from jaxtyping import Bool, Float
 from PIL import Image, ImageDraw
 from shapely.geometry.polygon import orient
 
-from slam.chains import Chain
-from slam.stochastic_map import StochasticMap
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
 
-from .driving_field import DrivingField
-from .free_space import FreeSpace
+from .floor.free_space import FreeSpace
 from .goal import LeftPlace
+from .goals.sweep import SweepConfig
 from .outcome import Outcome
-from .paths import PathConfig
+from .planning.driving_field import DrivingField
+from .planning.paths import PathConfig
 from .step import Step
-from .sweep import SweepConfig
-from .unexplained import unexplained
-from .unseen import unseen_borders
+from .survey.frontiers import unseen_borders
+from .survey.unmapped_obstacles import unexplained
 
 WALL_FRINGE_M = 0.1
 """Floor this near to a closed contour counts as seen: two cells, into which walls and their errors reach."""

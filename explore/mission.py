@@ -8,24 +8,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slam.backend import Backend
+from slam.estimation.backend import Backend
 from slam.mapper import Mapper, MapperConfig
 from slam.robot import Odometry, Robot
 
-from .decider import Decider
-from .explorer import Explorer, ExplorerConfig
-from .floor_memory import FloorMemory, FloorMemoryConfig
-from .free_space import FreeSpace, FreeSpaceConfig
-from .homing import Homing
+from .floor.accumulated_returns import RecentReturns
+from .floor.floor_memory import FloorMemory, FloorMemoryConfig
+from .floor.free_space import FreeSpace, FreeSpaceConfig
+from .following.wall_following import Surroundings
+from .goals.decider import Decider
+from .goals.explorer import Explorer, ExplorerConfig
+from .goals.homing import Homing
+from .goals.replay_driver import Passenger
+from .goals.retreat import Retreat
 from .limits import Limits, limited
 from .outcome import Outcome
-from .passenger import Passenger
-from .recent import RecentReturns
-from .retreat import Retreat
+from .planning.visibility_graph import VisibilityGraph, followed_wall
 from .step import Step
 from .strategies import Strategy
-from .visibility import VisibilityGraph, followed_wall
-from .wall_following import Surroundings
 
 
 @dataclass(frozen=True)

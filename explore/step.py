@@ -8,13 +8,13 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.chains import Chain
-from slam.matching import Matches
+from slam.association.matching import Matches
+from slam.extraction.segments import Segments
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
 from slam.robot import MotionCommand, Odometry, Scan
-from slam.segments import Segments
-from slam.stochastic_map import StochasticMap
 
-from .free_space import FreeSpace
+from .floor.free_space import FreeSpace
 from .goal import Goal, LeftPlace, SetAside
 from .outcome import Outcome
 

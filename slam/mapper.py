@@ -7,23 +7,23 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from .backend import Backend, Observations
-from .bends import BendsConfig, bends_within, laid_across, meetings, mistaken
-from .chains import Chain, ChainConfig, connect
-from .duplicates import DuplicatesConfig, duplicate_of
-from .extraction import NO_BENDS, extract
-from .faint import FaintConfig, FaintLines
-from .firmness import are_clear, as_told
-from .gaps import Gaps, GapsConfig
-from .joint_sightings import relocate
-from .kinks import Kink, Kinks, KinksConfig
-from .matching import KnownWalls, Matches, MatchingConfig, match
-from .pieces import sure_pieces
+from .association.ambiguity import TornConfig, observed_either_way
+from .association.joint_compatibility import relocate
+from .association.matching import KnownWalls, Matches, MatchingConfig, match
+from .estimation.backend import Backend, Observations
+from .extraction.extract import NO_BENDS, extract
+from .extraction.segments import Segments
+from .extraction.visible_extent import sure_pieces
+from .map.candidates import FaintConfig, FaintLines
+from .map.chains import Chain, ChainConfig, connect
+from .map.change_points import Kink, Kinks, KinksConfig
+from .map.extents import Walls, WallsConfig
+from .map.merging import DuplicatesConfig, duplicate_of
+from .map.openings import Gaps, GapsConfig
+from .map.reliability import are_clear, as_told
+from .map.stochastic_map import StochasticMap
+from .map.vertices import BendsConfig, bends_within, laid_across, meetings, mistaken
 from .robot import Odometry, Scan
-from .segments import Segments
-from .stochastic_map import StochasticMap
-from .torn import TornConfig, observed_either_way
-from .walls import Walls, WallsConfig
 
 
 @dataclass(frozen=True)

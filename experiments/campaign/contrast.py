@@ -6,17 +6,17 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from sim.replay import FORMAT
+from sim.logs.recorded_robot import FORMAT
 
-from ..files import csv_bytes, json_bytes, write
-from ..reading import read_json
+from ..artifacts.files import csv_bytes, json_bytes, write
+from ..artifacts.reading import read_json
 from ..scenario import UsageError
-from . import shapes
-from .comparison import MEASURES, Row, difference, select
+from .comparison import shapes
+from .comparison.comparison import MEASURES, Row, difference, select
+from .comparison.tables import trial_row
 from .merge import agree, in_order, union
 from .plan import Trial, trials
 from .store import Store, opened_anew, read_campaigns, read_config
-from .tables import trial_row
 
 CONTRAST, TRIALS = "contrast.json", "contrast.csv"
 SETTINGS = ("driver", "p0", "max_steps")

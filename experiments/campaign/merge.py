@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from sim.replay import FORMAT
+from sim.logs.recorded_robot import FORMAT
 
-from ..files import json_bytes, write
+from ..artifacts.files import json_bytes, write
 from ..scenario import UsageError
-from ..scores import TIMED
+from ..scoring.summary import TIMED
+from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
-from .score import Record
+from .scores.score import Record
 from .store import CONFIG, MERGED, Store, opened_anew, plain, read_campaigns, read_config
-from .tables import write_tables
 
 SHARED = ("driver", "p0", "max_steps")
 """What campaigns must have in common to be one."""

@@ -10,7 +10,7 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.backends import BACKENDS
 
-from ..replay import Association
+from ..replays.replay import Association
 from ..scenario import P0, TrialConfig, UsageError, check, choose
 
 CLOSED, RECORDING = "closed", "recording"

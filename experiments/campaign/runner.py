@@ -11,7 +11,7 @@ from joblib.externals.loky.backend.resource_tracker import ensure_running
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..console import plain_console
+from ..terminal.console import plain_console
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform

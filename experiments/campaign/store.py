@@ -9,16 +9,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.archive import regular
-from sim.replay import FORMAT
+from sim.logs.archive import regular
+from sim.logs.recorded_robot import FORMAT
 
-from ..files import json_bytes, write
-from ..reading import Each, UnfitError, fit, read_json, told
-from ..results import config_record
-from ..run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
+from ..artifacts.files import json_bytes, write
+from ..artifacts.reading import Each, UnfitError, fit, read_json, told
+from ..artifacts.results import config_record
+from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
 from ..scenario import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
-from .score import Record
+from .scores.score import Record
 from .work import Done, unpack
 
 CONFIG = "config.json"

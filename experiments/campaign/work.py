@@ -9,25 +9,25 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from sim.archive import read_archive
-from sim.replay import FORMAT, read_log
+from sim.logs.archive import read_archive
+from sim.logs.recorded_robot import FORMAT, read_log
 from sim.worlds import World
-from slam.extraction import NO_BENDS, extract
+from slam.extraction.extract import NO_BENDS, extract
+from slam.extraction.segments import Segments
 from slam.mapper import Extractor
 from slam.robot import Scan
-from slam.segments import Segments
 
-from ..files import json_bytes, npz_bytes
-from ..reading import Each, Maybe, UnfitError, parse_json
-from ..replay import RecordedRun, ReplayOptions, replay, run_of
-from ..results import log_arrays
+from ..artifacts.files import json_bytes, npz_bytes
+from ..artifacts.reading import Each, Maybe, UnfitError, parse_json
+from ..artifacts.results import log_arrays
+from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
 from ..scenario import TrialConfig, build, load_world
+from ..scoring.truth import truth_of
 from ..trial import TrialResult, default_mission, run_scenario
-from ..truth import truth_of
-from .innovation import InnovationEar
-from .observer import Observer
 from .plan import Trial, world_key
-from .score import Record, record_of
+from .scores.innovation import InnovationEar
+from .scores.observer import Observer
+from .scores.score import Record, record_of
 
 SUMMARY = "summary_json"
 """The name under which a trial's file holds its summary."""

@@ -6,18 +6,18 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from slam.backend import Belief
 from slam.backends.block_ekf import BlockEkf
 from slam.backends.fej_ekf import FejEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.invariant_ekf import InvariantEkf
-from slam.models import innovations
+from slam.estimation.backend import Belief
+from slam.estimation.models import innovations
 from viz import palette
-from viz.panels import panels
+from viz.figures.panels import panels
 
-from ..origin_study import Study
 from ..scenario import P0_SIGMAS
 from .reproduction import Reproduction, Value
+from .runs.origin import Study
 
 FILTERS: dict[str, type[Any]] = {
     "block-ekf": BlockEkf, "full-ekf": FullEkf, "fej-ekf": FejEkf, "invariant-ekf": InvariantEkf

@@ -4,17 +4,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slam.consistency import bound_margins
+from slam.evaluation.consistency import bound_margins
 from viz import palette
-from viz.curves import paint_map
-from viz.panels import MARGIN_M, paint_curves, paint_ellipses, panels
+from viz.figures.curves import paint_map
+from viz.figures.panels import MARGIN_M, paint_curves, paint_ellipses, panels
 
 from ..scenario import TrialConfig
-from ..standing_study import stand
 from ..trial import TrialResult
-from .doubles import NONE, Double, double_entry, entered, model_space, row_of_wall
-from .drives import PAPER, last_map, log_of, replayed, there_and_back, trace_over_start
 from .reproduction import Reproduction, Value
+from .runs.doubles import NONE, Double, double_entry, entered, model_space, row_of_wall
+from .runs.drives import PAPER, last_map, log_of, replayed, there_and_back, trace_over_start
+from .runs.standing import stand
 
 DRIVES = 2
 COMPARED = (PAPER, "full-ekf", "fej-ekf", "invariant-ekf", "graph")

@@ -4,12 +4,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from slam.geometry.poses import rotation, to_world
-from viz.panels import paint_uncertain_path, panels
+from viz.figures.panels import paint_uncertain_path, panels
 
-from ..timelines import true_rings
 from ..trial import TrialResult
-from .drives import PAPER, log_of, replayed, there_and_back, to_true, trace_over_start
+from ..views.timelines import true_rings
 from .reproduction import Reproduction, Value
+from .runs.drives import PAPER, log_of, replayed, there_and_back, to_true, trace_over_start
 
 COMPARED = (PAPER, "full-ekf", "fej-ekf", "invariant-ekf", "graph")
 REPASSED_M = 0.5

@@ -1,8 +1,8 @@
 """Figure 5: the nearest open end from where the robot is, a search depth first."""
 
-from .drives import driven
 from .reproduction import Reproduction
-from .traversals import NEAREST_ROBOT, NOTES, traversal_figure, traversal_numbers
+from .runs.drives import driven
+from .runs.traversals import NEAREST_ROBOT, NOTES, traversal_figure, traversal_numbers
 
 
 def reproduce(_seed: int) -> Reproduction:

@@ -1,8 +1,8 @@
 """Figure 6: the open end nearest to the start, a pendulum about it."""
 
-from .drives import driven
 from .reproduction import Reproduction, Value
-from .traversals import NEAREST_ROBOT, NEAREST_START, NOTES, traversal_figure, traversal_numbers
+from .runs.drives import driven
+from .runs.traversals import NEAREST_ROBOT, NEAREST_START, NOTES, traversal_figure, traversal_numbers
 
 RATIO = "path over that of figure 5"
 

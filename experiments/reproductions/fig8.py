@@ -1,11 +1,11 @@
 """Figure 8: the cyclic environment of 7 m x 7 m, explored and mapped on its own."""
 
-from viz.panels import map_panels
+from viz.figures.panels import map_panels
 
 from ..scenario import TrialConfig
-from .drives import PAPER, last_map
-from .maps import compared, map_numbers, map_words, mark
 from .reproduction import Reproduction
+from .runs.drives import PAPER, last_map
+from .runs.maps import compared, map_numbers, map_words, mark
 
 
 def reproduce(seed: int) -> Reproduction:

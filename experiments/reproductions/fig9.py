@@ -3,14 +3,14 @@
 import numpy as np
 
 from explore.step import Step
-from viz.curves import SmallMap
-from viz.panels import map_panels
+from viz.figures.curves import SmallMap
+from viz.figures.panels import map_panels
 
 from ..scenario import TrialConfig
 from ..trial import TrialResult, run_trial
-from .drives import PAPER, last_map, log_of, small_map
-from .maps import compared, map_numbers, map_words, mark
 from .reproduction import Reproduction
+from .runs.drives import PAPER, last_map, log_of, small_map
+from .runs.maps import compared, map_numbers, map_words, mark
 
 STAGES_M = (4.0, 12.0)
 """Path driven at the pictures before the obstacle's chain is closed."""

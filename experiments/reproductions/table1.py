@@ -3,12 +3,12 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from viz.panels import paint_intervals, panels
+from viz.figures.panels import paint_intervals, panels
 
-from ..measurements import Z_95
 from ..scenario import TrialConfig
-from .drives import BESIDE, PAPER, driven, replayed
+from ..scoring.measurements import Z_95
 from .reproduction import Reproduction, Value
+from .runs.drives import BESIDE, PAPER, driven, replayed
 
 DRIVES = 5
 BY_HAND = {"A-B": 6.50, "A-C": 8.35, "B-C": 7.60}

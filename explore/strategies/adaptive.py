@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from ..looks import ideal_places, lane
-from ..wall_following import Surroundings
+from ..following.wall_following import Surroundings
+from ..survey.viewpoints import ideal_places, lane
 from .expectation import Expectation, expect, position_sigma, walls_seen_from
 from .nearest_robot import NearestRobot
 from .strategy import Choice, Place, Situation

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import J
-from slam.stochastic_map import StochasticMap
+from slam.map.stochastic_map import StochasticMap
 
 POSE = 3
 SIGHTING_SIGMAS = np.array([0.005, 0.004])

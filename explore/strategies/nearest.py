@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ..unexplained import is_explained
-from ..unseen import borders_on_unseen
-from ..wall_following import Surroundings
+from ..following.wall_following import Surroundings
+from ..survey.frontiers import borders_on_unseen
+from ..survey.unmapped_obstacles import is_explained
 from .strategy import Choice, Place, Situation
 
 

@@ -11,15 +11,15 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.chains import Chain, OpenEnd
-from slam.stochastic_map import StochasticMap
+from slam.map.chains import Chain, OpenEnd
+from slam.map.stochastic_map import StochasticMap
 
-from ..driving_field import DrivingField
-from ..looks import LooksConfig, ideal_places
-from ..paths import PathConfig
-from ..unexplained import look_outs, unexplained
-from ..unseen import LEAST_CELLS, pieces, unseen_borders
-from ..wall_following import Surroundings
+from ..following.wall_following import Surroundings
+from ..planning.driving_field import DrivingField
+from ..planning.paths import PathConfig
+from ..survey.frontiers import LEAST_CELLS, pieces, unseen_borders
+from ..survey.unmapped_obstacles import look_outs, unexplained
+from ..survey.viewpoints import LooksConfig, ideal_places
 
 
 @dataclass(frozen=True, eq=False)

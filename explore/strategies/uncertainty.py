@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from slam.chains import HEAD, OpenEnd
 from slam.geometry.lines import directions
+from slam.map.chains import HEAD, OpenEnd
 
-from ..looks import ideal_places
+from ..survey.viewpoints import ideal_places
 from .expectation import SIGHTING_SIGMAS, Expectation, expect, walls_seen_from
 from .strategy import Choice, Situation
 

@@ -9,15 +9,15 @@ import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
-from .files import read_bytes, read_json_map
-from .random_building import read_seed
-from .raster import read_image
-from .ros_map import read_ros_map
+from .random.random_building import read_seed
+from .readers.files import read_bytes, read_json_map
+from .readers.raster import read_image
+from .readers.ros_map import read_ros_map
+from .readers.svg import read_svg
 from .solid import build
-from .svg import read_svg
 from .world import World
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "bundled"
 
 
 @dataclass(frozen=True)

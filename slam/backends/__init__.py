@@ -6,7 +6,7 @@ from importlib import import_module
 
 import numpy as np
 
-from ..backend import Backend
+from ..estimation.backend import Backend
 from .block_ekf import BlockEkf
 from .fej_ekf import FejEkf
 from .full_ekf import FullEkf
@@ -35,6 +35,8 @@ BACKENDS: dict[str, BackendEntry] = {
     "full-ekf": BackendEntry(FullEkf, "EKF with every cross-covariance, one joint update a scan (baseline)"),
     "fej-ekf": BackendEntry(FejEkf, "full EKF with its Jacobians at first estimates: gains nothing unobservable"),
     "invariant-ekf": BackendEntry(InvariantEkf, "full EKF with the right-invariant error: gains nothing unobservable"),
-    "graph": BackendEntry(_lazily("graph", "Graph"), "factor graph (GTSAM iSAM2): every pose kept and relinearised"),
-    "graph-batch": BackendEntry(_lazily("graph_batch", "GraphBatch"), "as graph, and everything optimised at the end"),
+    "graph": BackendEntry(
+        _lazily("graph.graph", "Graph"), "factor graph (GTSAM iSAM2): every pose kept and relinearised"
+    ),
+    "graph-batch": BackendEntry(_lazily("graph.batch", "GraphBatch"), "as graph, and everything optimised at the end"),
 }

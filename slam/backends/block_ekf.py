@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import Observations
-from ..models import stack
-from .block_map import BlockMap
-from .ekf import Ekf
+from ..estimation.backend import Observations
+from ..estimation.models import stack
+from .kalman.block_map import BlockMap
+from .kalman.ekf import Ekf
 
 
 class BlockEkf(Ekf[BlockMap]):

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import Observations
-from ..models import Growth, Innovations, Motion, grow, innovations, move
+from ..estimation.backend import Observations
+from ..estimation.models import Growth, Innovations, Motion, grow, innovations, move
 from ..robot import Odometry
-from .dense_map import DenseMap
-from .ekf import Ekf
-from .linear import carry
+from .kalman.dense_map import DenseMap
+from .kalman.ekf import Ekf
+from .kalman.linear import carry
 
 
 class FejEkf(Ekf[DenseMap]):

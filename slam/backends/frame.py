@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from ..backend import Joint
+from ..estimation.backend import Joint
+from ..estimation.models import move
 from ..geometry.lines import directions, normals
 from ..geometry.poses import J, compose, rotation, wrap
-from ..models import move
 from ..robot import Odometry
 
 

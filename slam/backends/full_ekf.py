@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from .dense_map import DenseMap
-from .ekf import Ekf
+from .kalman.dense_map import DenseMap
+from .kalman.ekf import Ekf
 
 
 class FullEkf(Ekf[DenseMap]):

@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..backend import POSE, Observations
-from ..models import Linear, stack
-from .dense_map import DenseMap
-from .ekf import Ekf
-from .linear import carry
+from ..estimation.backend import POSE, Observations
+from ..estimation.models import Linear, stack
+from .kalman.dense_map import DenseMap
+from .kalman.ekf import Ekf
+from .kalman.linear import carry
 
 
 class InvariantEkf(Ekf[DenseMap]):

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from .block_map import BlockMap
-from .ekf import Ekf
+from .kalman.block_map import BlockMap
+from .kalman.ekf import Ekf
 
 
 class JointBlockEkf(Ekf[BlockMap]):

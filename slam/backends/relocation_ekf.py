@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..backend import POSE, Observations
+from ..estimation.backend import POSE, Observations
+from ..estimation.models import Linear, innovations, stack
 from ..geometry.poses import wrap
-from ..models import Linear, innovations, stack
-from .dense_map import DenseMap, cholesky
-from .ekf import Ekf
+from .kalman.dense_map import DenseMap, cholesky
+from .kalman.ekf import Ekf
 
 
 class RelocationEkf(Ekf["RelocationMap"]):

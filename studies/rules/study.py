@@ -89,7 +89,7 @@ def main() -> int:
     study = tyro.cli(Study, prog="studies.rules.study")
     install(fitting(SWITCHES))
     study.out.parent.mkdir(parents=True, exist_ok=True)
-    code = importlib.import_module("experiments.rows").fingerprint()
+    code = importlib.import_module("studies.runner.rows").fingerprint()
     used = 0.0
     for file, steps in study.trials():
         rows = [row for row in read(study.out) if row["code"] == code]
@@ -101,7 +101,7 @@ def main() -> int:
 
 def _drive(study: Study, file: Path, max_steps: int, rows: list[Row]) -> float:
     """Drive one plan, with all rules and, forked off, without each of those still in question; return seconds taken."""
-    scenario, trials = (importlib.import_module(f"experiments.{name}") for name in ("scenario", "rows"))
+    scenario, trials = (importlib.import_module(name) for name in ("experiments.scenario", "studies.runner.rows"))
     there = {row["rule"]: row for row in rows if row["plan"] == file.stem}
     wanted = {rule for rule in study.rules if rule not in there and not is_clearly_worse(rows, rule)}
     if BASELINE in there:

@@ -5,21 +5,21 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
-from experiments.association import Votes
-from experiments.coverage import alignment
-from experiments.records import Log
 from experiments.scenario import Scenario, TrialConfig, build
-from experiments.scores import Ending, summarise
-from experiments.truth import truth_of
-from explore.free_space import FreeSpace
+from experiments.scoring.association import Votes
+from experiments.scoring.coverage import alignment
+from experiments.scoring.records import Log
+from experiments.scoring.summary import Ending, summarise
+from experiments.scoring.truth import truth_of
+from explore.floor.free_space import FreeSpace
 from explore.outcome import Outcome
 from explore.step import Step
 from sim.robot import RobotConfig
-from slam.backend import Joint
+from slam.association.matching import NO_MATCHES
+from slam.estimation.backend import Joint
+from slam.extraction.segments import Segments
 from slam.geometry.poses import inverse, to_world
-from slam.matching import NO_MATCHES
 from slam.robot import Odometry, Scan
-from slam.segments import Segments
 
 BEAMS = 36
 TRUE = np.array([[1.0, 1.0, 0.0], [1.1, 1.5, 0.5], [1.2, 1.3, 3.1]])

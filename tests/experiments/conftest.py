@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.free_space import FreeSpace
+from explore.floor.free_space import FreeSpace
 from explore.outcome import Outcome
 from explore.step import Step
 from sim.worlds import World
-from slam.backend import Belief, Joint
-from slam.chains import Chain, OpenEnd
+from slam.association.matching import NO_MATCHES
+from slam.estimation.backend import Belief, Joint
+from slam.extraction.segments import Segments
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import to_robot
-from slam.matching import NO_MATCHES
+from slam.map.chains import Chain, OpenEnd
+from slam.map.stochastic_map import StochasticMap
 from slam.robot import MotionCommand, Odometry
-from slam.segments import Segments
-from slam.stochastic_map import StochasticMap
 
 
 def square(low, high):

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.free_space import FreeSpace
-from explore.looks import LooksConfig
-from explore.paths import PathConfig
+from explore.floor.free_space import FreeSpace
+from explore.following.wall_following import Surroundings
+from explore.planning.paths import PathConfig
+from explore.planning.visibility_graph import followed_wall
 from explore.strategies import Situation
-from explore.visibility import followed_wall
-from explore.wall_following import Surroundings
+from explore.survey.viewpoints import LooksConfig
 from sim.lidar import LidarConfig, RangeFinder
-from slam.backend import Belief, Joint
-from slam.chains import Chain, OpenEnd
+from slam.estimation.backend import Belief, Joint
 from slam.geometry.lines import normals, through
+from slam.map.chains import Chain, OpenEnd
+from slam.map.stochastic_map import StochasticMap
 from slam.robot import Scan
-from slam.stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True)

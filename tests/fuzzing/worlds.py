@@ -177,7 +177,7 @@ def _good() -> dict[str, bytes]:
         "rooms.geojson": json.dumps({"type": "FeatureCollection", "features": rooms}).encode(),
         "lines.geojson": json.dumps({"type": "FeatureCollection", "features": [*drawn, *rooms[2:]]}).encode(),
         "own.geojson": json.dumps({"type": "FeatureCollection", "features": chains, **own}).encode(),
-        "map.svg": (Path(sim.worlds.__file__).parent / "rooms.svg").read_bytes(),
+        "map.svg": (Path(sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(),
         "map.yaml": f"{yaml}occupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n".encode(),
         "map.pgm": _encoded(image, "PPM"),
         "map.png": _encoded(image, "PNG"),

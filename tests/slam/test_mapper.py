@@ -7,11 +7,11 @@ import pytest
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
+from slam.association.matching import NO_MATCHES, match
 from slam.backends import BACKENDS
-from slam.extraction import extract
+from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
 from slam.mapper import Mapper
-from slam.matching import NO_MATCHES, match
 from slam.robot import Odometry, Scan
 
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2

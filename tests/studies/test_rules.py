@@ -122,6 +122,6 @@ def test_one_run_that_ends_worse_is_told_and_two_end_the_study(changes, words):
 def test_the_table_says_what_holds_a_rule_and_what_got_worse_without_it():
     name = "matching.beside"
     rows = json.loads(json.dumps(runs(false_matches=3)).replace('"cap"', f'"{name}"'))
-    made = tables({name: "tests/slam/test_gate.py::test_short[a]"}, rows)
+    made = tables({name: "tests/slam/association/test_gate.py::test_short[a]"}, rows)
     (line,) = (line for line in made.splitlines() if line.startswith(f"| `{name}`"))
     assert line.endswith("| 6 of 6 plans | worse: false matches 6 to 18 (99.0 sigmas); fails `test_short` |")

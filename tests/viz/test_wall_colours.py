@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slam.backend import Belief
-from slam.chains import Chain
-from slam.stochastic_map import StochasticMap
+from slam.estimation.backend import Belief
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
 from viz import palette
 from viz.timeline.colours import WallColours, packed
 

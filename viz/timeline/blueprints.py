@@ -6,12 +6,12 @@ import numpy as np
 import rerun.blueprint as rrb
 from jaxtyping import Float
 
-from .curves import CHAINS, CLOSED, ENDS, LINES, LOG_NEES, NEES, PATH, POSE_BAND, STEP_MS, TRACE
-from .map_layers import style
-from .model_layer import TIMES
+from .layers.curves import CHAINS, CLOSED, ENDS, LINES, LOG_NEES, NEES, PATH, POSE_BAND, STEP_MS, TRACE
+from .layers.map_layers import style
+from .layers.model_layer import TIMES
+from .layers.robot_layers import POSE_TIMES
+from .layers.sights import UNITS_PER_M
 from .recording import SIM_TIME, STEP
-from .robot_layers import POSE_TIMES
-from .sights import UNITS_PER_M
 
 WHITE = (255, 255, 255)
 STEP_MS_NAME, STEP_MS_SPAN = "time of a step, ms (cut at 200)", (0.0, 200.0)

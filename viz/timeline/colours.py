@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Int, UInt32
 
-from slam.chains import Chain
-from slam.stochastic_map import StochasticMap
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
 
 from .. import palette
 

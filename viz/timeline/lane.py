@@ -8,14 +8,14 @@ from jaxtyping import Float
 from explore.step import Step
 
 from .block import Block
-from .curves import Curves, Decisions
-from .map_layers import Corners, OpenEnds, Plan, Swept, Walls
-from .model_layer import ModelSpace
+from .layers.curves import Curves, Decisions
+from .layers.map_layers import Corners, OpenEnds, Plan, Swept, Walls
+from .layers.model_layer import ModelSpace
+from .layers.robot_layers import Robot, Seen
+from .layers.sights import SightsLayer
+from .layers.truth import Nees, NeesOf, Truth
 from .moment import Keeper, Moment
 from .recording import Recording
-from .robot_layers import Robot, Seen
-from .sights import SightsLayer
-from .truth import Nees, NeesOf, Truth
 
 
 class Layer(Protocol):

@@ -6,14 +6,14 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from explore.free_space import FreeSpace, FreeSpaceConfig
+from explore.floor.free_space import FreeSpace, FreeSpaceConfig
 from explore.goal import Goal, SetAside
+from explore.planning.visibility_graph import NEIGHBOUR
 from explore.step import Step
-from explore.visibility import NEIGHBOUR
-from slam.chains import Chain
-from slam.matching import Matches
+from slam.association.matching import Matches
+from slam.extraction.segments import Segments
+from slam.map.chains import Chain
 from slam.robot import Scan
-from slam.segments import Segments
 
 from .colours import WallColours
 

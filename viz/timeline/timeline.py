@@ -12,12 +12,12 @@ from slam.geometry.lines import through
 
 from .. import palette
 from .blueprints import blueprint, comparison, one_run
-from .campaign import Row, Summary
 from .colours import packed
 from .lane import Lane
-from .model_plane import Plane
+from .layers.campaign import Row, Summary
+from .layers.model_plane import Plane
+from .layers.truth import NeesOf, Truth
 from .recording import Recording
-from .truth import NeesOf, Truth
 from .words import legend
 
 BLOCK = 500

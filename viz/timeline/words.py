@@ -1,7 +1,7 @@
 """What a newcomer reads beside the picture."""
 
-from .model_layer import TIMES
-from .robot_layers import POSE_TIMES
+from .layers.model_layer import TIMES
+from .layers.robot_layers import POSE_TIMES
 
 
 def legend(title: str, plans: bool) -> str:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments import replay as replays
 from experiments.campaign.plan import ARMS, Campaign, Trial, config_of
 from experiments.campaign.work import Job, perform, unpack
-from slam.matching import match
+from experiments.replays import replay as replays
+from slam.association.matching import match
 
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 1, max_steps=12)
 DRIVE = Trial("paper-fig4", "nearest-robot", "", "recording", 2)

@@ -8,7 +8,7 @@ import pytest
 from experiments.campaign.merge import merge
 from experiments.campaign.plan import Campaign
 from experiments.campaign.store import read_campaigns
-from experiments.cli import main
+from experiments.commands.cli import main
 from experiments.scenario import UsageError
 from tests.experiments.campaign.running import run
 

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.page import page_of
+from experiments.campaign.comparison.words import command_of, interval, verdict
+from experiments.campaign.pages.page import page_of
 from experiments.campaign.plan import Campaign
-from experiments.campaign.words import command_of, interval, number, verdict
-from experiments.cli import main
+from experiments.commands.cli import main
+from experiments.views.numbers import number
 from tests.experiments.campaign.running import run
-from viz.report import LONG_ROWS, Page, PageTable, Section, filled, html
+from viz.reports.report import LONG_ROWS, Page, PageTable, Section, filled, html
 
 CAMPAIGN = Campaign(
     ("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot", "nearest-start"), 2,
@@ -180,7 +181,7 @@ def test_numbers_are_short_and_never_in_powers_of_ten():
 def test_the_command_on_the_page_runs_the_campaign_again():
     import tyro
 
-    from experiments.compare_command import Compare
+    from experiments.commands.compare import Compare
 
     words = command_of(CAMPAIGN).split()
     assert tyro.cli(Compare, args=words[2:]).campaign == CAMPAIGN

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from experiments.campaign import work
+from experiments.campaign.comparison.tables import TIMINGS, write_tables
 from experiments.campaign.plan import Campaign, Trial, config_of, trials
 from experiments.campaign.runner import on_cores, run_campaign
 from experiments.campaign.store import opened, read_campaigns
-from experiments.campaign.tables import TIMINGS, write_tables
 from experiments.campaign.work import Job, perform
-from experiments.cli import main
-from slam.extraction import extract
+from experiments.commands.cli import main
+from slam.extraction.extract import extract
 from slam.robot import Scan
 from tests.experiments.campaign.running import run
 
@@ -44,7 +44,7 @@ def tables(folder):
 
 STRUCK = """
 import os, signal, sys, time
-from experiments import cli
+from experiments.commands import cli
 from experiments.campaign.store import Store
 
 number, left, save = int(sys.argv.pop(1)), int(sys.argv.pop(1)), Store.save
@@ -65,7 +65,7 @@ sys.exit(cli.main())
 
 def start(folder, *more, struck=None):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    program = ["-m", "experiments.cli"] if struck is None else ["-c", STRUCK, *map(str, map(int, struck))]
+    program = ["-m", "experiments.commands.cli"] if struck is None else ["-c", STRUCK, *map(str, map(int, struck))]
     command = [sys.executable, *program, "compare", *WORDS, "--out", str(folder), *more]
     return subprocess.Popen(command, env=environment, start_new_session=True, stdout=subprocess.DEVNULL)
 

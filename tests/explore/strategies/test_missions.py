@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.explorer import Explorer, ExplorerConfig
-from explore.free_space import FreeSpace
+from explore.floor.free_space import FreeSpace
+from explore.following.wall_following import Surroundings
+from explore.goals.explorer import Explorer, ExplorerConfig
 from explore.mission import MissionConfig, explore_mission
+from explore.planning.visibility_graph import VisibilityGraph
 from explore.strategies import STRATEGIES, Strategy
-from explore.visibility import VisibilityGraph
-from explore.wall_following import Surroundings
 from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS

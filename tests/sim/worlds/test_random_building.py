@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sim.worlds import World, WorldError, listing, load
-from sim.worlds.floor_plan import DOOR_M, STYLES, floor_plan
+from sim.worlds.random.floor_plan import DOOR_M, STYLES, floor_plan
 from sim.worlds.world import SENSOR_RANGE_M
 
 SEEDS = st.integers(0, 2**64 - 1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from slam.backend import Observations
+from slam.estimation.backend import Observations
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
 

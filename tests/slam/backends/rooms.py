@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slam.backend import Backend, Observations
 from slam.backends import BACKENDS
+from slam.estimation.backend import Backend, Observations
 from slam.geometry.poses import compose, wrap
 from slam.robot import Odometry
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backend import StaleBeliefError
 from slam.backends import BACKENDS
+from slam.estimation.backend import StaleBeliefError
 from slam.robot import Odometry
 from tests.slam.backends.rooms import P0, START, Room, everything, journey, see
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backend import Observations
 from slam.backends import BACKENDS
+from slam.estimation.backend import Observations
 from slam.geometry.poses import compose, to_world, wrap
 from tests.slam.backends.rooms import P0, START, Room, assert_sound, everything, journey, odometry, see, volume
 

@@ -4,9 +4,9 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from slam.backend import Observations
 from slam.backends import BACKENDS
-from slam.consistency import joint_error, nees, pose_covariances, pose_errors
+from slam.estimation.backend import Observations
+from slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backend import Observations
 from slam.backends import BACKENDS
 from slam.backends.block_ekf import weighted_mean
-from slam.backends.dense_map import DenseMap
 from slam.backends.full_ekf import FullEkf
-from slam.models import Linear
+from slam.backends.kalman.dense_map import DenseMap
+from slam.estimation.backend import Observations
+from slam.estimation.models import Linear
 from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backend import Joint
 from slam.backends import BACKENDS
 from slam.backends.frame import Frame
+from slam.estimation.backend import Joint
 from slam.geometry.poses import compose, inverse, to_world, wrap
 from slam.robot import Odometry
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from slam.backend import Observations, StaleBeliefError
 from slam.backends import BACKENDS
+from slam.estimation.backend import Observations, StaleBeliefError
 from slam.geometry.poses import wrap
 from slam.robot import Odometry
 

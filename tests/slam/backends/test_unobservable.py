@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backend import Observations
 from slam.backends import BACKENDS
-from slam.backends.dense_map import DenseMap
-from slam.backends.linear import carry, equality
+from slam.backends.kalman.dense_map import DenseMap
+from slam.backends.kalman.linear import carry, equality
+from slam.estimation.backend import Observations
+from slam.estimation.models import grow, innovations, move
 from slam.geometry.poses import J
-from slam.models import grow, innovations, move
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import least_squares
 
-from slam.backend import Observations
+from slam.estimation.backend import Observations
+from slam.estimation.models import innovations, lines_robot
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import compose, inverse, to_robot, wrap
-from slam.models import innovations, lines_robot
 from slam.robot import Odometry
 
 P0 = np.array([[4e-4, 5e-5, 1e-5], [5e-5, 3e-4, -2e-5], [1e-5, -2e-5, 1e-4]])
@@ -69,7 +69,7 @@ class Trip:
     def dense(self, anchors: np.ndarray, form: str = "shared"):
         """Solve the whole problem with scipy; return poses, lines (alpha, d) by wall, and the covariance of all.
 
-        `shared` takes errors as `slam.models.innovations` does, `plain` as differences of (alpha, r).
+        `shared` takes errors as `slam.estimation.models.innovations` does, `plain` as differences of (alpha, r).
         """
         n, rows = len(self.seen), [(k, *s) for k, sightings in enumerate(self.seen) for s in sightings]
         step = np.array([r[0] for r in rows])

@@ -6,15 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.lines import (
-    directions,
-    distance_to_segments,
-    intersect,
-    lines_to_world,
-    normals,
-    project,
-    through,
-)
+from slam.geometry.lines import directions, distance_to_segments, intersect, lines_to_world, normals, project, through
 from slam.geometry.poses import J, to_world
 
 seeds = st.integers(0, 2**32)

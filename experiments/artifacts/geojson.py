@@ -1,0 +1,129 @@
+"""The map as GeoJSON, in local metres: walls and corners with covariances, chains, what is left open or unseen."""
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
+from explore.step import Step
+from sim.logs.recorded_robot import FORMAT
+from slam.estimation.backend import Joint
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+
+from ..scoring.certificate import contour_record, open_end_record, unexplained_record, unseen_record
+from ..scoring.corners import Corner, corners
+from ..scoring.records import Log
+
+FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
+LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
+
+
+def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: Log) -> dict[str, Any]:
+    """Return the map of the last step with what the mission can vouch for; covariances are null without `joint`.
+
+    RFC 7946 knows longitudes and latitudes only. A building's map has none, so the file says so twice: in words, and
+    as the `crs` of the GeoJSON of 2008, which GDAL (and so QGIS) reads as a local system in metres.
+    """
+    walls, chains = step.map, step.chains
+    found = corners(walls, chains)
+    return {
+        "type": "FeatureCollection",
+        "name": "map",
+        "format": FORMAT,
+        "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
+        "coordinate_system": FRAME,
+        "features": [
+            *(_contour_feature(contour) for contour in certificate.contours),
+            *(_chain_feature(k, chain, walls) for k, chain in enumerate(chains) if not chain.is_closed),
+            *_wall_features(walls, chains, joint),
+            *(_corner_feature(k, corner, joint) for k, corner in enumerate(found)),
+            *(_open_end_feature(end) for end in certificate.open_ends),
+            *(_unseen_feature(border) for border in certificate.unseen or ()),
+            *(_unexplained_feature(thing) for thing in certificate.unexplained or ()),
+            _trajectory_feature(log),
+            _start_feature(log),
+        ],
+    }
+
+
+def _feature(geometry: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "geometry": {"type": geometry, "coordinates": coordinates},
+        "properties": properties,
+    }
+
+
+def _wall_features(walls: StochasticMap, chains: tuple[Chain, ...], joint: Joint | None) -> list[dict[str, Any]]:
+    chain_of = {wall: index for index, chain in enumerate(chains) for wall in chain.walls}
+    features = []
+    for row, wall in enumerate(walls.ids.tolist()):
+        own = slice(3 + 2 * row, 5 + 2 * row)
+        features.append(
+            _feature(
+                "LineString",
+                walls.ends_world[row],
+                kind="wall",
+                id=wall,
+                chain=chain_of.get(wall),
+                tentative=bool(walls.tentative[row]),
+                crooked=bool(walls.crooked[row]),
+                sightings=int(walls.sightings[row]),
+                alpha_rad=walls.belief.means[row, 0],
+                d_m=walls.belief.means[row, 1],
+                anchor_m=walls.belief.anchors[row],
+                covariance_alpha_d=None if joint is None else joint.cov[own, own],
+            )
+        )
+    return features
+
+
+def _corner_feature(index: int, corner: Corner, joint: Joint | None) -> dict[str, Any]:
+    return _feature(
+        "Point",
+        corner.position_world,
+        kind="corner",
+        id=index,
+        chain=corner.chain,
+        walls=corner.walls,
+        covariance_xy_m2=None if joint is None else corner.cov(joint),
+    )
+
+
+def _contour_feature(contour: Contour) -> dict[str, Any]:
+    """Return a closed chain; the corners of the polygon are those of the chain."""
+    ring = shapely.get_coordinates(contour.polygon)
+    return _feature("Polygon", [ring], kind="chain", closed=True, **contour_record(contour))
+
+
+def _chain_feature(index: int, chain: Chain, walls: StochasticMap) -> dict[str, Any]:
+    """Return a chain that is open at both its ends."""
+    ends = walls.ends_world[walls.belief.rows((chain.walls[0], chain.walls[-1]))]
+    way = np.concatenate([ends[:1, 0], chain.corners_world, ends[1:, 1]])
+    return _feature("LineString", way, kind="chain", closed=False, chain=index, walls=chain.walls)
+
+
+def _open_end_feature(end: LeftOpen) -> dict[str, Any]:
+    return _feature("Point", end.position_world, kind="open-end", **open_end_record(end))
+
+
+def _unseen_feature(border: LeftUnseen) -> dict[str, Any]:
+    return _feature("MultiPoint", border.cells_world, kind="unseen", **unseen_record(border))
+
+
+def _unexplained_feature(thing: LeftUnexplained) -> dict[str, Any]:
+    return _feature("MultiPoint", thing.cells_world, kind="unexplained", **unexplained_record(thing))
+
+
+def _trajectory_feature(log: Log) -> dict[str, Any]:
+    """Return the estimated way; a run of one step has a way of no length."""
+    way = log.estimated_world[:, :2] if len(log) > 1 else np.repeat(log.estimated_world[:, :2], 2, axis=0)
+    return _feature("LineString", way, kind="trajectory", steps=len(log), path_length_m=log.path_length_m[-1])
+
+
+def _start_feature(log: Log) -> dict[str, Any]:
+    """Return where the robot believes to have started: explored as a world, the map has a start."""
+    x, y, heading = log.estimated_world[0]
+    return _feature("Point", [x, y], kind="start", id="start", heading=heading)

@@ -1,0 +1,42 @@
+"""The robot's own free space as a ROS map: `map.pgm`, a grey picture, and `map.yaml`, which says where it lies."""
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.floor.free_space import FreeSpace
+
+FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+"""The greys of ROS map_server's map_saver."""
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
+BORDER_CELLS = 4
+"""Unknown cells kept around all that was seen."""
+
+
+def occupancy_files(free_space: FreeSpace, start_world: Float[np.ndarray, "3"]) -> tuple[bytes, bytes]:
+    """Return the bytes of `map.pgm` and `map.yaml`; raises ValueError where nothing was seen.
+
+    The first row of the picture is the one farthest up; the origin is the outer corner of its lower left pixel,
+    in the world frame of the map. `start_world` goes into a comment.
+    """
+    evidence = free_space.evidence
+    seen = np.argwhere(evidence != 0)
+    if not len(seen):
+        raise ValueError("expected floor that was seen, found none: this robot kept no free space")
+    low = np.maximum(seen.min(axis=0) - BORDER_CELLS, 0)
+    high = np.minimum(seen.max(axis=0) + 1 + BORDER_CELLS, evidence.shape)
+    cells = evidence[low[0] : high[0], low[1] : high[1]]
+    grey = np.where(cells < 0, FREE, np.where(cells > 0, OCCUPIED, UNKNOWN)).astype(np.uint8)[::-1]
+    x, y = free_space.origin_world + low[::-1] * free_space.config.cell_m
+    head = f"P5\n# metres: {free_space.config.cell_m:g} a pixel\n{grey.shape[1]} {grey.shape[0]}\n255\n"
+    start = ", ".join(f"{value:.4f}" for value in start_world)
+    words = (
+        f"# seen by the robot, at the poses that it estimated; it started at [{start}] (x m, y m, heading rad)\n"
+        "image: map.pgm\n"
+        "mode: trinary\n"
+        f"resolution: {free_space.config.cell_m:g}\n"
+        f"origin: [{x:.6g}, {y:.6g}, 0]\n"
+        "negate: 0\n"
+        f"occupied_thresh: {OCCUPIED_THRESH:g}\n"
+        f"free_thresh: {FREE_THRESH:g}\n"
+    )
+    return head.encode() + grey.tobytes(), words.encode()

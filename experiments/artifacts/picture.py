@@ -1,0 +1,79 @@
+"""The picture of a run's map: the estimate, and the truth moved by the initial pose error under it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+from jaxtyping import Float
+
+from explore.goal import SetAside
+from sim.worlds import World
+from slam.geometry.poses import compose, inverse, to_world
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+from viz.figures.maps import Picture, draw_map, png
+
+from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..scoring.corners import corners
+from ..scoring.coverage import own_alignment
+from ..trial import TrialResult
+
+
+def picture_of(result: TrialResult) -> bytes:
+    """Return the PNG of a trial's map; raises ValueError where there was no step to draw."""
+    if result.log is None or result.last is None:
+        raise ValueError("expected a run of at least one step, found none: there is no map to draw")
+    log, last, scenario = result.log, result.last, result.scenario
+    known = [
+        (corner.position_world, cov)
+        for corner in corners(last.map, last.chains)
+        if result.joint is not None and (cov := corner.cov(result.joint)) is not None
+    ]
+    return png(
+        draw_map(
+            over_truth(
+                scenario.world, scenario.config, result.summary, last.map, last.chains, last.set_aside, known,
+                log.estimated_world, log.true_world, scenario.start_estimate,
+            )
+        )
+    )  # fmt: skip
+
+
+def over_truth(
+    world: World,
+    config: TrialConfig,
+    summary: Mapping[str, Any],
+    walls: StochasticMap,
+    chains: tuple[Chain, ...],
+    set_aside: tuple[SetAside, ...],
+    corners_with_covs: list[tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"]]],
+    estimated_world: Float[np.ndarray, "s 3"],
+    true_world: Float[np.ndarray, "s 3"],
+    start_estimate: Float[np.ndarray, "3"],
+) -> Picture:
+    """Return what the picture of a map shows."""
+    to_estimate = inverse(own_alignment(start_estimate, estimated_world, true_world, summary["map_began_step"]))
+    rings = (world.free.exterior, *world.free.interiors)
+    off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
+    laid_over = " laid over the truth" if summary["map_began_step"] else ""
+    words = [
+        f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
+        f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
+        f"coverage {100 * summary['coverage_own_frame']:.1f} %{laid_over}",
+        f"pose error rms {off_cm:.1f} cm (wheels alone {wheels_cm:.0f} cm)",
+    ]
+    noise = "errorless" if config.errorless else f"seed {config.seed}"
+    how = "replayed" if config.strategy == STRATEGY_OF_REPLAYS else config.strategy
+    return Picture(
+        map=walls,
+        chains=chains,
+        path_world=estimated_world,
+        title=f"{world.name}   {config.backend}, {how}, {noise}",
+        subtitle="grid 1 m;  " + ";  ".join(words),
+        set_aside=set_aside,
+        true_path_world=np.array([compose(to_estimate, pose) for pose in true_world]),
+        corners_world=np.array([place for place, _ in corners_with_covs]).reshape(-1, 2),
+        corner_covs=np.array([cov for _, cov in corners_with_covs]).reshape(-1, 2, 2),
+        true_floor=tuple(to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings),
+    )

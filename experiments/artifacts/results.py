@@ -1,0 +1,210 @@
+"""The folder that a trial leaves: all that is needed to look at it, score it again, replay it and run it again."""
+
+import platform
+import subprocess
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from sim.logs.recorded_robot import FORMAT
+from slam.evaluation.consistency import pose_errors
+from slam.geometry.poses import wrap
+from viz.figures.floor_plan import floor_plan
+
+from ..scenario import TrialConfig
+from ..scoring.records import Log
+from ..scoring.summary import odometry_path, pose_nees
+from ..trial import TrialResult
+from .files import csv_bytes, json_bytes, npz_bytes, write
+from .geojson import map_geojson
+from .occupancy import occupancy_files
+from .picture import picture_of
+
+PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
+CONFIG, LOG, SUMMARY = "config.json", "log.npz", "summary.json"
+RUNNING = "log.arrow"
+"""The log while the run goes on: it is there until all results are."""
+RECORDING = "run.rrd"
+RUN_FILES = (
+    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, "map.npz", "map.geojson", "map.svg", "map.png", "map.pgm"),
+    *("map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
+    *(RECORDING, "report.html", "tables.tex"),
+)
+"""All that a run leaves, and what `view` and `report` make of it in the same folder."""
+REPLAY = "replay"
+"""In `config.json`: the options of a replay; none for a run that drove."""
+STEP_COLUMNS = (
+    *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
+    *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
+    *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
+    *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
+    *("odometry_error_m", "collisions", "reason", "step_ms"),
+)
+"""Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
+with the poses beside it, all that `pose_nees` is made of."""
+
+
+def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | None = None) -> list[str]:
+    """Write every file of a trial into `folder`, and return, in words, what could not be written and why.
+
+    `config` is what `config.json` holds, by default the record of the trial's settings. One file that fails does not
+    cost the others.
+    """
+    problems: dict[str, list[str]] = {}
+    for name, make in _files(result, config or config_record(result.scenario.config)).items():
+        try:
+            write(folder / name, make())
+        except Exception as error:  # nothing that was computed may be lost to one bad file
+            known = error.strerror if isinstance(error, OSError) else None
+            why = known or f"{type(error).__name__}: {' '.join(str(error).split())}"
+            problems.setdefault(why, []).append(name)
+    if not result.ending.traceback:
+        (folder / "failure.txt").unlink(missing_ok=True)
+    return [f"{', '.join(names)}: {why}" for why, names in problems.items()]
+
+
+def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
+    files: dict[str, Callable[[], bytes]] = {
+        CONFIG: lambda: json_bytes(config),
+        SUMMARY: lambda: json_bytes({"format": FORMAT} | result.summary),
+    }
+    if result.ending.traceback:
+        files["failure.txt"] = lambda: result.ending.traceback.encode()
+    log, last = result.log, result.last
+    certificate = result.certificate
+    if log is None or last is None or certificate is None:
+        return files
+    smoothed = result.smoothed
+    if smoothed is not None:
+        files["trajectory_smoothed.tum"] = lambda: tum(log.time_s, smoothed.poses_world)
+    title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
+    files |= {
+        LOG: lambda: npz_bytes(log_arrays(result, log)),
+        "map.npz": lambda: npz_bytes(map_arrays(result)),
+        "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
+        "steps.csv": lambda: steps_csv(log),
+        "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
+        "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
+        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title),
+        "map.png": lambda: picture_of(result),
+    }
+    if last.free_space.evidence.size:
+        # Both come from one pass over the grid; a recorded robot keeps none.
+        files["map.pgm"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[0]
+        files["map.yaml"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[1]
+    return files
+
+
+def config_record(config: TrialConfig) -> dict[str, Any]:
+    """Return all that is needed to run a trial again, with the versions that ran it."""
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return {"format": FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
+
+
+def _commit() -> str | None:
+    """Return the commit of the sources, with a plus sign where files have changed since; None outside git."""
+    here = Path(__file__).parent
+    try:
+        words = [
+            subprocess.run(
+                ["git", "-C", str(here), *args], capture_output=True, text=True, timeout=10, check=True
+            ).stdout
+            for args in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
+        ]
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return words[0].strip() + ("+" if words[1].strip() else "")
+
+
+def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
+    """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
+    return {
+        "format": FORMAT,
+        "time_s": log.time_s,
+        "bearings_rad": log.bearings_rad,
+        "ranges_m": log.ranges_m,
+        "sigma_m": log.sigma_m,
+        "range_max_m": log.range_max_m,
+        "odometry": log.odometry,
+        "odometry_cov": log.odometry_cov,
+        "touched": log.touched,
+        "start_pose": result.scenario.start_estimate,
+        "start_cov": result.scenario.start_cov,
+        "true_poses": log.true_world,
+        "true_faces": result.votes.truth.faces,
+        "true_face_of_beam": log.face_of_beam,
+        "true_wall_of_face": result.votes.truth.walls,
+        "true_ring_of_face": result.votes.truth.rings,
+    }
+
+
+def map_arrays(result: TrialResult) -> dict[str, Any]:
+    """Return the final map: lines are (alpha rad, d m) about their anchors, NaN for a lost covariance.
+
+    It is that of the last step, or of the smoothed solution if there is one.
+    """
+    if result.last is None:
+        raise ValueError("expected a run of at least one step, found none: there is no map")
+    final = result.smoothed
+    walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
+    size = 3 + 2 * len(walls)
+    return {
+        "format": FORMAT,
+        "pose": walls.belief.pose_world,
+        "ids": walls.ids,
+        "lines": walls.belief.means,
+        "lines_world": walls.belief.lines_world,
+        "anchors": walls.belief.anchors,
+        "extents": walls.extents,
+        "sightings": walls.sightings,
+        "tentative": walls.tentative,
+        "crooked": walls.crooked,
+        "cov": np.full((size, size), np.nan) if joint is None else joint.cov,
+        "true_faces_of_lines": result.votes.faces_of(walls.ids),
+    }
+
+
+def steps_csv(log: Log) -> bytes:
+    """Return a row for each step; the errors are the invariant ones that the NEES is made of."""
+    sigmas = np.sqrt(np.diagonal(log.estimated_cov, axis1=1, axis2=2))
+    rows, columns_of_cov = np.triu_indices(3)
+    wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)
+    columns = [
+        np.arange(len(log)),
+        log.time_s,
+        log.path_length_m,
+        pose_nees(log),
+        np.trace(log.estimated_cov, axis1=1, axis2=2),
+        log.open_ends,
+        log.lines,
+        log.tentative,
+        log.closed_chains,
+        log.set_aside,
+        *log.estimated_world.T,
+        *log.true_world.T,
+        *pose_errors(log.estimated_world, log.true_world).T,
+        *sigmas.T,
+        *log.estimated_cov[:, rows, columns_of_cov].T,
+        wheels,
+        np.cumsum(log.touched),
+        log.reasons,
+        1e3 * log.seconds,
+    ]
+    return csv_bytes(STEP_COLUMNS, zip(*columns, strict=True))
+
+
+def tum(time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"]) -> bytes:
+    """Return poses in the TUM format: t x y z qx qy qz qw."""
+    half = 0.5 * wrap(poses_world[:, 2])
+    rows = zip(time_s, poses_world[:, 0], poses_world[:, 1], np.sin(half), np.cos(half), strict=True)
+    return "".join(f"{t:.6f} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}\n" for t, x, y, qz, qw in rows).encode()

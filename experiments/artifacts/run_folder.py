@@ -1,0 +1,154 @@
+"""The folder that a command writes into: made, kept to one process, cleared of what an earlier one left."""
+
+import fcntl
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from ..scenario import UsageError
+from .files import PART, json_bytes, write
+from .results import CONFIG, REPLAY, RUN_FILES
+
+LOCK = ".lock"
+
+
+class FolderGoneError(UsageError):
+    """The folder for the results was taken away while they were worked out."""
+
+    exit_status = 1
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(
+            f"expected the folder {folder} to stay, found it gone: nothing more could be written, run it again"
+        )
+
+
+def unwritable(folder: Path, error: OSError) -> UsageError:
+    """Return what is told, before anything is computed, of a folder into which nothing can be written."""
+    named = Path(error.filename or folder)
+    where = str(folder) if folder.is_relative_to(named) else f"{folder / named.name}"
+    return UsageError(
+        f"expected a folder that can be written into, found {where} ({error.strerror}): name another with --out"
+    )
+
+
+def prepare(folder: Path) -> None:
+    """Make a folder that files can be written into; raises UsageError, before anything is computed, where it cannot."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"expected a folder to write into, found {folder} read-only: name another with --out")
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Keep a folder to this process while the block runs; raises UsageError where another process has it.
+
+    The kernel lets go of it when the process ends, however it ends. A file system that knows no locks (some of NFS)
+    costs one line on standard error, and nobody is kept out.
+    """
+    path = folder / LOCK
+    try:
+        lock = _locked(path)
+    except BlockingIOError as error:
+        raise UsageError(
+            f"expected a folder to itself, found another run at work in {folder}: wait for it or name another --out"
+        ) from error
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    try:
+        yield
+    finally:
+        # While it is still held: whoever opened it meanwhile finds that it is no longer the one in the folder.
+        with suppress(OSError):
+            path.unlink()
+        os.close(lock)
+
+
+def _locked(path: Path) -> int:
+    """Return the lock's descriptor; raises BlockingIOError where another process has it."""
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(lock)
+            raise
+        except OSError as error:
+            print(
+                f"chainslam: {path.parent} cannot be locked ({error.strerror}): let no other run write into it",
+                file=sys.stderr,
+            )
+            return lock
+        if _is_at(lock, path):
+            return lock
+        os.close(lock)
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Return whether an open file is the one that bears this name now."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+def clear_leftovers(folder: Path, pattern: str = ".*") -> None:
+    """Remove the half-written files of processes that were killed; call it with the folder held."""
+    for path in folder.glob(pattern):
+        if PART.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+
+
+def refuse_others(folder: Path, config: Mapping[str, Any], force: bool) -> None:
+    """Raise UsageError where a held folder holds anything else than the run of this config; `force` lets runs pass."""
+    clear_leftovers(folder)
+    found = sorted(child.name for child in folder.iterdir() if child.name != LOCK)
+    other = _other(folder, found, config) if found else ""
+    if other == _CAMPAIGN:
+        raise UsageError(f"expected a folder for a run, found {other} in {folder}: name another with --out")
+    if other and not force:
+        raise UsageError(
+            f"expected an empty folder or this run's own, found {other} in {folder}: name another with --out,"
+            " or let --force replace a run there"
+        )
+
+
+def settle(folder: Path, config: Mapping[str, Any]) -> None:
+    """Make a held folder that of a new run: what an earlier one left there goes, and `config.json` is written.
+
+    Raises UsageError where that cannot be.
+    """
+    try:
+        for name in RUN_FILES:
+            if name != CONFIG:
+                (folder / name).unlink(missing_ok=True)
+        # Last, so that a folder in which this was cut short is that of the earlier run still.
+        write(folder / CONFIG, json_bytes(config))
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
+_CAMPAIGN = "a campaign"
+
+
+def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
+    """Return what else than this very run a folder holds, in words; empty if it is this run."""
+    few = found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
+    try:
+        there = json.loads((folder / CONFIG).read_text())
+        if "campaign" in there or "merged" in there:
+            return _CAMPAIGN
+        now = json.loads(json_bytes(config))
+        if there.get(REPLAY) != now.get(REPLAY):
+            return "a replay of other options" if REPLAY in there and REPLAY in now else "another kind of run"
+        different = sorted(key for key in now["trial"] if there["trial"].get(key) != now["trial"][key])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return few
+    return f"another run (other {', '.join(different)})" if different else ""

@@ -1,0 +1,164 @@
+"""A run's own folder read again: its settings, and how to go on from where it stopped.
+
+A run is decided by its settings alone, so going on means driving it once more from the start, past the place where
+it stopped; that costs the time of the first part again, and leaves the bytes of a run that was never stopped. What the
+robot reports on the way is held against the log, so that a world or a software that has changed since is noticed.
+A run that was killed left no `log.npz`, or an older one, but the stream that it wrote as it went (`running_log.py`).
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.limits import Limits
+from explore.outcome import Outcome
+from explore.step import Step
+from sim.logs.recorded_robot import RecordingError, read_log, recording_of
+
+from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
+from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
+from .results import LOG, RUNNING
+from .running_log import Kept, read_running
+
+REMEDY = "keep a run's files together, or make it anew"
+NUMBERS = (
+    *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
+    *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
+)
+COUNTS = (
+    *("open_ends", "lines", "contours_closed", "contours_reachable", "false_matches", "duplicate_lines", "collisions"),
+    "map_began_step",
+)
+SUMMARY = {
+    "status": str,
+    "reason": str,
+    "steps": int,
+    **{f"{name}?": float | None for name in NUMBERS},
+    **{f"{name}?": int | None for name in COUNTS},
+    "set_aside?": Maybe([{"wall": int, "side": int, "position_m": tuple[float, float], "why": str}]),
+}
+"""What pages and pictures take from a `summary.json`."""
+
+
+@dataclass(frozen=True)
+class SavedRun:
+    """What a stopped or killed run has left; s steps, k beams."""
+
+    trial: TrialConfig
+    outcome: Outcome | None
+    """What the saved results say; None where they are not all there."""
+    kept: Kept | None
+    """The stream of a run that was killed, None where all results were written."""
+    time_s: Float[np.ndarray, " s"]
+    ranges_m: Float[np.ndarray, "s k"]
+    odometry: Float[np.ndarray, "s 3"]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def check(self, step: Step) -> None:
+        """Raise UsageError where a step differs from the saved one of the same number."""
+        if step.index >= len(self):
+            return
+        same = np.array_equal(step.scan.ranges_m, self.ranges_m[step.index], equal_nan=True)
+        if not same or not np.array_equal(step.odometry.motion, self.odometry[step.index]):
+            raise UsageError(
+                f"expected the saved run again, found another from step {step.index} on (the world, the software or"
+                " the machine has changed): explore anew"
+            )
+
+    def is_finished(self, trial: TrialConfig) -> bool:
+        """Return whether driving again with these settings would leave what is there already."""
+        if self.kept is not None or self.outcome is None or self.outcome in (Outcome.INTERRUPTED, Outcome.FAILED):
+            return False
+        if self.outcome.status == "complete":
+            # It ended by itself: no other limit makes it longer.
+            saved = self.trial
+            trial = replace(
+                trial, max_steps=saved.max_steps, max_path_m=saved.max_path_m, time_limit_s=saved.time_limit_s
+            )
+        return trial == self.trial
+
+    def outlasts(self, limits: Limits) -> bool:
+        """Return whether the saved results go further than these limits would let the run go."""
+        if self.outcome is None or not len(self):
+            return False
+        way_m = np.cumsum(np.hypot(self.odometry[:-1, 0], self.odometry[:-1, 1]))
+        return (
+            (limits.steps is not None and limits.steps < len(self))
+            or (limits.path_m is not None and bool(np.any(way_m >= limits.path_m)))
+            or (limits.time_s is not None and bool(np.any(self.time_s[:-1] >= limits.time_s)))
+        )
+
+
+def read_saved(folder: Path) -> SavedRun:
+    """Read what a run left in its folder, whatever ended it; raises UsageError where none can go on."""
+    kept = read_running(folder)
+    trial = read_trial(folder / "config.json") if kept is None else _trial_of(kept, folder / RUNNING)
+    if trial.strategy == STRATEGY_OF_REPLAYS:
+        raise UsageError(f"expected the folder of a run that drove, found that of a replay in {folder}: replay again")
+    time_s, ranges_m, odometry = np.empty(0), np.empty((0, 0)), np.empty((0, 3))
+    outcome = None
+    if (folder / LOG).exists():
+        outcome = _outcome(folder / "summary.json")
+        try:
+            log = recording_of(read_log(folder / LOG))
+        except RecordingError as error:
+            raise UsageError(str(error)) from error
+        time_s, ranges_m, odometry = log.time_s, log.ranges_m, log.odometry
+    if kept is not None and len(kept.time_s) > len(time_s):
+        time_s, ranges_m, odometry = kept.time_s, kept.ranges_m, kept.odometry
+    return SavedRun(trial, outcome, kept, time_s, ranges_m, odometry)
+
+
+def _outcome(summary: Path) -> Outcome | None:
+    try:
+        return Outcome(read_json(summary, {"outcome": str}, REMEDY)["outcome"])
+    except ValueError:
+        return None
+
+
+@dataclass(frozen=True)
+class SavedConfig:
+    """A run's `config.json`: what was run, as a replay or not, and by which versions."""
+
+    trial: TrialConfig
+    replay: Any
+    """The options of a replay as they stand there; None for a run that drove."""
+    versions: dict[str, str]
+    commit: str | None
+
+
+CONFIG = {"trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "replay?": Any}
+
+
+def read_config(path: Path) -> SavedConfig:
+    """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
+    return _config_of(read_json(path, CONFIG, REMEDY), path)
+
+
+def _trial_of(kept: Kept, path: Path) -> TrialConfig:
+    with told(path, REMEDY):
+        said = parse_json(kept.config, CONFIG)
+    return _config_of(said, path).trial
+
+
+def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
+    with told(path, REMEDY):
+        for key in said.keys() - {"format", *(key.removesuffix("?") for key in CONFIG)}:
+            raise UnfitError(f"an unknown {key[:40]!r}")
+        trial: TrialConfig = fit(TrialConfig, said["trial"], "trial")
+    return SavedConfig(trial, said.get("replay"), said.get("versions", {}), said.get("commit"))
+
+
+def read_trial(path: Path) -> TrialConfig:
+    """Read the settings of a run from its `config.json`; raises UsageError."""
+    return read_config(path).trial
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Read a run's `summary.json`; raises UsageError."""
+    return read_json(folder / "summary.json", SUMMARY, REMEDY)

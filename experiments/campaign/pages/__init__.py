@@ -1,0 +1,1 @@
+"""A campaign as pages, pictures and a recording."""

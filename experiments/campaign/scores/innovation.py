@@ -1,0 +1,85 @@
+"""Innovations on true associations, taken before any gate: a gate would cut off the very tail that tells."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.association.matching import KnownWalls, Matches, MatchingConfig
+from slam.estimation.backend import Joint
+from slam.estimation.models import innovations
+from slam.evaluation.consistency import nis
+from slam.extraction.segments import Segments
+from slam.map.reliability import FirmnessConfig, are_clear
+from slam.mapper import Matcher
+
+
+@dataclass
+class InnovationEar:
+    """Listens to a matcher that knows the true pairs, and keeps what the filter thought of each scan beforehand."""
+
+    firmness: FirmnessConfig
+    """Segments of an unclear direction move no estimate and are not listened to."""
+    values: list[float] = field(default_factory=list)
+    """NIS of each scan that showed a known wall."""
+    dofs: list[int] = field(default_factory=list)
+    _before: dict[int, Float[np.ndarray, "2"]] = field(default_factory=dict)
+    _pairs: list[Float[np.ndarray, "2 2"]] = field(default_factory=list)
+
+    def around(self, matcher: Matcher) -> Matcher:
+        """Return the matcher, overheard."""
+
+        def overheard(
+            segments: Segments, walls: KnownWalls, joint: Joint, config: MatchingConfig, *, clear_only: bool = False
+        ) -> Matches:
+            matches = matcher(segments, walls, joint, config, clear_only=clear_only)
+            if clear_only:
+                self._hear(segments, walls.ids, joint, matches)
+            return matches
+
+        return overheard
+
+    def whiteness(self) -> float | None:
+        """Return the correlation of a wall's normalised innovations in two scans running: 0 for a right filter."""
+        if not self._pairs:
+            return None
+        before, after = np.array(self._pairs).transpose(1, 0, 2)
+        norm = np.sqrt(np.sum(before**2) * np.sum(after**2))
+        return float(np.sum(before * after) / norm) if norm > 0 else None
+
+    def _hear(self, segments: Segments, ids: Int[np.ndarray, " n"], joint: Joint, matches: Matches) -> None:
+        pairs = matches.pairs[are_clear(segments, self.firmness)[matches.pairs[:, 0]]]
+        if not len(pairs):
+            self._before = {}
+            return
+        rows = np.searchsorted(ids, pairs[:, 1])
+        e, S = stacked(joint, rows, segments.lines[pairs[:, 0]], segments.cov[pairs[:, 0]])
+        try:
+            value = float(nis(e[None], S[None])[0])
+        except np.linalg.LinAlgError:
+            self._before = {}
+            return
+        self.values.append(value)
+        self.dofs.append(len(e))
+        # Each wall's own 2 by 2 block, whitened: comparable from scan to scan whatever else was seen beside it.
+        blocks = S.reshape(len(rows), 2, len(rows), 2)[np.arange(len(rows)), :, np.arange(len(rows))]
+        white = np.linalg.solve(np.linalg.cholesky(blocks), e.reshape(-1, 2, 1))[..., 0]
+        now = dict(zip(pairs[:, 1].tolist(), white, strict=True))
+        self._pairs += [np.stack([self._before[wall], now[wall]]) for wall in now if wall in self._before]
+        self._before = now
+
+
+def stacked(
+    joint: Joint, rows: Int[np.ndarray, " m"], lines_robot: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k k"]]:
+    """Return the innovation (2m,) of lines seen on the joint's lines `rows`, and the covariance that it should have."""
+    m = len(rows)
+    means = joint.mean[3:].reshape(-1, 2)
+    model = innovations(joint.mean[:3], joint.anchors[rows], means[rows], lines_robot, cov)
+    H, R, each = np.zeros((m, 2, len(joint.mean))), np.zeros((m, 2, m, 2)), np.arange(m)
+    H[:, :, :3] = model.H_pose
+    for k in range(2):
+        H[each, :, 3 + 2 * rows + k] = model.H_line[:, :, k]
+    R[each, :, each, :] = model.R
+    flat = H.reshape(2 * m, len(joint.mean))
+    return model.e.ravel(), flat @ joint.cov @ flat.T + R.reshape(2 * m, 2 * m)

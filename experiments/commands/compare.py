@@ -1,0 +1,144 @@
+"""`chainslam compare`: a campaign of many trials, and the comparison that comes of it."""
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from ..campaign.cluster import ClusterError, on_dask
+from ..campaign.comparison.tables import write_tables
+from ..campaign.comparison.words import left_out
+from ..campaign.contrast import contrast, read_contrast
+from ..campaign.merge import merge
+from ..campaign.pages.contrast_page import verdict
+from ..campaign.pages.film import record_campaign
+from ..campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_campaign, trials
+from ..campaign.runner import on_cores, run_campaign
+from ..campaign.store import opened
+from ..replays.replay import Association
+from ..scenario import P0, UsageError, load_world
+from ..terminal.console import say
+from ..terminal.interrupts import INTERRUPTED
+from .echo import echo_world
+
+FAILED = 1
+JOBS_A_CORE = 8
+"""Processes beyond this for each core only take memory from one another."""
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them honestly.
+
+    The same command goes on where it was stopped.
+    """
+
+    out: Path
+    """Folder for the results."""
+    preset: Literal["smoke", "paper", "full"] | None = None
+    """A campaign by name; options named beside it go before."""
+    worlds: tuple[str, ...] | None = None
+    """Bundled names or files."""
+    backends: tuple[str, ...] | None = None
+    """The estimators (see `chainslam backends`)."""
+    strategies: tuple[str, ...] | None = None
+    """Exploration strategies (see `chainslam strategies`)."""
+    trials: int | None = None
+    """How many, with seeds that follow each other, in every cell."""
+    first_seed: int = 1
+    """The seed of the first trial."""
+    modes: tuple[Literal["closed", "replay"], ...] = ("closed", "replay")
+    """Closed loop, or one recording for each world, strategy and seed through all back ends."""
+    association: tuple[Association, ...] = ("own", "true")
+    """Whose matches the replays use: the back end's own gate, the truth, or each."""
+    driver: str = "full-ekf"
+    """The back end that drives the recordings."""
+    p0: P0 = "small"
+    """Covariance of the start."""
+    max_steps: int | None = None
+    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
+    jobs: int | None = None
+    """Number of processes; all cores by default. The results are the same."""
+    dask: str | None = None
+    """Address of a Dask scheduler whose workers run the trials, in place of `--jobs`."""
+    merge: tuple[Path, ...] = ()
+    """Folders of campaigns to put together into one, in place of running any."""
+    against: tuple[Path, Path] | None = None
+    """Folders of two campaigns to hold against each other, trial by trial, in place of running any."""
+
+    rrd: Path | None = None
+    """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this file."""
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign that the options describe; raises UsageError where they leave something open."""
+        given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
+        named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
+        chosen = {"max_steps": MAX_STEPS} | (PRESETS[self.preset] if self.preset else {}) | named
+        missing = [f"--{name}" for name in given if name not in chosen]
+        if missing:
+            raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
+        arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
+        arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
+        settings: dict[str, Any] = {
+            "driver": self.driver,
+            "p0": self.p0,
+            "first_seed": self.first_seed,
+        }
+        return Campaign(**chosen, arms=tuple(arms), **settings)
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError before anything is computed."""
+        if self.merge or self.against:
+            return self._of_others()
+        campaign = self.campaign
+        check_campaign(campaign)
+        most = JOBS_A_CORE * len(os.sched_getaffinity(0))
+        if self.jobs is not None and not 1 <= self.jobs <= most:
+            raise UsageError(
+                f"expected 1 to {most} processes on this machine, found --jobs {self.jobs}: choose another"
+            )
+        worlds = [load_world(world) for world in campaign.worlds]
+        executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
+        with opened(self.out, campaign) as store:
+            # A result that cannot be read is told now, not after hours of computing.
+            for trial in filter(store.has, trials(campaign)):
+                store.record(trial)
+            try:
+                for world in worlds:
+                    echo_world(world)
+                tally = run_campaign(store, executor)
+            except KeyboardInterrupt:
+                print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
+                      file=sys.stderr)  # fmt: skip
+                return INTERRUPTED
+            except ClusterError as error:
+                print(f"chainslam: {error}; what is done is kept in {self.out}, the same command goes on",
+                      file=sys.stderr)  # fmt: skip
+                return FAILED
+            said = write_tables(self.out, campaign, trials(campaign), store.record)
+        print(tally.words())
+        for words in left_out(said):
+            print(words)
+        say(f"results in {self.out}")
+        problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
+        for problem in problems:
+            say(f"chainslam: not written: {problem}", stderr=True)
+        return 1 if problems else 0
+
+    def _of_others(self) -> int:
+        """Merge campaigns or hold two against each other; raises UsageError."""
+        if self.rrd is not None:
+            word = "--merge" if self.merge else "--against"
+            raise UsageError(f"expected --rrd with a campaign that runs, found {word}: leave one of them out")
+        if self.merge and self.against:
+            raise UsageError("expected either --merge or --against, found both: leave one of them out")
+        if self.against is None:
+            merge(self.merge, self.out)
+        else:
+            contrast(*self.against, self.out)
+            for words in verdict(read_contrast(self.out)):
+                print(words)
+        say(f"results in {self.out}")
+        return 0

@@ -1,0 +1,233 @@
+"""`chainslam explore`: one world, one robot, one map."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from explore.goals.explorer import ExplorerConfig
+from explore.mission import MissionConfig
+from explore.step import Step
+from sim.worlds import World
+
+from ..artifacts.results import config_record, write_results
+from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
+from ..artifacts.running_log import RunningLog
+from ..artifacts.saved import SavedRun, read_saved
+from ..scenario import P0, TrialConfig, UsageError, build, check, load_world
+from ..terminal.console import say
+from ..terminal.interrupts import first_interrupt_waits
+from ..terminal.progress import print_summary, progress
+from ..trial import TrialResult, default_mission, run_scenario
+from ..views.timelines import Recording
+from .echo import echo_world
+
+MAX_STEPS = TrialConfig.max_steps
+SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale")
+"""What a saved run has settled; only its limits may be others when it goes on."""
+
+
+@dataclass(frozen=True)
+class Explore:
+    """Explore a world until every chain of walls is closed, and write the map beside how good it is."""
+
+    world: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="WORLD")] = None
+    """A name (see `chainslam worlds`) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
+    backend: str = "full-ekf"
+    """The estimator (see `chainslam backends`)."""
+    strategy: str = "nearest-robot"
+    """Where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at step 200."""
+    seed: int = 1
+    """Decides all noise and the error of the first estimate; the same seed gives the same bytes."""
+    p0: P0 = "small"
+    """Covariance of the start: zero (0.1 mm, 1e-5 rad), small (0.01 m, 0.1 degree) or large (0.1 m, 2 degrees)."""
+    errorless: bool = False
+    """Exact ranges and wheels, the estimate started at the truth; the models keep the stated noise."""
+    sweep: bool = True
+    """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
+    max_steps: int | None = None
+    """The run is stopped after this many scans; 100,000 where no number is named."""
+    max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
+    """The run is stopped once the wheels have counted this many metres."""
+    time_limit: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    """The run is stopped once this many seconds have passed on the robot's own clock: it counts driving and
+    scanning, not computing, so that every machine stops at the same step."""
+    return_to_start: bool = False
+    """Once there is nothing left to explore, drive back to the start, to within 0.2 m."""
+    start: tuple[float, ...] | None = None
+    """Start pose instead of the drawing's own: x and y in metres, and perhaps the heading in rad."""
+    scale: float | None = None
+    """Metres per pixel or drawing unit, for files that do not say."""
+    out: Path | None = None
+    """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. One that holds anything but the same run
+    is refused."""
+    force: bool = False
+    """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
+    resume: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """In place of WORLD: go on with the run in this folder, stopped or killed, up to its own limits or to those given
+    now. It is driven again from its start, which takes as long as it took, and leaves what a run that was never
+    stopped would have left."""
+    rrd: Path | None = None
+    """Record the run for Rerun's viewer into this file (`chainslam view FILE` opens it)."""
+    view: bool = False
+    """Open Rerun's viewer and show the run as it goes on, instead of recording it."""
+
+    @property
+    def trial(self) -> TrialConfig:
+        """What decides the run, without where its results go; raises UsageError where no world is named."""
+        if self.world is None:
+            raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
+        return TrialConfig(
+            world=self.world,
+            backend=self.backend,
+            strategy=self.strategy,
+            seed=self.seed,
+            p0=self.p0,
+            errorless=self.errorless,
+            max_steps=MAX_STEPS if self.max_steps is None else self.max_steps,
+            start=self.start,
+            scale=self.scale,
+            max_path_m=self.max_path,
+            time_limit_s=self.time_limit,
+            mission=MissionConfig(explorer=ExplorerConfig(sweep=self.sweep), return_to_start=self.return_to_start),
+        )
+
+    def continued(self, saved: TrialConfig) -> TrialConfig:
+        """Return a saved run with the limits given now; raises UsageError where anything else is given, too."""
+        for name in SETTLED:
+            if getattr(self, name) != getattr(Explore, name):
+                raise UsageError(
+                    f"expected nothing but limits and --out with --resume, found {name}: the saved run has settled it"
+                )
+        home = self.return_to_start or saved.mission.return_to_start
+        going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
+        if self.max_steps is self.max_path is self.time_limit is None:
+            return going_on
+        steps = MAX_STEPS if self.max_steps is None else self.max_steps
+        return replace(going_on, max_steps=steps, max_path_m=self.max_path, time_limit_s=self.time_limit)
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError before anything is computed."""
+        if self.view and self.rrd is not None:
+            raise UsageError("expected --rrd or --view, found both: the viewer can save what it shows")
+        if self.resume is not None:
+            return self._go_on(self.resume)
+        trial = self.trial
+        check(trial)
+        world = load_world(trial.world, trial.start, trial.scale)
+        folder = self.out or default_folder(world.name, trial)
+        prepare(folder)
+        with held(folder):
+            config = config_record(trial)
+            refuse_others(folder, config, self.force)
+            settle(folder, config)
+            status = self._drive(trial, world, folder, config)
+        if self.out is None:
+            _point_latest_at(folder)
+        return status
+
+    def _go_on(self, source: Path) -> int:
+        """Take up the run in a folder; raises UsageError where there is none, or none that these limits let go on."""
+        # Read before any folder is made, and once more when nobody else can write into it.
+        check(self.continued(read_saved(source).trial))
+        folder = self.out or source
+        prepare(folder)
+        with held(folder):
+            saved = read_saved(source)
+            trial = self.continued(saved.trial)
+            world = load_world(trial.world, trial.start, trial.scale)
+            in_place = folder.samefile(source)
+            if in_place and saved.is_finished(trial):
+                print(f"the run in {source} is finished ({_why(saved)}): nothing done")
+                return 0
+            if saved.outlasts(trial.limits):
+                raise UsageError(
+                    f"expected limits beyond the {len(saved)} steps of the saved run, found one before their end: its"
+                    " files are left as they were, raise it"
+                )
+            config = config_record(trial)
+            if in_place:
+                clear_leftovers(folder)
+            else:
+                refuse_others(folder, config, self.force)
+                settle(folder, config)
+            return self._drive(trial, world, folder, config, saved)
+
+    def _drive(
+        self, trial: TrialConfig, world: World, folder: Path, config: dict[str, Any], saved: SavedRun | None = None
+    ) -> int:
+        """Drive a run, write it into its folder, and return the exit status; raises UsageError."""
+        scenario = build(trial, world)
+        echo_world(world)
+        noise = "errorless" if trial.errorless else f"seed {trial.seed}"
+        title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
+        log = RunningLog(folder, config, saved.kept if saved is not None else None)
+        recording = Recording(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
+        try:
+            with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
+
+                def watch(step: Step) -> None:
+                    if saved is not None:
+                        saved.check(step)
+                    log.add(step)
+                    show(step)
+                    stop_if_asked()
+
+                recorded = recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
+                result = run_scenario(scenario, recorded, default_mission)
+            log.check()
+        except UsageError:
+            recording.drop()
+            if saved is not None and saved.kept is None:
+                log.remove()
+            raise
+        finally:
+            log.close()
+        if saved is not None and result.ending.exit_status and len(result.log or ()) < len(saved):
+            recording.drop()
+            told = f"expected to pass the end of the saved run, found {result.ending.reason}: its files are left as"
+            say(f"chainslam: {told} they were, --resume goes on", stderr=True)
+            return result.ending.exit_status
+        problems = write_results(result, folder, config)
+        if not problems:
+            log.remove()
+        problems += recording.close()
+        return _told(result, folder, problems)
+
+
+def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
+    """Print what came of a run, and return the exit status."""
+    print_summary(result.summary)
+    say(f"results in {folder}")
+    if result.ending.exit_status:
+        say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)
+    for problem in problems:
+        say(f"chainslam: not written: {problem}", stderr=True)
+    return result.ending.exit_status or (1 if problems else 0)
+
+
+def _why(saved: SavedRun) -> str:
+    """Return in words why a finished run is over."""
+    assert saved.outcome is not None
+    words = f"{saved.outcome.status}: {saved.outcome}"
+    return words if saved.outcome.status == "complete" else f"{words}; raise the limit to go on"
+
+
+def default_folder(world: str, trial: TrialConfig) -> Path:
+    """Return the folder for a run that names none: the same run comes to the same place."""
+    parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
+    parts += [trial.p0] if trial.p0 != "small" else []
+    parts += ["errorless"] if trial.errorless else []
+    return Path("results") / "-".join(parts)
+
+
+def _point_latest_at(folder: Path) -> None:
+    """Let results/latest lead to the newest run; file systems without links go without."""
+    link = folder.parent / "latest"
+    try:
+        if link.is_symlink():
+            link.unlink()
+        link.symlink_to(folder.name, target_is_directory=True)
+    except OSError:
+        return

@@ -1,0 +1,86 @@
+"""`chainslam measure`: distances, lengths and areas of a map, with error bars."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from ..artifacts.mapped import MappedCorners, read_corners
+from ..artifacts.saved import read_config
+from ..scenario import UsageError
+from ..scoring.measurements import Measured
+from ..terminal.console import plain_console
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
+    """The folder that a run left."""
+    corners: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="CORNER")] = ()
+    """Two corners, by their ids in map.geojson."""
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError for names that are no corners."""
+        mapped = read_corners(self.folder)
+        if len(self.corners) not in (0, 2):
+            raise UsageError(f"expected two corners or none, found {len(self.corners)}: name two of the listing")
+        if not self.corners:
+            _list(mapped, self.folder)
+            return 0
+        first, second = (_corner(name, mapped, self.folder) for name in self.corners)
+        measured = mapped.distance(first, second)
+        low, high = measured.interval
+        print(
+            f"corner {first} to corner {second}: {measured.value:.3f} m, 95 % interval {low:.3f} to {high:.3f} m"
+            f" (sigma {1e3 * measured.sigma:.1f} mm{_estimator(self.folder)})"
+        )
+        return 0
+
+
+def _corner(name: str, mapped: MappedCorners, folder: Path) -> int:
+    corners = {str(k): k for k in range(len(mapped))}
+    if name not in corners:
+        known = f"0 to {len(mapped) - 1}" if corners else "none"
+        raise UsageError(f"expected a corner out of {known}, found {name!r}: see `chainslam measure {folder}`")
+    if not mapped.sharp[corners[name]]:
+        raise UsageError(f"expected walls that cross, found those of corner {name} on one line: take another")
+    return corners[name]
+
+
+def _list(mapped: MappedCorners, folder: Path) -> None:
+    console = plain_console(width=None)
+    corners = Table(title=f"corners of {folder}{_estimator(folder)}", title_justify="left")
+    for title in ("corner", "x m", "y m", "sigma mm", "walls", "chain"):
+        corners.add_column(title, justify="right")
+    for k, walls in enumerate(mapped.walls):
+        x, y = mapped.points.positions_world[k]
+        spread = 1e3 * max(mapped.points.cov[k, 0, k, 0] + mapped.points.cov[k, 1, k, 1], 0.0) ** 0.5
+        sigma = f"{spread:.1f}" if mapped.sharp[k] else "one line"
+        corners.add_row(str(k), f"{x:.3f}", f"{y:.3f}", sigma, f"{walls[0]}, {walls[1]}", str(mapped.chains[k]))
+    console.print(corners)
+    if not mapped.rooms:
+        print("no closed chain, so no area")
+        return
+    rooms = Table(title="closed chains, value and 95 % interval", title_justify="left")
+    for title in ("chain", "is", "corners", "area m²", "length m"):
+        rooms.add_column(title, justify="left" if title == "is" else "right")
+    for room in mapped.rooms:
+        kind = "island" if room.is_island else "room"
+        values = (_words(mapped.area(room)), _words(mapped.perimeter(room)))
+        rooms.add_row(str(room.chain), kind, str(len(room.corners)), *values)
+    console.print(rooms)
+
+
+def _words(measured: Measured) -> str:
+    return f"{measured.value:.3f} ± {measured.interval[1] - measured.value:.3f}"
+
+
+def _estimator(folder: Path) -> str:
+    """Return whose word the intervals are; nothing where the folder does not tell."""
+    config = folder / "config.json"
+    return f", as {read_config(config).trial.backend} states it" if os.path.lexists(config) else ""

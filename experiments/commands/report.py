@@ -1,0 +1,45 @@
+"""`chainslam report`: a campaign, two held against each other, or a run, as one page that a person reads."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from viz.reports.report import Page, html, latex
+
+from ..artifacts.files import write
+from ..campaign.contrast import CONTRAST
+from ..campaign.pages.contrast_page import contrast_page
+from ..campaign.pages.page import page_of
+from ..views.run_page import is_run, run_page
+
+REPORT, TABLES = "report.html", "tables.tex"
+
+
+@dataclass(frozen=True)
+class Report:
+    """Write what a campaign or a run found as one HTML file that holds everything, for a screen, a phone or paper."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
+    """The folder that `compare`, `explore` or `replay` left."""
+    latex: bool = False
+    """Write the tables as LaTeX, too."""
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError for a folder without results."""
+        page = _page(self.folder)
+        write(self.folder / REPORT, html(page))
+        print(f"report in {self.folder / REPORT}")
+        if self.latex:
+            tables = [table for section in page.sections for table in section.tables]
+            write(self.folder / TABLES, latex(tables))
+            print(f"tables in {self.folder / TABLES}")
+        return 0
+
+
+def _page(folder: Path) -> Page:
+    if (folder / CONTRAST).is_file():
+        return contrast_page(folder)
+    # A campaign keeps no summary.json; its recordings lie two folders further down.
+    return run_page(folder) if is_run(folder) else page_of(folder)

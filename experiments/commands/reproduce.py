@@ -1,0 +1,72 @@
+"""`chainslam reproduce`: the paper's figures, with its numbers beside ours."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from viz.figures.maps import saved
+
+from ..artifacts.files import json_bytes, write
+from ..artifacts.run_folder import prepare
+from ..reproductions import REPRODUCTIONS, Reproduction
+from ..reproductions.reproduction import Value
+from ..scenario import UsageError, choose
+from ..terminal.console import plain_console
+
+SEED_LARGEST = 2**32
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Reproduce the paper's figures: a picture of each, and its numbers beside ours, by several back ends."""
+
+    names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
+    """Out of table1, fig5, fig6, fig8, fig9, fig10, fig11, eq4; without names, all of them."""
+    out: Path = Path("results/reproduce")
+    """Folder for NAME.png, NAME.svg and NAME.json."""
+    seed: int = 1
+    """Of the noise; where there are several drives, of the first."""
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError before anything is computed."""
+        names = tuple(dict.fromkeys(choose("figure", name, REPRODUCTIONS) for name in self.names)) or (*REPRODUCTIONS,)
+        if not 0 <= self.seed < SEED_LARGEST:
+            raise UsageError(f"expected a seed from 0 to 2^32 - 1, found {self.seed}: choose another")
+        prepare(self.out)
+        console = plain_console(width=max(plain_console().width, 130))
+        for name in names:
+            began = time.perf_counter()
+            with console.status(f"{name}: {REPRODUCTIONS[name].about}"):
+                made = REPRODUCTIONS[name].make(self.seed)
+                for kind in ("png", "svg"):
+                    write(self.out / f"{name}.{kind}", saved(made.figure, kind))
+                command = f"chainslam reproduce {name} --seed {self.seed}"
+                write(self.out / f"{name}.json", json_bytes({"name": name, **made.record(command)}))
+            console.print(table_of(made))
+            for note in made.notes:
+                console.print(note, style="dim")
+            console.print(f"{self.out / name}.png, .svg, .json; {time.perf_counter() - began:.0f} s\n")
+        return 0
+
+
+def table_of(made: Reproduction) -> Table:
+    """Return a row for each quantity: what the paper says, and a column for each back end."""
+    table = Table(title=made.title, title_justify="left")
+    table.add_column("quantity", overflow="fold")
+    for column in ("paper", *made.ours):
+        table.add_column(column, justify="right", overflow="fold")
+    for quantity in made.quantities:
+        table.add_row(
+            quantity, _words(made.paper.get(quantity, "")), *(_words(v.get(quantity, "")) for v in made.ours.values())
+        )
+    return table
+
+
+def _words(value: Value) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

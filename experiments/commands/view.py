@@ -1,0 +1,97 @@
+"""`chainslam view`: what a run left, in Rerun's viewer."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from viz.viewer import Viewer, ViewerError, available
+
+from ..artifacts.results import LOG, RECORDING
+from ..artifacts.run_folder import prepare
+from ..campaign.pages.film import record_campaign
+from ..campaign.store import read_campaigns
+from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
+from ..scenario import UsageError, load_world
+from ..views.timelines import Recording
+
+TRIALS = "trials.csv"
+"""A folder that holds it is that of a campaign."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Open a recording in Rerun's viewer, or a results folder: its recording, or one made now and kept in it.
+
+    From a run's log, from the logs of several back ends that replayed one run, or from a campaign's tables.
+    """
+
+    path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
+    """A .rrd file, a run's log.npz, or the folder that `explore`, `replay` or `compare` left."""
+
+    def run(self) -> int:
+        """Run the command and return its exit status; raises UsageError where there is nothing to open."""
+        recordings = recordings_at(self.path)
+        try:
+            available()
+            files = recordings()
+            Viewer(files)
+        except ViewerError as error:
+            print(f"chainslam: {error}", file=sys.stderr)
+            return 1
+        print(f"opened {', '.join(map(str, files))}")
+        return 0
+
+
+def recordings_at(path: Path) -> Callable[[], list[Path]]:
+    """Return what gives the recordings at a place, made now if there are none; raises UsageError for other places."""
+    if path.suffix == ".rrd" and path.is_file():
+        return lambda: [path]
+    found = sorted(path.glob("*.rrd")) if path.is_dir() else []
+    if found:
+        return lambda: found
+    if (path / TRIALS).is_file():
+        return lambda: [_made(path, lambda target: record_campaign(path, read_campaigns(path)[0], target))]
+    log = path if path.name == LOG else path / LOG
+    logs = [log] if log.is_file() else sorted(path.glob(f"*/{LOG}"))
+    if not logs:
+        raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found {path}: name what a run left")
+    runs = [read_run(each) for each in logs]
+    if not all(_is_same(runs[0], run) for run in runs):
+        raise UsageError(f"expected one run, found several in {path}: name the folder of one")
+    options = read_options(logs[0].with_name("config.json"))
+    return lambda: [_made(log.parent if len(logs) == 1 else path, lambda target: _record(runs, options, target))]
+
+
+def _is_same(one: RecordedRun, other: RecordedRun) -> bool:
+    """Whether two logs hold the same scans and odometry."""
+    a, b = one.recording, other.recording
+    return np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) and np.array_equal(a.odometry, b.odometry)
+
+
+def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
+    """Return the recording that was made in a folder; raises UsageError where it could not be written."""
+    prepare(folder)
+    target = folder / RECORDING
+    problems = record(target)
+    if problems:
+        raise UsageError(f"expected to keep a recording in {folder}, found {problems[0]}: free the place and try again")
+    return target
+
+
+def _record(runs: list[RecordedRun], options: ReplayOptions, target: Path) -> list[str]:
+    """Replay each run's log as it was made, all in one recording; return what went wrong."""
+    run = runs[0]
+    trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
+    world = load_world(trial.world, trial.start, trial.scale)
+    title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, {options.association} association"
+    recording = Recording(title, backends, world, trial.errorless, target)
+    for backend in backends:
+        if recording.is_on:
+            watch = recording.watch(backend, lambda step: run.true_poses_world[step.index])
+            replay(run, backend, options, watch)
+    return recording.close()

@@ -1,0 +1,150 @@
+"""The truth in place of one part of the software, to find out which part a fault comes from; handed to the mapper."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from sim.chance import Channel, standard_normals
+from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
+from slam.estimation.backend import Joint
+from slam.extraction.extract import NO_BENDS, extract
+from slam.extraction.segments import Segments
+from slam.geometry.poses import compose, inverse
+from slam.robot import Scan
+
+from ..scoring.association import ONE_FACE_SHARE
+from ..scoring.truth import Truth
+
+MOST_TURN_RAD = 1.0
+"""No sighting is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
+
+
+@dataclass
+class Witness:
+    """What really stood before the robot in each scan of a run, and where the run now is."""
+
+    truth: Truth
+    poses_world: Float[np.ndarray, "s 3"]
+    face_of_beam: Int[np.ndarray, "s k"]
+    at: int = 0
+    """The scan that is being mapped."""
+
+    def faces(self, segments: Segments) -> Int[np.ndarray, " n"]:
+        """Return the true face of each segment: the one of most beams on its wall; -1 where several walls mixed."""
+        beams = self.face_of_beam[self.at]
+        found = np.full(len(segments), -1, dtype=np.int64)
+        for row, (first, last) in enumerate(segments.beams.tolist()):
+            span = np.arange(first, last + 1 + (len(beams) if last < first else 0)) % len(beams)
+            faces = beams[span]
+            faces = faces[faces >= 0]
+            if not len(faces):
+                continue
+            walls = np.bincount(self.truth.walls[faces])
+            if walls.max() >= ONE_FACE_SHARE * len(span):
+                found[row] = np.bincount(faces[self.truth.walls[faces] == walls.argmax()]).argmax()
+        return found
+
+
+class TrueAssociation:
+    """A matcher that knows which wall each segment was seen on; a line's wall is that of the segment that began it."""
+
+    def __init__(self, witness: Witness) -> None:
+        self._witness = witness
+        self._line_of_wall: dict[int, int] = {}
+        self._all: Int[np.ndarray, " s"] = np.zeros(0, dtype=np.int64)
+        self._rest: Int[np.ndarray, "u 2"] = np.zeros((0, 2), dtype=np.int64)
+
+    def __call__(
+        self,
+        segments: Segments,
+        walls: KnownWalls,
+        joint: Joint,
+        config: MatchingConfig,
+        *,
+        clear_only: bool = False,
+    ) -> Matches:
+        """Return the true pairs when asked for the clear ones, and none of the rest."""
+        if not clear_only:
+            # Called with the segments left over: those of walls without a line begin one, the others are not used.
+            begins = begins_a_line(self._rest[:, 0], self._rest[:, 1], self._line_of_wall)
+            return replace(NO_MATCHES, unmatched=np.arange(len(segments)), doubtful=np.flatnonzero(~begins))
+        faces = self._witness.faces(segments)
+        wall = np.where(faces >= 0, self._witness.truth.walls[faces], -1)
+        line = np.array([self._line_of_wall.get(int(w), -1) for w in wall], dtype=np.int64)
+        pairs = np.flatnonzero((line >= 0) & np.isin(line, walls.ids))
+        self._all, self._rest = wall, np.delete(np.column_stack([wall, segments.beam_counts]), pairs, axis=0)
+        unmatched = np.setdiff1d(np.arange(len(segments)), pairs)
+        return replace(
+            NO_MATCHES,
+            pairs=np.column_stack([pairs, line[pairs]]),
+            distances=np.zeros(len(pairs)),
+            unmatched=unmatched,
+        )
+
+    def learn(self, owners: Int[np.ndarray, " s"]) -> None:
+        """Take note of which lines were begun by which walls; call it after each scan was mapped."""
+        for wall, line in zip(self._all.tolist(), owners.tolist(), strict=True):
+            if wall >= 0 and line >= 0:
+                self._line_of_wall.setdefault(wall, line)
+
+
+def begins_a_line(
+    walls: Int[np.ndarray, " u"], beam_counts: Int[np.ndarray, " u"], known: Collection[int]
+) -> Bool[np.ndarray, " u"]:
+    """Return which segments are on walls (-1 for none) without a line: of several on one wall, that of most beams."""
+    begins = np.zeros(len(walls), dtype=bool)
+    for wall in np.unique(walls).tolist():
+        if wall >= 0 and wall not in known:
+            rows = np.flatnonzero(walls == wall)
+            begins[rows[np.argmax(beam_counts[rows])]] = True
+    return begins
+
+
+class PerfectExtraction:
+    """Real segmentation, but each line is the true one with an error drawn as the measurement model states it."""
+
+    def __init__(self, witness: Witness, seed: int) -> None:
+        self._witness, self._seed = witness, seed
+
+    def __call__(self, scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+        """Extract the segments of one scan; those of several walls are left out, so that the map need not say where."""
+        segments = extract(scan)
+        faces = self._witness.faces(segments)
+        segments, faces = segments.take(faces >= 0), faces[faces >= 0]
+        if not len(segments):
+            return segments
+        pose = self._witness.poses_world[self._witness.at]
+        alpha, r = self._witness.truth.lines[faces].T
+        exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
+        draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
+        return replace(segments, lines=as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2)))
+
+
+def as_stated(
+    lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], standard_normals: Float[np.ndarray, "m 2"]
+) -> Float[np.ndarray, "m 2"]:
+    """Return sightings of true lines (alpha, r), robot frame, with the error that `slam.estimation.models` states.
+
+    There (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_true) has independent parts of variance C_alpha_alpha and
+    (C_r_r - C_alpha_r t0) (cos(epsilon) - t0 sin(epsilon) / r)^2, t0 = C_alpha_r / C_alpha_alpha: to first order the
+    covariance C of (alpha, r), but a line off by epsilon turns about the seen piece instead of sliding off it. Solved
+    for r.
+    """
+    t0 = cov[:, 0, 1] / cov[:, 0, 0]
+    epsilon = np.clip(np.sqrt(cov[:, 0, 0]) * standard_normals[:, 0], -MOST_TURN_RAD, MOST_TURN_RAD)
+    across = np.sqrt(cov[:, 1, 1] - cov[:, 0, 1] * t0) * standard_normals[:, 1]
+    c, b = np.cos(epsilon), t0 * np.sin(epsilon)
+    half = 0.5 * (lines[:, 1] + across * c + b)
+    r = (half + np.sqrt(np.maximum(half**2 - c * b * across, 0.0))) / c
+    return np.stack([lines[:, 0] + epsilon, r], axis=-1)
+
+
+def true_odometry(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
+    """Return the true motion that led to each pose, in the frame of the pose before; zero for the first."""
+    motions = [np.zeros(3)]
+    for before, after in pairwise(poses_world):
+        motions.append(compose(inverse(before), after))
+    return np.array(motions)

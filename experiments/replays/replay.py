@@ -1,0 +1,190 @@
+"""A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from explore.mission import ride_mission
+from explore.step import Step
+from sim.logs.recorded_robot import (
+    MOST_M,
+    TRUTH,
+    RecordedRobot,
+    Recording,
+    RecordingError,
+    are_covariances,
+    read_log,
+    recording_of,
+    within,
+)
+from sim.robot import TrueRecord
+from sim.worlds import World
+from slam.association.matching import match
+from slam.backends import BACKENDS
+from slam.extraction.extract import extract
+from slam.map.extents import WallsConfig
+from slam.mapper import Extractor, Mapper, MapperConfig, Matcher
+from slam.robot import MotionCommand, Odometry, Scan
+
+from ..artifacts.reading import fit, told
+from ..artifacts.saved import read_config, read_trial
+from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, UsageError, check, load_world
+from ..scoring.truth import truth_of
+from ..trial import TrialResult, run_scenario
+from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
+
+Association = Literal["own", "true"]
+_NEVER = 10**9
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Which parts of the software the truth takes the place of."""
+
+    association: Association = "own"
+    """Whose matches: the back end's own gate, or the truth."""
+    perfect_extraction: bool = False
+    """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
+    perfect_odometry: bool = False
+    """The true motions in place of what the wheels reported; the stated covariance stays."""
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """A run's own log with the truth beside it, and the settings that made it."""
+
+    trial: TrialConfig
+    recording: Recording
+    start_pose: Float[np.ndarray, "3"]
+    start_cov: Float[np.ndarray, "3 3"]
+    true_poses_world: Float[np.ndarray, "s 3"]
+    true_face_of_beam: Int[np.ndarray, "s k"]
+
+
+def read_run(log: Path) -> RecordedRun:
+    """Read `log.npz` and the `config.json` beside it; raises UsageError, in one line, for anything else."""
+    try:
+        arrays = read_log(log)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    return run_of(arrays, lambda: read_trial(log.with_name("config.json")))
+
+
+def read_options(config: Path) -> ReplayOptions:
+    """Return the options of the replay that left a `config.json`, those by default for a run that drove."""
+    said = read_config(config).replay
+    if said is None:
+        return ReplayOptions()
+    with told(config, "keep a run's files together, or make it anew"):
+        options: ReplayOptions = fit(ReplayOptions, said, "replay")
+    return options
+
+
+def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:
+    """Return the run in the arrays of a `log.npz`; raises UsageError, in one line, where they make none."""
+    try:
+        recording = recording_of(arrays)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    missing = [name for name in TRUTH if name not in arrays]
+    if missing:
+        raise UsageError(f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run")
+    poses, cov, faces = arrays["true_poses"], arrays["start_cov"], arrays["true_face_of_beam"]
+    numbers = (poses, cov, arrays["start_pose"], arrays["true_faces"])
+    known = faces.min(initial=-1) >= -1 and faces.max(initial=-1) < len(arrays["true_faces"])
+    if not known or not all(within(values, MOST_M) for values in numbers) or not are_covariances(cov):
+        raise UsageError("expected a log with its truth, found one that no simulated run leaves: record the run anew")
+    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces)
+
+
+class ReplayedRobot(RecordedRobot):
+    """A recorded robot that goes on keeping the true record of what it plays back."""
+
+    def __init__(self, run: RecordedRun, recording: Recording) -> None:
+        super().__init__(recording)
+        self._run = run
+        self._record = TrueRecord()
+
+    @property
+    def record(self) -> TrueRecord:
+        """What really happened, up to the last scan."""
+        return self._record
+
+    def sense(self) -> Scan:
+        """Return the present scan and record the truth about it."""
+        at = len(self._record.poses_world)
+        self._record.poses_world.append(self._run.true_poses_world[at])
+        self._record.faces_of_beams.append(self._run.true_face_of_beam[at])
+        return super().sense()
+
+    def drive(self, command: MotionCommand) -> Odometry:
+        """Go on to the next scan."""
+        odometry = super().drive(command)
+        self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
+        self._record.collisions += odometry.touched
+        return odometry
+
+
+def replayed(run: RecordedRun, backend: str) -> TrialConfig:
+    """Return the settings of a recording's replay through a back end."""
+    return replace(run.trial, backend=backend, strategy=STRATEGY_OF_REPLAYS)
+
+
+def replay(
+    run: RecordedRun,
+    backend: str,
+    options: ReplayOptions = ReplayOptions(),
+    watch: Callable[[Step], None] = lambda step: None,
+    world: World | None = None,
+    around: Callable[[Matcher], Matcher] = lambda matcher: matcher,
+    extractor: Extractor = extract,
+) -> TrialResult:
+    """Map a recording with one back end; raises UsageError before anything is computed.
+
+    `world` saves loading it again; `around` may wrap the matcher, to listen to it; `extractor` finds the
+    segments of a scan unless the options put the truth in its place.
+    """
+    config = replayed(run, backend)
+    check(config)
+    world = world or load_world(config.world, config.start, config.scale)
+    recording = run.recording
+    if options.perfect_odometry:
+        recording = replace(recording, odometry=true_odometry(run.true_poses_world))
+    backend_made = BACKENDS[backend].make(run.start_pose.copy(), run.start_cov.copy())
+    robot = ReplayedRobot(run, recording)
+    scenario = Scenario(config, world, robot, backend_made, None, run.start_pose, run.start_cov)
+    witness = Witness(truth_of(world, config.robot), run.true_poses_world, run.true_face_of_beam)
+    if len(witness.truth.faces) <= int(run.true_face_of_beam.max(initial=-1)):
+        raise UsageError(f"expected the world that the log was made in, found another {config.world}: bring it back")
+    oracle = TrueAssociation(witness) if options.association == "true" else None
+
+    def learn(step: Step) -> None:
+        if oracle is not None:
+            oracle.learn(step.walls_of_segments)
+        witness.at += 1
+        watch(step)
+
+    def mission(scenario: Scenario) -> Iterator[Step]:
+        rules = scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper)
+        mapper = Mapper(
+            scenario.backend,
+            rules,
+            PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
+            around(match if oracle is None else oracle),
+        )
+        return ride_mission(scenario.robot, len(recording), scenario.backend, scenario.config.mission, mapper)
+
+    return run_scenario(scenario, learn, mission)
+
+
+def _without_housekeeping(config: MapperConfig) -> MapperConfig:
+    """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
+    walls = WallsConfig(
+        trusted_sightings=config.walls.trusted_sightings, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0,
+        claims=_NEVER,
+    )  # fmt: skip
+    return replace(config, walls=walls, duplicates=None)

@@ -1,0 +1,163 @@
+"""Sightings told wall by wall, so that a back end runs alone: no mapper, the true association settled beforehand.
+
+What the mapper asks of a back end under `--association true` does not depend on the back end. It is worked out once for
+a drive and handed to many.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sim.chance import Channel, standard_normals
+from slam.estimation.backend import Backend, Joint, Observations
+from slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
+from slam.extraction.extract import extract
+from slam.extraction.segments import Segments
+from slam.extraction.visible_extent import sure_pieces
+from slam.map.reliability import Firmness, as_told
+from slam.mapper import seen_centres
+from slam.robot import Odometry, Scan
+
+from ..scenario import P0_SIGMAS, load_world
+from ..scoring.truth import truth_of
+from .oracles import PerfectExtraction, Witness, begins_a_line
+from .replay import RecordedRun
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Lines seen in one scan, robot frame."""
+
+    walls: Int[np.ndarray, " m"]
+    """The true wall of each."""
+    lines: Float[np.ndarray, "m 2"]
+    """(alpha rad, r m)."""
+    cov: Float[np.ndarray, "m 2 2"]
+    centres: Float[np.ndarray, "m 2"]
+    """Middle of each seen piece, m."""
+
+    def __len__(self) -> int:
+        return len(self.walls)
+
+    def take(self, index: np.ndarray) -> "Looks":
+        """Return the chosen ones (integer or boolean index)."""
+        return Looks(self.walls[index], self.lines[index], self.cov[index], self.centres[index])
+
+
+@dataclass(frozen=True, eq=False)
+class Sightings:
+    """A drive of s scans: what the wheels reported, what was seen again and what for the first time, and the truth."""
+
+    odometry: Float[np.ndarray, "s 3"]
+    """Motion that led to each scan, robot frame before the motion, m m rad; the first is not used."""
+    odometry_cov: Float[np.ndarray, "s 3 3"]
+    again: tuple[Looks, ...]
+    """For each scan the sightings of walls seen before."""
+    first: tuple[Looks, ...]
+    """And those that begin a line."""
+    true_poses_world: Float[np.ndarray, "s 3"]
+    true_lines_world: dict[int, Float[np.ndarray, "2"]]
+    """(alpha rad, r m) of each wall that begins a line."""
+
+    def told(self, share: float) -> "Sightings":
+        """Return the same sightings with their covariances stated as this share of what they are."""
+        again, first = ([replace(looks, cov=share * looks.cov) for looks in part] for part in (self.again, self.first))
+        return replace(self, again=tuple(again), first=tuple(first))
+
+
+@dataclass(frozen=True, eq=False)
+class Ridden:
+    """What a back end made of a drive."""
+
+    estimated_world: Float[np.ndarray, "s 3"]
+    """The estimate available after each scan."""
+    estimated_cov: Float[np.ndarray, "s 3 3"]
+    joint: Joint
+    """Pose and all lines after the last scan."""
+    true_poses_world: Float[np.ndarray, "s 3"]
+    true_lines_world: Float[np.ndarray, "m 2"]
+
+    @property
+    def pose_nees(self) -> Float[np.ndarray, " s"]:
+        """NEES of the invariant pose error after each scan; raises LinAlgError where a covariance is none."""
+        errors = pose_errors(self.estimated_world, self.true_poses_world)
+        return nees(errors, pose_covariances(self.estimated_world, self.estimated_cov))
+
+    @property
+    def map_anees(self) -> float:
+        """Joint NEES of all lines after the last scan over its dimension; raises LinAlgError likewise."""
+        error, cov = joint_error(self.joint, self.true_poses_world[-1], self.true_lines_world)
+        return float(nees(error[None, 3:], cov[None, 3:, 3:])[0]) / (len(error) - 3)
+
+
+def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
+    """Return what a recorded run saw, as the mapper would hand it to any back end under the true association.
+
+    Raises UsageError for a world that cannot be loaded.
+    """
+    trial, recording = run.trial, run.recording
+    world = load_world(trial.world, trial.start, trial.scale)
+    witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
+    extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
+    rules = trial.mission.mapper.walls
+    firmness = Firmness(rules.firmness)
+    true_lines: dict[int, np.ndarray] = {}
+    again, first = [], []
+    for k, ranges in enumerate(recording.ranges_m):
+        scan = Scan(
+            recording.bearings_rad, ranges, recording.sigma_m, recording.range_max_m, float(recording.time_s[k])
+        )
+        witness.at = k
+        segments = sure_pieces(extractor(scan), scan, rules.pieces)
+        faces = witness.faces(segments)
+        walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
+        known = np.isin(walls, list(true_lines))
+        seen = np.flatnonzero(known)
+        seen = seen[firmness.may_move(segments.take(seen), walls[seen])]
+        rest = np.flatnonzero(~known)
+        begun = rest[begins_a_line(walls[rest], segments.beam_counts[rest], set(true_lines))]
+        begun = begun[~segments.is_tentative[begun]]
+        owned = known & ~segments.is_tentative
+        owned[begun] = True
+        firmness.see(segments, np.where(owned, walls, -1), run.true_poses_world[k])
+        looks = _looks(segments, walls).take(seen)
+        again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.firmness)))
+        first.append(_looks(segments, walls).take(begun))
+        true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
+    return Sightings(
+        recording.odometry, recording.odometry_cov, tuple(again), tuple(first), run.true_poses_world, true_lines
+    )
+
+
+def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> Looks:
+    return Looks(walls, segments.lines, segments.cov, seen_centres(segments, np.arange(len(segments))))
+
+
+def start(seed: int, true_pose_world: Float[np.ndarray, "3"], p0: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose (3,) at which the estimate starts, drawn about the true one, and its covariance (3, 3)."""
+    position_m, heading_rad = P0_SIGMAS[p0]
+    sigmas = np.array([position_m, position_m, heading_rad])
+    return true_pose_world + sigmas * standard_normals(seed, Channel.START, 0, 3), np.diag(sigmas**2)
+
+
+def ride(backend: Backend, drive: Sightings) -> Ridden:
+    """Take a back end without lines along a drive and return its estimates."""
+    line_of_wall: dict[int, int] = {}
+    poses, covs = [], []
+    for k, (again, first) in enumerate(zip(drive.again, drive.first, strict=True)):
+        if k:
+            backend.predict(Odometry(drive.odometry[k], drive.odometry_cov[k]))
+        ids = np.array([line_of_wall[wall] for wall in again.walls.tolist()], dtype=np.int64)
+        seen = Observations(ids, again.lines, again.cov)
+        backend.update(seen, seen)
+        if len(first):
+            new = backend.grow(first.lines, first.cov, first.centres)
+            line_of_wall |= zip(first.walls.tolist(), new.tolist(), strict=True)
+        belief = backend.belief
+        poses.append(belief.pose_world)
+        covs.append(belief.pose_cov)
+    joint = backend.belief.joint(np.array(sorted(line_of_wall.values()), dtype=np.int64))
+    wall_of_line = {line: wall for wall, line in line_of_wall.items()}
+    truth = np.array([drive.true_lines_world[wall_of_line[line]] for line in sorted(wall_of_line)]).reshape(-1, 2)
+    return Ridden(np.array(poses), np.array(covs), joint, drive.true_poses_world, truth)

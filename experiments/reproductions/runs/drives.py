@@ -1,0 +1,81 @@
+"""Drives that the reproductions share: one recording by the paper's filter, the same scans through the others."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.geometry.poses import to_world
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+from viz.figures.curves import SmallMap
+
+from ...replays.recordings import recorded
+from ...replays.replay import replay
+from ...scenario import TrialConfig
+from ...scoring.coverage import alignment
+from ...scoring.records import Log
+from ...trial import TrialResult, run_trial
+from ...views.timelines import true_rings
+
+PAPER = "block-ekf"
+"""The paper's estimator, which drives."""
+BESIDE = (PAPER, "full-ekf", "invariant-ekf", "graph")
+"""The estimators that are shown beside each other."""
+
+
+@lru_cache(maxsize=16)
+def driven(config: TrialConfig) -> TrialResult:
+    """Return a trial, run once; raises UsageError for bad names."""
+    return run_trial(config)
+
+
+@lru_cache(maxsize=64)
+def replayed(config: TrialConfig, backend: str) -> TrialResult:
+    """Return what a back end makes, with its own gate, of the scans of a trial; raises UsageError likewise."""
+    made = driven(config)
+    return made if backend == config.backend else replay(recorded(made), backend, world=made.scenario.world)
+
+
+def there_and_back(seed: int) -> TrialConfig:
+    """Return the drive of figures 10 and 11: the world of figure 9 from an uncertain start, and back there."""
+    config = TrialConfig("paper-fig9", PAPER, seed=seed, p0="large")
+    return replace(config, mission=replace(config.mission, return_to_start=True))
+
+
+def log_of(result: TrialResult) -> Log:
+    """Return the steps of a trial; raises ValueError where there were none."""
+    if result.log is None:
+        raise ValueError(f"expected a run of at least one step, found none: {result.ending.reason}")
+    return result.log
+
+
+def to_true(result: TrialResult) -> Float[np.ndarray, "3"]:
+    """Return the motion that undoes the error of the start, which nothing can observe."""
+    return alignment(result.scenario.start_estimate, log_of(result).true_world[0])
+
+
+def small_map(
+    result: TrialResult, title: str, walls: StochasticMap, chains: tuple[Chain, ...], steps: int | None = None
+) -> SmallMap:
+    """Return the map after so many steps in the true frame, for a picture; without `steps`, after all."""
+    closed = {wall for chain in chains if chain.is_closed for wall in chain.walls}
+    moved = to_true(result)
+    path = log_of(result).estimated_world[:steps, :2]
+    return SmallMap(
+        title, to_world(walls.ends_world, moved), np.isin(walls.ids, sorted(closed)), walls.tentative.copy(),
+        to_world(path, moved), true_rings(result.scenario.world),
+    )  # fmt: skip
+
+
+def last_map(result: TrialResult, title: str) -> SmallMap:
+    """Return the map at the end of a trial, for a picture."""
+    assert result.last is not None
+    return small_map(result, title, result.last.map, result.last.chains)
+
+
+def trace_over_start(result: TrialResult) -> Float[np.ndarray, " s"]:
+    """Return the trace of the pose covariance (m^2 and rad^2 added, as the paper does) over that of the start."""
+    start = result.scenario.start_cov
+    return np.asarray(np.trace(log_of(result).estimated_cov, axis1=1, axis2=2) / np.trace(start))

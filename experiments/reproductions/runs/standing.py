@@ -1,0 +1,94 @@
+"""A robot that stands still and looks at the same walls: what each back end claims to learn of where it stands.
+
+No look tells where the world lies, so the pose's covariance must not fall below that of the start carried along,
+A P0 A' with A = [I, J (p - p0); 0, 1] (docs/estimation.md). The paper's figures 10 and 11 show one that does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import tyro
+from jaxtyping import Float
+from rich.table import Table
+
+from slam.backends import BACKENDS
+from slam.estimation.backend import Observations
+from slam.geometry.lines import through
+from slam.geometry.poses import J
+
+from ...replays.corridor import look, on_ring, ring
+from ...replays.sightings import start
+from ...scenario import P0, P0_SIGMAS, UsageError, choose
+from ...terminal.console import plain_console
+
+MARKS = (10, 100, 1000)
+
+
+@dataclass(frozen=True)
+class Study:
+    """Look at the same walls again and again, and print how sure each back end becomes of its pose."""
+
+    backends: tuple[str, ...] = tuple(name for name in BACKENDS if name != "graph-batch")
+    """The estimators."""
+    p0: tuple[P0, ...] = ("large", "small")
+    """Covariances of the start."""
+    looks: int = 1000
+    """How often it looks."""
+    seed: int = 1
+    """Of the noise and the walls."""
+
+    def run(self) -> None:
+        """Run the study and print a row for each back end; raises UsageError."""
+        for name in self.backends:
+            choose("back end", name, BACKENDS)
+        marks = [mark for mark in MARKS if mark <= self.looks]
+        if not marks:
+            raise UsageError(f"expected at least {MARKS[0]} looks, found {self.looks}: raise --looks")
+        for p0 in self.p0:
+            choose("start covariance (--p0)", p0, P0_SIGMAS)
+            columns = (*(f"after {mark}" for mark in marks), "slope", "P - A P0 A'")
+            table = Table("back end", *columns, title=f"trace of P over that of P0, P0 {p0}")
+            for name in self.backends:
+                trace, bound = stand(name, p0, self.looks, self.seed)
+                cells = [f"{trace[mark - 1]:.4g}" for mark in marks]
+                table.add_row(name, *cells, f"{slope(trace):.3f}", f"{bound.min():.1e}")
+            plain_console(width=max(plain_console().width, 100)).print(table)
+        print("slope: of the trace over the number of looks, log-log, from the tenth on; last column: least eigenvalue")
+        print("at any look, over the trace of P0, with A at the estimate")
+
+
+def stand(name: str, p0: str, looks: int, seed: int) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return, after each look, tr P / tr P0 and the least eigenvalue of P - A P0 A' over tr P0."""
+    rng = np.random.default_rng(seed)
+    walls = ring(40.0, rng)
+    lines = through(walls)
+    # Where most walls are in sight: between parallel ones alone nothing would be seen of the way along them.
+    true = max(on_ring(np.arange(0.0, 10.0, 0.25), 40.0), key=lambda p: len(look(walls, lines, p, 0.0 * lines)))
+    begin, cov = start(seed, true, p0)
+    backend = BACKENDS[name].make(begin.copy(), cov.copy())
+    seen = look(walls, lines, true, rng.standard_normal((len(walls), 2)))
+    ids = backend.grow(seen.lines, seen.cov, seen.centres)
+    trace, bound = np.empty(looks), np.empty(looks)
+    for k in range(looks):
+        seen = look(walls, lines, true, rng.standard_normal((len(walls), 2)))
+        observed = Observations(ids, seen.lines, seen.cov)
+        backend.update(observed, observed)
+        belief = backend.belief
+        A = np.eye(3)
+        A[:2, 2] = J @ (belief.pose_world[:2] - begin[:2])
+        trace[k] = np.trace(belief.pose_cov) / np.trace(cov)
+        bound[k] = np.linalg.eigvalsh(belief.pose_cov - A @ cov @ A.T).min() / np.trace(cov)
+    return trace, bound
+
+
+def slope(trace: Float[np.ndarray, " n"]) -> float:
+    """Return how the trace falls with the number of looks, from the tenth on: -1 is like 1/n."""
+    n = np.arange(1, len(trace) + 1)
+    return float(np.polyfit(np.log(n[9:]), np.log(trace[9:]), 1)[0]) if len(trace) > 10 else float("nan")
+
+
+if __name__ == "__main__":
+    try:
+        tyro.cli(Study).run()
+    except UsageError as error:
+        raise SystemExit(f"standing_study: {error}") from error

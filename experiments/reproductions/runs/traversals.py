@@ -1,0 +1,68 @@
+"""What figures 5 and 6 share: one world explored by two strategies, errorless, shaded by how often it was driven."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.figure import Figure
+
+from slam.backends import BACKENDS
+from viz.figures.plots import draw_traversal, traversals
+
+from ...replays.recordings import recorded
+from ...replays.sightings import ride, sightings_of
+from ...scenario import TrialConfig
+from ...trial import TrialResult
+from ...views.timelines import true_rings
+from ..reproduction import Value
+from .drives import PAPER, driven, log_of
+
+NEAREST_ROBOT = TrialConfig("paper-fig5", PAPER, "nearest-robot", errorless=True)
+NEAREST_START = replace(NEAREST_ROBOT, strategy="nearest-start")
+RIDERS = (PAPER, "full-ekf", "invariant-ekf")
+"""The graph keeps every pose of some thousand and would take minutes."""
+NOTES = (
+    "As in the paper, motion and perception are errorless, so that the seed changes nothing; the models keep their"
+    f" stated noise. {PAPER} drives; sigmas are of each back end alone on the same sightings, true association.",
+)
+NEAR_START_M = 1.0
+AWAY_M = 1.5
+
+
+def traversal_numbers(config: TrialConfig) -> dict[str, dict[str, Value]]:
+    """Return the path's numbers, which no back end changes, and for each back end how uncertain it became."""
+    made = driven(config)
+    log = log_of(made)
+    path: dict[str, Value] = {
+        "path, m": made.summary["path_length_m"],
+        "contours closed": f"{made.summary['contours_closed']} of {made.summary['contours_reachable']}",
+        "passes by the start": passes(log.true_world),
+        "share of the path driven before, %": 100.0 * float(np.mean(traversals(log.true_world[:, :2]) > 1)),
+    }
+    run = recorded(made)
+    seen = sightings_of(run, perfect_extraction=False)
+    ours = {}
+    for name in RIDERS:
+        covs = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy()), seen).estimated_cov
+        sigmas = np.sqrt(covs[:, 0, 0] + covs[:, 1, 1])
+        ours[name] = path | {
+            "largest sigma of the position, cm": 100.0 * float(sigmas.max()),
+            "mean sigma of the position, cm": 100.0 * float(sigmas.mean()),
+        }
+    return ours
+
+
+def passes(path_world: Float[np.ndarray, "s 3"]) -> int:
+    """Return how often the path is within a metre of its start, the beginning included, 1.5 m elsewhere between."""
+    away = np.hypot(*(path_world - path_world[0])[:, :2].T)
+    count, outside = 1, False
+    for distance in away:
+        outside = outside or distance > AWAY_M
+        if outside and distance <= NEAR_START_M:
+            count, outside = count + 1, False
+    return count
+
+
+def traversal_figure(title: str, made: TrialResult) -> Figure:
+    """Draw the true path, shaded by how often it was driven."""
+    return draw_traversal(log_of(made).true_world, true_rings(made.scenario.world), title)

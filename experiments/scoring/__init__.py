@@ -1,0 +1,1 @@
+"""Where truth and estimate meet: every number of summary.json."""

@@ -1,0 +1,109 @@
+"""Which true face each mapped line came from, told by the beams; never by the nearest wall."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from slam.extraction.segments import Segments
+from slam.geometry.lines import directions
+from slam.map.stochastic_map import StochasticMap
+
+from .truth import Truth
+
+ONE_FACE_SHARE = 0.8
+"""A segment with this share of its beams on one wall is an observation of that wall."""
+OVERLAP_M = 0.2
+"""Two lines of one wall that overlap over this length are one too many."""
+UNLABELLED = -1
+
+
+@dataclass
+class Votes:
+    """Beams of each map line by face, gathered over a run."""
+
+    truth: Truth
+    beams: dict[int, Int[np.ndarray, " n"]] = field(default_factory=dict)
+    """For each line id ever fused, the number of its beams from each face."""
+    fused: list[tuple[int, int]] = field(default_factory=list)
+    """(line id, true wall) of each segment fused, `UNLABELLED` where its beams came from several walls."""
+    merges: int = 0
+    false_merges: int = 0
+    """Of these, lines labelled with two different walls."""
+
+    def add(self, segments: Segments, owners: Int[np.ndarray, " s"], face_of_beam: Int[np.ndarray, " k"]) -> None:
+        """Count the beams of the segments of one scan; `owners` holds line ids, -1 where one was not used."""
+        count = len(self.truth.faces)
+        for row in np.flatnonzero(owners >= 0):
+            first, last = (int(beam) for beam in segments.beams[row])
+            span = np.arange(first, last + 1 + (len(face_of_beam) if last < first else 0)) % len(face_of_beam)
+            faces = face_of_beam[span]
+            faces = faces[faces >= 0]
+            owner = int(owners[row])
+            votes = self.beams.setdefault(owner, np.zeros(count, dtype=np.int64))
+            np.add.at(votes, faces, 1)
+            walls = np.bincount(self.truth.walls[faces]) if len(faces) else np.zeros(1)
+            clear = len(faces) > 0 and walls.max() >= ONE_FACE_SHARE * len(span)
+            self.fused.append((owner, int(walls.argmax()) if clear else UNLABELLED))
+
+    def merge(self, keep: int, drop: int) -> None:
+        """Count the beams of two lines as one line's from now on, under both ids: the map has made them one."""
+        kept, dropped = (self.walls_of(np.array([line]))[0] for line in (keep, drop))
+        self.merges += 1
+        self.false_merges += bool(UNLABELLED not in (kept, dropped) and kept != dropped)
+        theirs, none = self.beams.get(drop), np.zeros(len(self.truth.faces), dtype=np.int64)
+        ours = self.beams.setdefault(keep, none)
+        ours += 0 if theirs is None else theirs
+        # Ids that were merged into the dropped one before go along.
+        same = [line for line, beams in self.beams.items() if theirs is not None and beams is theirs]
+        self.beams.update(dict.fromkeys([drop, *same], ours))
+
+    def face_of(self, line_id: int) -> int:
+        """Return the face that stands for a line: of the wall with most of its beams, the face with most; or -1."""
+        votes = self.beams.get(line_id)
+        if votes is None or not votes.any():
+            return UNLABELLED
+        per_wall = np.bincount(self.truth.walls, weights=votes)
+        return int(np.argmax(np.where(self.truth.walls == per_wall.argmax(), votes, -1)))
+
+    def faces_of(self, ids: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the face of each line, -1 where no beam tells."""
+        return np.array([self.face_of(int(i)) for i in ids], dtype=np.int64)
+
+    def walls_of(self, ids: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the true wall of each line, -1 where no beam tells."""
+        faces = self.faces_of(ids)
+        return np.where(faces >= 0, self.truth.walls[faces], UNLABELLED)
+
+    def false_matches(self) -> int:
+        """Return how many segments seen on one wall were fused into a line labelled with another."""
+        ids = np.array(sorted(self.beams), dtype=np.int64)
+        label = dict(zip(ids.tolist(), self.walls_of(ids).tolist(), strict=True))
+        return sum(wall not in (UNLABELLED, label[owner]) for owner, wall in self.fused)
+
+
+def duplicate_lines(walls: StochasticMap, labels: Int[np.ndarray, " n"], among: Bool[np.ndarray, " n"]) -> int:
+    """Return how many lines, beyond the first of their true wall, overlap an older one of it over 0.2 m or more."""
+    return len(duplicate_pairs(walls, labels, among))
+
+
+def duplicate_pairs(
+    walls: StochasticMap, labels: Int[np.ndarray, " n"], among: Bool[np.ndarray, " n"]
+) -> list[tuple[int, int]]:
+    """Return the ids (older, younger) of those lines, each with the first line of its wall that it overlaps."""
+    rows = np.flatnonzero(among & (labels >= 0))
+    pairs = []
+    for label in np.unique(labels[rows]):
+        same = rows[labels[rows] == label]
+        along = _along(walls.ends_world[same], float(walls.belief.means[same[0], 0]))
+        for k in range(1, len(same)):
+            overlap = np.minimum(along[:k, 1], along[k, 1]) - np.maximum(along[:k, 0], along[k, 0])
+            older = np.flatnonzero(overlap >= OVERLAP_M)
+            if len(older):
+                pairs.append((int(walls.ids[same[older[0]]]), int(walls.ids[same[k]])))
+    return pairs
+
+
+def _along(ends: Float[np.ndarray, "m 2 2"], alpha: float) -> Float[np.ndarray, "m 2"]:
+    """Return from and to of each piece along one direction, m."""
+    return np.sort(ends @ directions(np.array(alpha)), axis=1)

@@ -1,0 +1,124 @@
+"""How much of the reachable contour the map holds, and which true contours it has closed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from jaxtyping import Bool, Float, Int
+
+from slam.evaluation.trajectories import alignment_of_paths
+from slam.geometry.lines import normals, through
+from slam.geometry.poses import compose, inverse, to_world
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+
+from .association import Votes
+from .truth import Truth
+
+NEAR_M, NEAR_NOISY_M = 0.1, 0.3
+"""A point of the contour is covered by a wall this near; the second is for runs with noise, after alignment."""
+PITCH_M = 0.02
+CLOSED_SHARE = 0.9
+"""A closed chain stands for a true contour if it covers this share of the contour's reachable length."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points of the reachable contour, each standing for a piece of it."""
+
+    points_world: Float[np.ndarray, "p 2"]
+    normals_world: Float[np.ndarray, "p 2"]
+    """Into the wall."""
+    length_m: Float[np.ndarray, " p"]
+    rings: Int[np.ndarray, " p"]
+
+
+def sample(truth: Truth) -> Samples:
+    """Return the reachable contour as points every 0.02 m or less."""
+    pieces = truth.contour.segments
+    along = pieces[:, 1] - pieces[:, 0]
+    lengths = np.hypot(along[:, 0], along[:, 1])
+    counts = np.maximum(np.ceil(lengths / PITCH_M).astype(int), 1)
+    piece = np.repeat(np.arange(len(pieces)), counts)
+    share = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece] + 0.5) / counts[piece]
+    return Samples(
+        pieces[piece, 0] + share[:, None] * along[piece],
+        normals(truth.lines[truth.contour.face[piece], 0]),
+        (lengths / counts)[piece],
+        truth.rings[truth.contour.face[piece]],
+    )
+
+
+def alignment(estimated_world: Float[np.ndarray, "3"], true_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Return the motion that carries the estimate's frame to the true one, from the initial poses of both."""
+    return compose(true_world, inverse(estimated_world))
+
+
+def began(lines: Int[np.ndarray, " s"]) -> int:
+    """Return the step at which a map of so many lines at each step began: the first, but for a start in the blind."""
+    return min(int(np.max(np.flatnonzero(lines == 0), initial=-1)) + 1, len(lines) - 1)
+
+
+def own_alignment(
+    start_estimate: Float[np.ndarray, "3"],
+    estimated_world: Float[np.ndarray, "s 3"],
+    true_world: Float[np.ndarray, "s 3"],
+    step: int,
+) -> Float[np.ndarray, "3"]:
+    """Return the motion that carries the map to the truth: by the path since the step where it began, if not the first.
+
+    What the robot lost before its first wall no scan can tell; it moves the map as a whole, also later on, since a
+    filter that does not know its heading to some degrees is turned by small innovations.
+    """
+    if not step:
+        return alignment(start_estimate, true_world[0])
+    return alignment_of_paths(*(_with_headings(path[step:]) for path in (estimated_world, true_world)))
+
+
+def _with_headings(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "r 3"]:
+    """Return poses and a place a metre ahead of each: a robot that stands still has a heading too."""
+    ahead = np.column_stack([poses_world[:, :2] + normals(poses_world[:, 2]), poses_world[:, 2]])
+    return np.concatenate([poses_world, ahead])
+
+
+def covered(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> Bool[np.ndarray, " p"]:
+    """Return which points lie within `near_m` of a wall whose normal agrees within 45 degrees."""
+    result = np.zeros(len(samples.points_world), dtype=bool)
+    if not len(walls_world):
+        return result
+    tree = shapely.STRtree([shapely.LineString(wall) for wall in walls_world])
+    point, wall = tree.query(shapely.points(samples.points_world), predicate="dwithin", distance=near_m)
+    mapped = normals(through(walls_world)[:, 0])
+    agrees = np.sum(samples.normals_world[point] * mapped[wall], axis=-1) >= np.cos(np.pi / 4)
+    result[point[agrees]] = True
+    return result
+
+
+def coverage(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> float:
+    """Return the covered share of the reachable contour, by length."""
+    share = samples.length_m[covered(samples, walls_world, near_m)].sum() / samples.length_m.sum()
+    return float(share)
+
+
+def closed_contours(
+    samples: Samples, walls: StochasticMap, chains: tuple[Chain, ...], votes: Votes, to_true: Float[np.ndarray, "3"],
+    near_m: float,
+) -> list[int]:  # fmt: skip
+    """Return the reachable true contours that a closed chain stands for.
+
+    A chain belongs to the contour from which most of its beams came; it stands for it if its walls cover nine
+    tenths of the contour's reachable length, so that a chain closed by mistake across a door does not count.
+    """
+    reachable = set(votes.truth.contour.rings.tolist())
+    found: set[int] = set()
+    for chain in chains:
+        beams = [votes.beams[wall] for wall in chain.walls if wall in votes.beams]
+        if not chain.is_closed or not beams:
+            continue
+        ring = int(np.bincount(votes.truth.rings, weights=np.sum(beams, axis=0)).argmax())
+        mine = samples.rings == ring
+        ends = to_world(walls.ends_world[walls.belief.rows(chain.walls)], to_true)
+        length = samples.length_m[mine & covered(samples, ends, near_m)].sum()
+        if ring in reachable and length >= CLOSED_SHARE * samples.length_m[mine].sum():
+            found.add(ring)
+    return sorted(found)

@@ -1,0 +1,122 @@
+"""What a trial keeps of every step, as arrays; truth and estimate side by side."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from explore.step import Step
+from slam.estimation.backend import Joint
+
+from ..scenario import WitnessedRobot
+from .association import Votes
+
+
+@dataclass(frozen=True)
+class Log:
+    """A run, step by step; s steps, k beams."""
+
+    time_s: Float[np.ndarray, " s"]
+    bearings_rad: Float[np.ndarray, " k"]
+    ranges_m: Float[np.ndarray, "s k"]
+    sigma_m: float
+    range_max_m: float
+    odometry: Float[np.ndarray, "s 3"]
+    """Motion that led to each step, robot frame before the motion, m m rad."""
+    odometry_cov: Float[np.ndarray, "s 3 3"]
+    touched: Bool[np.ndarray, " s"]
+    """Whether the body met something on the way to each step."""
+    estimated_world: Float[np.ndarray, "s 3"]
+    """The estimate available at that step."""
+    estimated_cov: Float[np.ndarray, "s 3 3"]
+    true_world: Float[np.ndarray, "s 3"]
+    face_of_beam: Int[np.ndarray, "s k"]
+    path_length_m: Float[np.ndarray, " s"]
+    open_ends: Int[np.ndarray, " s"]
+    lines: Int[np.ndarray, " s"]
+    """Lines in the map, tentative ones included."""
+    tentative: Int[np.ndarray, " s"]
+    closed_chains: Int[np.ndarray, " s"]
+    set_aside: Int[np.ndarray, " s"]
+    seconds: Float[np.ndarray, " s"]
+    """Wall-clock time of each step, sense to command."""
+    planning_seconds: Float[np.ndarray, " s"]
+    """Processor time of each step's decisions."""
+    reasons: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass
+class Recorder:
+    """Gathers a run while it goes on, so that whatever ends it leaves everything up to then."""
+
+    robot: WitnessedRobot
+    votes: Votes
+    last: Step | None = None
+    joint: Joint | None = None
+    """Pose and all lines at the last step; None where the back end could no longer tell."""
+    _rows: list[dict[str, object]] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def add(self, step: Step) -> None:
+        """Keep one step and the truth of the same moment; raises ValueError if scans and steps have parted."""
+        record = self.robot.record
+        if len(record.poses_world) != len(self._rows) + 1:
+            raise ValueError(
+                f"expected one scan for each step, found {len(record.poses_world)} scans at step {len(self._rows) + 1}:"
+                " a mission yields a step after each sense()"
+            )
+        belief = step.map.belief
+        self.last, self.joint = step, None
+        for keep, drop in step.merged:
+            self.votes.merge(keep, drop)
+        self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1])
+        self._rows.append(
+            {
+                "time_s": step.time_s,
+                "ranges_m": step.scan.ranges_m,
+                "odometry": step.odometry.motion,
+                "odometry_cov": step.odometry.cov,
+                "touched": step.odometry.touched,
+                "estimated_world": belief.pose_world.copy(),
+                "estimated_cov": belief.pose_cov.copy(),
+                "true_world": record.poses_world[-1],
+                "face_of_beam": record.faces_of_beams[-1],
+                "path_length_m": step.path_length_m,
+                "open_ends": sum(len(chain.open_ends) for chain in step.chains),
+                "lines": len(step.map),
+                "tentative": int(np.count_nonzero(step.map.tentative)),
+                "closed_chains": sum(chain.is_closed for chain in step.chains),
+                "set_aside": len(step.set_aside),
+                "seconds": step.seconds,
+                "planning_seconds": step.planning_seconds,
+                "reasons": step.reason,
+            }
+        )
+
+    def close(self) -> None:
+        """Ask the last belief for its joint covariance, while its back end has not moved on."""
+        if self.last is None:
+            return
+        try:
+            self.joint = self.last.map.belief.joint(self.last.map.ids)
+        except Exception:  # whatever a failing back end raises must not cost the results so far
+            self.joint = None
+
+    def log(self) -> Log:
+        """Return the run so far; raises ValueError if there was no step."""
+        if self.last is None:
+            raise ValueError("expected at least one step, found none: the run failed before its first scan was mapped")
+        scan = self.last.scan
+        columns = {name: np.array([row[name] for row in self._rows]) for name in self._rows[0] if name != "reasons"}
+        return Log(
+            bearings_rad=scan.bearings_rad,
+            sigma_m=float(scan.sigma_m),
+            range_max_m=float(scan.range_max_m),
+            reasons=tuple(str(row["reasons"]) for row in self._rows),
+            **columns,
+        )

@@ -1,0 +1,37 @@
+"""What a back end that smooths knows once a run has ended; no score is taken from it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.estimation.backend import Backend, Joint, Smoother
+from slam.map.stochastic_map import StochasticMap
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """The estimate of everything from everything, which no step of the run had."""
+
+    poses_world: Float[np.ndarray, "s 3"]
+    """The robot at each step."""
+    map: StochasticMap
+    joint: Joint
+    """The pose at the last step and all lines."""
+
+
+def smooth(backend: Backend, last: StochasticMap, steps: int) -> Smoothed | None:
+    """Let a back end finish after so many steps; None if it does not smooth or broke off within a step.
+
+    Every belief before it goes stale.
+    """
+    try:
+        if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
+            return None
+        poses = backend.finish()[:steps]
+        belief = backend.belief
+        if len(poses) < steps or not np.array_equal(belief.ids, last.ids):
+            return None
+        return Smoothed(poses, replace(last, belief=belief), belief.joint(belief.ids))
+    except Exception:  # whatever a back end raises after a failed run must not cost the results so far
+        return None

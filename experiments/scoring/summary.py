@@ -1,0 +1,219 @@
+"""The keys of summary.json, as DESIGN.md section 6 defines them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from explore.goals.homing import HOME_M
+from explore.outcome import Outcome
+from explore.step import Step
+from slam.estimation.backend import POSE, Joint, columns_of
+from slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
+from slam.geometry.poses import compose, to_world, wrap
+
+from ..scenario import Scenario
+from .association import Votes, duplicate_lines
+from .corners import corners, label_distances
+from .coverage import NEAR_M, NEAR_NOISY_M, alignment, began, closed_contours, coverage, own_alignment, sample
+from .records import Log
+from .swept import swept
+
+EXIT_STATUS = {Outcome.FAILED: 1, Outcome.INTERRUPTED: 130}
+"""What the command ends in; 0 for every other outcome."""
+TIMED = ("step_ms", "planning_ms")
+"""The keys that differ between two runs of the same command."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended."""
+
+    outcome: Outcome
+    reason: str
+    traceback: str = ""
+
+    @property
+    def status(self) -> str:
+        """`complete`, `stopped` or `failed`."""
+        return self.outcome.status
+
+    @property
+    def exit_status(self) -> int:
+        """What the command ends in."""
+        return EXIT_STATUS.get(self.outcome, 0)
+
+
+def pose_nees(log: Log) -> Float[np.ndarray, " s"]:
+    """Return the NEES of the invariant pose error at each step; NaN where a covariance is not positive definite."""
+    return nees_of_poses(log.estimated_world, log.estimated_cov, log.true_world)
+
+
+def nees_of_poses(
+    estimated_world: Float[np.ndarray, "s 3"],
+    estimated_cov: Float[np.ndarray, "s 3 3"],
+    true_world: Float[np.ndarray, "s 3"],
+) -> Float[np.ndarray, " s"]:
+    """Return the NEES of invariant pose errors (m, m, rad); NaN where a covariance is not positive definite."""
+    errors = pose_errors(estimated_world, true_world)
+    covs = pose_covariances(estimated_world, estimated_cov)
+    try:
+        return nees(errors, covs)
+    except np.linalg.LinAlgError:
+        if len(errors) == 1:
+            return np.array([np.nan])
+        rows = zip(estimated_world[:, None], estimated_cov[:, None], true_world[:, None], strict=True)
+        return np.concatenate([nees_of_poses(*row) for row in rows])
+
+
+def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
+    """Return where the wheels alone, from the true start on, say the robot was."""
+    return wheels_path(log.true_world[0], log.odometry)
+
+
+def wheels_path(start_world: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
+    """Return the poses from a start on by the wheels' motions alone; the first motion led to the start."""
+    poses = [start_world]
+    for motion in odometry[1:]:
+        poses.append(compose(poses[-1], motion))
+    return np.array(poses)
+
+
+def run_keys(scenario: Scenario, ending: Ending) -> dict[str, Any]:
+    """Return the keys of summary.json that say which run it was and how it ended."""
+    config = scenario.config
+    return {
+        "world": scenario.world.name,
+        "backend": config.backend,
+        "strategy": config.strategy,
+        "seed": config.seed,
+        "p0": config.p0,
+        "errorless": config.errorless,
+        "status": ending.status,
+        "reason": ending.reason,
+        "outcome": str(ending.outcome),
+    }
+
+
+def summarise(
+    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, ending: Ending
+) -> dict[str, Any]:
+    """Return every key of summary.json; null where there is nothing to measure."""
+    config = scenario.config
+    return {
+        **run_keys(scenario, ending),
+        "steps": len(log),
+        "path_length_m": float(log.path_length_m[-1]),
+        "path_length_true_m": scenario.robot.record.path_length_m,
+        "drive_time_s": scenario.robot.record.drive_time_s,
+        "collisions": scenario.robot.record.collisions,
+        "return_to_start": _return(log) if config.mission.return_to_start else None,
+        "open_ends": int(log.open_ends[-1]),
+        "set_aside": [
+            {"wall": int(end.wall), "side": int(end.side), "position_m": end.position_world.tolist(), "why": end.reason}
+            for end in step.set_aside
+        ],
+        **_map_scores(scenario, log, votes, step, joint),
+        **_pose_scores(log, config.errorless),
+        "step_ms": _spread_ms(log.seconds),
+        "planning_ms": _spread_ms(log.planning_seconds),
+    }
+
+
+def _return(log: Log) -> dict[str, Any]:
+    """Return how far from its start the robot is at the end, m: as it believes, and truly."""
+    believed, true = (float(np.hypot(*(p[-1] - p[0])[:2])) for p in (log.estimated_world, log.true_world))
+    return {"reached": believed <= HOME_M, "distance_m": believed, "distance_true_m": true}
+
+
+def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:
+    off = log.estimated_world - log.true_world
+    wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)
+    scores: dict[str, Any] = {
+        "pose_rmse_m": float(np.sqrt(np.mean(np.sum(off[:, :2] ** 2, axis=1)))),
+        "heading_rmse_rad": float(np.sqrt(np.mean(wrap(off[:, 2]) ** 2))),
+        "odometry_rmse_m": float(np.sqrt(np.mean(wheels**2))),
+        "odometry_max_m": float(wheels.max()),
+        "odometry_end_m": float(wheels[-1]),
+        "pose_anees": None,
+        "pose_nees_in_band": None,
+    }
+    values = pose_nees(log)
+    if not errorless and np.all(np.isfinite(values)):
+        scores |= {"pose_anees": anees(values, 3), "pose_nees_in_band": share_in_band(values, 3)}
+    return scores
+
+
+def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None) -> dict[str, Any]:
+    truth, walls = votes.truth, step.map
+    errorless = scenario.config.errorless
+    near = NEAR_M if errorless else NEAR_NOISY_M
+    to_true = alignment(scenario.start_estimate, log.true_world[0])
+    began_at = began(log.lines)
+    own = own_alignment(scenario.start_estimate, log.estimated_world, log.true_world, began_at)
+    samples = sample(truth)
+    aligned = to_world(walls.ends_world, to_true)
+    labels = votes.walls_of(walls.ids)
+    firm = ~walls.tentative
+    return {
+        "lines": len(walls),
+        "lines_tentative": int(np.count_nonzero(~firm)),
+        "lines_crooked": int(np.count_nonzero(walls.crooked)),
+        "lines_unlabelled": int(np.count_nonzero(firm & (labels < 0))),
+        "contours_closed": len(closed_contours(samples, walls, step.chains, votes, own, near)),
+        "contours_reachable": truth.contour.contours,
+        "chains_closed": int(log.closed_chains[-1]),
+        "chains_open": len(step.chains) - int(log.closed_chains[-1]),
+        "coverage": coverage(samples, aligned[firm], near),
+        "coverage_own_frame": coverage(samples, to_world(walls.ends_world[firm], own), near),
+        "map_began_step": began_at,
+        "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
+        "map_anees": None
+        if errorless
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & (labels >= 0)),
+        "map_anees_straight": None
+        if errorless
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & ~walls.crooked & (labels >= 0)),
+        "duplicate_lines": duplicate_lines(walls, labels, firm),
+        "false_matches": votes.false_matches(),
+        "merges": votes.merges,
+        "false_merges": votes.false_merges,
+        "distances": label_distances(corners(walls, step.chains), scenario.world.labels, to_true, joint),
+    }
+
+
+def map_anees(
+    votes: Votes,
+    ids: Int[np.ndarray, " n"],
+    joint: Joint | None,
+    true_pose_world: Float[np.ndarray, "3"],
+    among: Bool[np.ndarray, " n"],
+    with_pose: bool = False,
+) -> float | None:
+    """Return the joint NEES of the chosen walls over its dimension, in the invariant error; null where it has none.
+
+    `with_pose` takes pose and walls together, 3 + 2 m dimensions. Each wall is held against the true face from which
+    most of its beams came; duplicates stay, and a covariance that is not positive definite gives null instead of a
+    pseudo-inverse.
+    """
+    rows = np.flatnonzero(among)
+    if joint is None or not len(rows):
+        return None
+    lines = votes.truth.lines[np.maximum(votes.faces_of(ids), 0)]
+    error, cov = joint_error(joint, true_pose_world, lines)
+    index = columns_of(rows)[0 if with_pose else POSE :]
+    try:
+        return float(nees(error[None, index], cov[None][:, index[:, None], index])[0]) / len(index)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _spread_ms(seconds: Float[np.ndarray, " s"]) -> dict[str, float]:
+    ms = 1e3 * seconds
+    return {
+        "mean": float(ms.mean()),
+        "p50": float(np.percentile(ms, 50)),
+        "p95": float(np.percentile(ms, 95)),
+        "max": float(ms.max()),
+    }

@@ -1,0 +1,1 @@
+"""Pictures, pages and timelines of what runs left."""

@@ -1,0 +1,139 @@
+"""Pictures for papers from the folders that runs left: `python -m experiments.views.pictures DIR ... --out PICTURES`.
+
+Paths and NEES of several folders (replays of one log) come together; the map, the model space and the traversals are of
+the first.
+"""
+
+import csv
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tyro
+from jaxtyping import Float
+from matplotlib.figure import Figure
+
+from sim.logs.archive import regular
+from sim.logs.recorded_robot import MOST_M, within
+from viz import palette
+from viz.figures.maps import draw_map, saved
+from viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
+from viz.shapes import hessian_cov
+
+from ..artifacts.files import write
+from ..artifacts.map_files import read_map
+from ..artifacts.reading import UnfitError, told
+from ..artifacts.results import LOG
+from ..artifacts.run_folder import prepare
+from ..artifacts.saved import REMEDY, read_trial
+from ..replays.replay import read_run
+from ..scenario import TrialConfig, UsageError, load_world
+from ..scoring.summary import wheels_path
+from .saved_map import saved_map
+from .timelines import true_rings
+
+BAD_USAGE = 2
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Draw map, paths, NEES, model space and traversals of the runs in some folders."""
+
+    runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR")]
+    """Folders of runs in one world."""
+    out: Path
+    """Folder for the pictures."""
+    kinds: tuple[Literal["png", "svg", "pdf"], ...] = ("svg", "png")
+    """Kinds of files."""
+
+    def run(self) -> None:
+        """Write the pictures; raises UsageError where a folder holds no run."""
+        runs = [read_pictured(folder) for folder in self.runs]
+        first = runs[0]
+        shown = saved_map(self.runs[0], first.trial, first.log, first.walls, first.estimated_world)
+        prepare(self.out)
+        pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown), **draw_all(runs)}
+        for name, draw in pictures.items():
+            figure = draw()
+            for kind in self.kinds:
+                write(self.out / f"{name}.{kind}", saved(figure, kind))
+
+
+@dataclass(frozen=True)
+class PicturedRun:
+    """What pictures of a run are drawn from."""
+
+    trial: TrialConfig
+    log: dict[str, Any]
+    walls: dict[str, Any]
+    estimated_world: Float[np.ndarray, "s 3"]
+    nees: Float[np.ndarray, " s"]
+
+
+def read_pictured(folder: Path) -> PicturedRun:
+    """Read a run's folder; raises UsageError where it holds none."""
+    trial = read_trial(folder / "config.json")
+    run = read_run(folder / LOG)
+    walls, steps = read_map(folder), read_steps(folder)
+    if len(steps) != len(run.recording):
+        raise UsageError(
+            f"expected a step for each of {len(run.recording)} scans, found {len(steps)} in {folder / 'steps.csv'}:"
+            " keep a run's files together"
+        )
+    arrays = {"true_poses": run.true_poses_world, "start_pose": run.start_pose, "odometry": run.recording.odometry}
+    return PicturedRun(trial, arrays, walls, steps[:, :3], steps[:, 3])
+
+
+def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
+    """Return the estimated poses (m, m, rad) and the pose's NEES from a run's `steps.csv`; raises UsageError."""
+    path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad", "pose_nees")
+    with told(path, REMEDY):
+        try:
+            with regular(path).open(newline="") as stream:
+                rows = [[float(row[name] or "nan") for name in columns] for row in csv.DictReader(stream)]
+        except (ValueError, KeyError, TypeError, csv.Error) as error:
+            raise UnfitError("another table, or one that was cut short") from error
+        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
+        if not within(steps[:, :3], MOST_M):
+            raise UnfitError(f"poses that are NaN or beyond {MOST_M:g} m")
+    return steps
+
+
+def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
+    """Return, by name, what draws each picture of runs in one world; nothing for no run."""
+    if not runs:
+        return {}
+    first = runs[0]
+    trial = first.trial
+    world = load_world(trial.world, trial.start, trial.scale)
+    rings, title = true_rings(world), f"{world.name}, seed {trial.seed}"
+    paths = {run.trial.backend: run.estimated_world for run in runs}
+    lines = first.walls["lines_world"]
+    count = len(lines)
+    blocks = first.walls["cov"][3:, 3:].reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count), :]
+    covs = hessian_cov(lines[:, 0], first.walls["anchors"], blocks)
+    true, wheels = first.log["true_poses"], wheels_path(first.log["true_poses"][0], first.log["odometry"])
+    colours = [palette.of_backend(trial.backend)] * count
+    return {
+        "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and believed", wheels),
+        "nees": lambda: draw_nees({run.trial.backend: run.nees for run in runs}, f"{title}: NEES of the pose"),
+        "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
+        "traversals": lambda: draw_traversal(true, rings, f"{title}: how often each stretch was driven"),
+    }
+
+
+def main() -> int:
+    """Run the command and return its exit status."""
+    try:
+        tyro.cli(Pictures).run()
+    except UsageError as error:
+        print(f"pictures: {error}", file=sys.stderr)
+        return BAD_USAGE
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

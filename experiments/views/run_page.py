@@ -1,0 +1,177 @@
+"""The report of a run, or of one log through several back ends: what was mapped, how well, and how honestly."""
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viz.figures.maps import png
+from viz.reports.report import Page, PagePicture, PageTable, Section, filled
+
+from ..artifacts.mapped import read_corners
+from ..artifacts.saved import read_config, read_summary
+from ..replays.replay import ReplayOptions, read_options
+from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
+from .numbers import NONE, number, percent
+from .pictures import draw_all, read_pictured
+
+CAPTIONS = {
+    "paths": "The way as it was, and as each back end believes it",
+    "nees": "NEES of the pose: inside the band the estimate knows how wrong it is, above it, it is overconfident",
+    "model": "Walls in the plane of direction and distance, with their ellipses",
+    "traversals": "How often each stretch was driven",
+}
+FIGURES: dict[str, tuple[str, float]] = {
+    "steps": ("steps", 1.0), "path_length_m": ("way driven, m", 1.0), "coverage": ("contour mapped, %", 100.0),
+    "swept": ("floor seen, %", 100.0), "contours_closed": ("contours closed", 1.0),
+    "contours_reachable": ("contours there are", 1.0), "open_ends": ("open ends left", 1.0), "lines": ("walls", 1.0),
+    "pose_rmse_m": ("pose error, cm rms", 100.0), "heading_rmse_rad": ("heading error, degrees rms", 180.0 / np.pi),
+    "odometry_max_m": ("wheels alone, worst, m", 1.0), "pose_anees": ("pose ANEES (1 is ideal)", 1.0),
+    "pose_nees_in_band": ("steps in the 95 % band, %", 100.0), "map_anees": ("map ANEES (1 is ideal)", 1.0),
+    "false_matches": ("false matches", 1.0), "duplicate_lines": ("walls twice in the map", 1.0),
+    "collisions": ("collisions", 1.0),
+}  # fmt: skip
+"""What the table tells: the key of summary.json, words, and what it is multiplied by."""
+
+LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
+
+
+def is_run(folder: Path) -> bool:
+    """Return whether a folder holds a run, or runs of several back ends."""
+    return bool(_homes(folder))
+
+
+def run_page(folder: Path) -> Page:
+    """Return the report of a run's folder; raises UsageError where its files do not belong to one run."""
+    homes = _homes(folder)
+    summaries = [read_summary(home) for home in homes]
+    configs = [read_config(home / "config.json") for home in homes]
+    trials = [config.trial for config in configs]
+    names = [trial.backend for trial in trials]
+    first = trials[0]
+    options = read_options(homes[0] / "config.json")
+    how = (
+        f"A recorded drive{_by_truth(options)}"
+        if first.strategy == STRATEGY_OF_REPLAYS
+        else f"A robot drives by {first.strategy}"
+    )
+    maps = [
+        PagePicture((home / "map.png").read_bytes(), f"Map by {name}")
+        for home, name in zip(homes, names, strict=True)
+        if (home / "map.png").is_file()
+    ]
+    drawn = draw_all([read_pictured(home) for home in homes if (home / "map.npz").is_file()])
+    pictures = tuple(PagePicture(png(draw()), CAPTIONS[kind]) for kind, draw in drawn.items())
+    table = PageTable(
+        "The run in numbers", ("what", *names),
+        tuple((words, *(_told(s.get(key), scale) for s in summaries)) for key, (words, scale) in FIGURES.items()),
+    )  # fmt: skip
+    return Page(
+        f"{Path(first.world).stem}: {', '.join(names)}",
+        f"{how} in {Path(first.world).stem}, seed {first.seed}: what was mapped, how far is it off, and does the"
+        " estimator know?",
+        tuple(_answer(name, summary) for name, summary in zip(names, summaries, strict=True)),
+        _command(first, names, options),
+        (*configs[0].versions.items(), ("commit", str(configs[0].commit)[:10])),
+        (
+            *filled(
+                Section("The map", pictures=tuple(maps)),
+                Section("In numbers", tables=(table,)),
+                Section("Rooms and islands", _ROOM_WORDS, tuple(filter(None, map(_rooms, homes, names)))),
+                Section("Along the way", pictures=pictures),
+            ),
+            Section("Open ends", _open_ends(names, summaries)),
+        ),
+    )
+
+
+_ROOM_WORDS = (
+    "Areas and lengths of the closed chains, with 95 % intervals through the joint covariance of all walls, as far as"
+    " the back end knows it.",
+)
+
+
+def _homes(folder: Path) -> list[Path]:
+    if (folder / "summary.json").is_file():
+        return [folder]
+    return sorted(path.parent for path in folder.glob("*/summary.json"))
+
+
+def _answer(name: str, summary: dict[str, Any]) -> str:
+    """Return a run in one sentence."""
+    if not summary.get("steps"):
+        return f"{name}: {summary['status']} before its first step: {summary['reason']}."
+    words = f"{name}: {summary['status']} after {number(summary['path_length_m'])} m ({summary['reason']});"
+    if summary.get("coverage") is not None:
+        words += f" {percent(summary['coverage'])} % of the reachable contour mapped;"
+    words += f" the pose {_told(summary['pose_rmse_m'], 100.0)} cm off (rms)"
+    if summary.get("pose_anees") is None:
+        return f"{words}."
+    return f"{words}, {_honest(summary['pose_anees'])} (ANEES {number(summary['pose_anees'])}; 1 is ideal)."
+
+
+def _honest(anees: float) -> str:
+    """Return what the ANEES of one run says; those of an ideal filter scatter by a factor of two or three."""
+    low, high = 0.2, 3.0
+    return "more than it thinks" if anees > high else "less than it thinks" if anees < low else "about as it thinks"
+
+
+def _told(value: Any, scale: float) -> str:
+    if value is None:
+        return NONE
+    return number(value if scale == 1.0 else scale * value)
+
+
+def _rooms(home: Path, name: str) -> PageTable | None:
+    try:
+        mapped = read_corners(home)
+    except UsageError:
+        return None
+    rows = []
+    for room in mapped.rooms:
+        measured = mapped.area(room), mapped.perimeter(room)
+        values = (f"{m.value:.3f} ± {m.interval[1] - m.value:.3f}" for m in measured)
+        rows.append((str(room.chain), "island" if room.is_island else "room", str(len(room.corners)), *values))
+    return PageTable(f"As {name} states it", ("chain", "is", "corners", "area, m²", "length, m"), tuple(rows))
+
+
+def _open_ends(names: list[str], summaries: list[dict[str, Any]]) -> tuple[str, ...]:
+    words = []
+    for name, summary in zip(names, summaries, strict=True):
+        left = summary.get("set_aside") or []
+        if not summary.get("open_ends"):
+            words.append(f"{name}: none is left.")
+            continue
+        places = (f"({end['position_m'][0]:.1f}, {end['position_m'][1]:.1f}) m: {end['why']}" for end in left)
+        words.append(f"{name}: {summary['open_ends']} left. " + "; ".join(places))
+    return tuple(words)
+
+
+def _by_truth(options: ReplayOptions) -> str:
+    """Return what the truth took the place of, in words."""
+    parts = {
+        "matches": options.association == "true",
+        "extracted lines": options.perfect_extraction,
+        "odometry": options.perfect_odometry,
+    }
+    told = [name for name, by_truth in parts.items() if by_truth]
+    return f" with true {' and '.join(told)}" if told else ""
+
+
+def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> str:
+    """Return the command that makes the run again."""
+    if trial.strategy == STRATEGY_OF_REPLAYS:
+        truth = {"--perfect-extraction": options.perfect_extraction, "--perfect-odometry": options.perfect_odometry}
+        words = ["chainslam", "replay", "LOG", "--backend", *names, "--association", options.association]
+        return shlex.join([*words, *(name for name, given in truth.items() if given), "--out", "DIR"])
+    plain, mission = TrialConfig(trial.world), trial.mission
+    words = ["chainslam", "explore", trial.world, "--backend", trial.backend, "--strategy", trial.strategy]
+    words += ["--seed", str(trial.seed), "--p0", trial.p0, *(["--errorless"] if trial.errorless else [])]
+    words += [] if trial.start is None else ["--start", *map(str, trial.start)]
+    words += [] if mission.explorer.sweep else ["--no-sweep"]
+    words += ["--return-to-start"] if mission.return_to_start else []
+    for option, name in LIMITS.items():
+        value = getattr(trial, name)
+        words += [] if value == getattr(plain, name) else [option, str(value)]
+    return shlex.join([*words, "--out", "DIR"])

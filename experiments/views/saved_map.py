@@ -1,0 +1,74 @@
+"""The picture of a map from the files that a run left, so that it can be drawn again as vectors."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from explore.goal import SetAside
+from slam.estimation.backend import Belief, Joint, StaleBeliefError
+from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
+from slam.map.stochastic_map import StochasticMap
+from viz.figures.maps import Picture
+
+from ..artifacts.map_files import read_features
+from ..artifacts.picture import over_truth
+from ..artifacts.reading import fit, told
+from ..artifacts.saved import REMEDY, read_summary
+from ..scenario import TrialConfig, load_world
+
+_TOLD = ("path_length_m", "coverage_own_frame", "pose_rmse_m", "odometry_rmse_m")
+_COUNTED = ("contours_closed", "contours_reachable", "map_began_step")
+"""What the picture tells of a run's summary."""
+
+
+def saved_map(
+    folder: Path,
+    trial: TrialConfig,
+    log: Mapping[str, np.ndarray],
+    walls: Mapping[str, np.ndarray],
+    estimated_world: Float[np.ndarray, "s 3"],
+) -> Picture:
+    """Return the picture of a run's map from its folder and its arrays; raises UsageError where a file is missing."""
+    features = read_features(folder, walls["ids"])
+    summary = read_summary(folder)
+    with told(folder / "summary.json", REMEDY):
+        fit({**dict.fromkeys(_TOLD, float), **dict.fromkeys(_COUNTED, int)}, summary)
+    covs = [
+        (np.array(feature["geometry"]["coordinates"]), np.array(feature["properties"]["covariance_xy_m2"]))
+        for feature in features["corner"]
+        if feature["properties"]["covariance_xy_m2"] is not None
+    ]
+    aside = [
+        SetAside(end["wall"], end["side"], np.array(end["position_m"]), end["why"])
+        for end in summary.get("set_aside") or ()
+    ]
+    belief = Belief(
+        walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
+    )
+    marks = walls["sightings"], walls["tentative"], walls["crooked"]
+    world = load_world(trial.world, trial.start, trial.scale)
+    return over_truth(
+        world, trial, summary, StochasticMap(belief, walls["extents"], *marks), _chains(features["chain"]),
+        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
+    )  # fmt: skip
+
+
+def _not_to_be_asked(ids: np.ndarray) -> Joint:
+    raise StaleBeliefError("expected a back end at work, found its results on disk: read the joint covariance there")
+
+
+def _chains(features: Sequence[Mapping[str, Any]]) -> tuple[Chain, ...]:
+    """Return the chains in the order that they had; a file holds the closed ones first."""
+    found: dict[int, Chain] = {}
+    for feature in features:
+        says, way = feature["properties"], feature["geometry"]["coordinates"]
+        members = tuple(says["walls"])
+        if says["closed"]:
+            found[says["chain"]] = Chain(members, np.array(way[0][:-1]), ())
+        else:
+            ends = (OpenEnd(members[0], TAIL, np.array(way[0])), OpenEnd(members[-1], HEAD, np.array(way[-1])))
+            found[says["chain"]] = Chain(members, np.array(way[1:-1]).reshape(-1, 2), ends)
+    return tuple(chain for _, chain in sorted(found.items()))

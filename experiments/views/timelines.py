@@ -1,0 +1,149 @@
+"""Truth meets timeline: runs become recordings, and whatever happens to a recording, the run goes on."""
+
+import gc
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from jaxtyping import Float
+
+from explore.step import Step
+from sim.worlds import World
+from viz.viewer import Viewer, ViewerError
+
+from ..artifacts.files import probe, write_anywhere
+from ..replays.replay import RecordedRun, ReplayOptions, replay
+from ..scenario import load_world
+from ..scoring.summary import nees_of_poses
+
+if TYPE_CHECKING:
+    from viz.timeline import Timeline
+
+TruePose = Callable[[Step], Float[np.ndarray, "3"]]
+Watch = Callable[[Step], None]
+
+
+class Recording:
+    """A timeline of one or several back ends on its way to a file or a viewer; its troubles are told at the end."""
+
+    def __init__(
+        self,
+        title: str,
+        backends: Sequence[str],
+        world: World | None,
+        errorless: bool,
+        rrd: Path | None,
+        view: bool = False,
+    ) -> None:
+        """Begin it; with neither a file nor a viewer asked for it does nothing and costs nothing."""
+        self._rrd = rrd
+        self._problem = ""
+        self._timeline: Timeline | None = None
+        if rrd is not None or view:
+            self._try(lambda: self._begin(title, backends, world, errorless, view))
+
+    def watch(self, backend: str, true_pose_of: TruePose, also: Watch = lambda step: None) -> Watch:
+        """Return what takes in each step of one back end, beside whatever else watches."""
+
+        def add(step: Step) -> None:
+            if (timeline := self._timeline) is not None:
+                self._try(lambda: timeline.add(backend, step, np.asarray(true_pose_of(step))))
+
+        def watch(step: Step) -> None:
+            # Recorded first: what else watches may stop the run here, and this step belongs to it.
+            add(step)
+            also(step)
+
+        return watch
+
+    @property
+    def is_on(self) -> bool:
+        """Whether anything is recorded."""
+        return self._timeline is not None
+
+    def add_campaign(self, trials: Sequence[Mapping[str, Any]], steps: Sequence[Mapping[str, Any]]) -> None:
+        """Add the summary of a campaign from its tables, a mapping a row."""
+        if (timeline := self._timeline) is not None:
+            self._try(lambda: timeline.add_campaign(trials, steps))
+
+    def close(self) -> list[str]:
+        """Write what was recorded, and return, in words, what could not be."""
+        self._try(self._finish)
+        return [self._problem] if self._problem else []
+
+    def _begin(self, title: str, backends: Sequence[str], world: World | None, errorless: bool, view: bool) -> None:
+        if self._rrd is not None:
+            # Tried before the run, so that nobody waits for a recording that cannot be.
+            probe(self._rrd)
+        viewer_url = Viewer().url if view else None
+        # Rerun's own words on a viewer that went would come between ours; what matters it raises, too.
+        os.environ.setdefault("RUST_LOG", "off")
+        from viz.timeline import Timeline  # imports rerun: only where a recording is asked for
+
+        # Its modules stay till the end: looked through at every collection, they would cost as much as the drawing.
+        gc.freeze()
+        nees_of = None if errorless else nees_of_poses
+        self._timeline = Timeline(title, backends, () if world is None else true_rings(world), nees_of, viewer_url)
+
+    def _finish(self) -> None:
+        if self._timeline is None:
+            return
+        try:
+            content = self._timeline.close()
+        except RuntimeError as error:
+            if self._rrd is not None:
+                raise
+            raise ViewerError(
+                "expected the viewer to stay open till the end, found it closed: `chainslam view DIR` shows the run"
+            ) from error
+        if self._rrd is not None:
+            write_anywhere(self._rrd, content)
+
+    def drop(self) -> None:
+        """Throw away what was recorded."""
+        timeline, self._timeline = self._timeline, None
+        if timeline is not None:
+            timeline.discard()
+
+    def _try(self, act: Callable[[], None]) -> None:
+        try:
+            act()
+        except Exception as error:  # a recording's trouble must cost neither the run nor its other results
+            self.drop()
+            what = "the viewer" if self._rrd is None else str(self._rrd)
+            why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            self._problem = f"{what}: {' '.join(why.split()) or type(error).__name__}"
+
+
+def true_rings(world: World) -> tuple[Float[np.ndarray, "_ 2"], ...]:
+    """Return the rings of the true floor, the exterior first."""
+    return tuple(shapely.get_coordinates(ring)[:-1] for ring in (world.free.exterior, *world.free.interiors))
+
+
+def record_comparison(
+    rrd: Path,
+    title: str,
+    trials: Sequence[Mapping[str, Any]],
+    steps: Sequence[Mapping[str, Any]],
+    run: RecordedRun | None,
+    backends: Sequence[str],
+    options: ReplayOptions,
+) -> list[str]:
+    """Record a campaign: one of its logs, if any, through all back ends side by side, and the summary of all trials.
+
+    `trials` and `steps` are the campaign's tables, a mapping a row. Returns, in words, what could not be written.
+    """
+    if run is None:
+        recording = Recording(title, (), None, False, rrd)
+    else:
+        trial = run.trial
+        world = load_world(trial.world, trial.start, trial.scale)
+        recording = Recording(title, backends, world, trial.errorless, rrd)
+        for backend in backends:
+            if recording.is_on:
+                replay(run, backend, options, recording.watch(backend, lambda step: run.true_poses_world[step.index]))
+    recording.add_campaign(trials, steps)
+    return recording.close()

@@ -1,0 +1,1 @@
+"""What was seen free and what was hit, at estimated poses."""

@@ -1,0 +1,1 @@
+"""From walls and paths to motion commands."""

@@ -1,0 +1,250 @@
+"""The lowest layer: from walls to motion commands (paper, section 3.1).
+
+Approach a wall from anywhere, follow it at a set distance to its open end, round the end, and turn back. The way is
+always over floor that was seen free; the stand-off yields in narrow passages, the clearance of the body does not.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.map.chains import OpenEnd
+from slam.map.stochastic_map import StochasticMap
+from slam.robot import MotionCommand, Scan
+
+from ..floor.free_space import FreeSpace
+from ..planning.paths import PathConfig, Planner
+from ..survey.viewpoints import LOOKS, LooksConfig, ideal_places, lane, places_beyond, places_near, places_that_see
+from .driving import DrivingConfig, Pilot
+
+
+@dataclass(frozen=True)
+class FollowingConfig:
+    """The rules of the lowest layer."""
+
+    paths: PathConfig = field(default_factory=PathConfig)
+    driving: DrivingConfig = field(default_factory=DrivingConfig)
+    looks: LooksConfig = field(default_factory=LooksConfig)
+    window_m: float = 6.0
+    """Paths are sought this far around the robot first, then along the route of walls, then everywhere."""
+    moved_m: float = 0.2
+    """An end that moved by more than this is looked at afresh."""
+    tries: int = 4
+    """A place to which the way was blocked this often is given up."""
+    squeezes: int = 2
+    """A gap hardly wider than the body is tried this often."""
+    stall_steps: int = 60
+    """An errand ends when the way to its place grew no shorter for so many steps."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What one step of driving may know."""
+
+    walls: StochasticMap
+    free_space: FreeSpace
+    scan: Scan
+    recent_robot: Float[np.ndarray, "r 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """What the scans before this one hit nearby, m, in the robot's frame of now."""
+    touched_robot: Float[np.ndarray, "t 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """What the body touched, likewise."""
+
+    @property
+    def pose_world(self) -> Float[np.ndarray, "3"]:
+        """The estimated pose."""
+        return self.walls.belief.pose_world
+
+
+class Errand(ABC):
+    """Drives to a sequence of places, one after the other, each given as a set of points that will do."""
+
+    def __init__(self, config: FollowingConfig) -> None:
+        self._config = config
+        self._pilot: Pilot | None = None
+        self._stage = 0
+        self._failures = 0
+        self._shortest_m, self._stalled = np.inf, 0
+        self._hopeless = False
+        self.looks_done = 0
+        self.trouble = ""
+        self.doing = ""
+
+    def command(self, around: Surroundings) -> MotionCommand | None:
+        """Return the next step, or None when nothing is left to do; then `trouble` says what was in the way."""
+        for _ in range(12):
+            if self._hopeless:
+                return None
+            if self._pilot is not None and self._pilot.arrived(around.pose_world):
+                self._pilot = None
+                self._arrived()
+            if self._pilot is None and not self._plan(around):
+                return None
+            assert self._pilot is not None
+            if not self._pilot.is_obstructed(around.pose_world, around.scan):
+                command = self._pilot.command(
+                    around.pose_world, around.scan, around.free_space, around.recent_robot, around.touched_robot
+                )
+                if command is not None and not self._is_stalled(self._pilot.remaining_m):
+                    return command
+            self._blocked(around)
+        return None
+
+    def interrupt(self, around: Surroundings) -> None:
+        """Look for another way: something stands in this one."""
+        if self._pilot is not None:
+            self._blocked(around)
+
+    @abstractmethod
+    def _plan(self, around: Surroundings) -> bool:
+        """Set out for the present place or a later one; False when no way is left to any."""
+
+    def _is_stalled(self, remaining_m: float) -> bool:
+        """Take note of the way left; once it has not become shorter for long, there is no hope."""
+        if remaining_m < self._shortest_m - 0.02:
+            self._shortest_m, self._stalled = remaining_m, 0
+        self._stalled += 1
+        self._hopeless = self._stalled > self._config.stall_steps
+        if self._hopeless:
+            self.trouble = f"got no nearer in {self._config.stall_steps} steps"
+        return self._hopeless
+
+    def _arrived(self) -> None:
+        self._next_stage()
+        self.looks_done += 1
+
+    def _blocked(self, around: Surroundings) -> None:
+        assert self._pilot is not None
+        self._failures += 1
+        squeeze = self._pilot.squeeze_world
+        if squeeze is not None and (self._hopeless or self._failures >= self._config.squeezes):
+            around.free_space.note_too_tight(squeeze)
+        self._pilot = None
+        if self._failures >= self._config.tries:
+            self.trouble = "the way was blocked"
+            self._next_stage()
+
+    def _next_stage(self) -> None:
+        self._stage += 1
+        self._failures = 0
+        self._shortest_m, self._stalled = np.inf, 0
+
+    def _planner(self, around: Surroundings, window_m: float | None) -> Planner:
+        """Return a planner that keeps farther from walls after each failure."""
+        paths = self._config.paths
+        margin = paths.margin_m + 0.01 * self._failures
+        squeeze = paths.squeeze_m if self._failures < self._config.squeezes else paths.radius_m + margin
+        wider = replace(paths, margin_m=margin, squeeze_m=squeeze)
+        return Planner(around.free_space, around.pose_world[:2], wider, window_m)
+
+    def _drive(self, planner: Planner, places: Float[np.ndarray, "n 2"]) -> bool:
+        path = planner.to(places) if len(places) else None
+        if path is not None:
+            self._pilot = Pilot(path, planner, self._config.driving)
+        return path is not None
+
+
+class EndErrand(Errand):
+    """Looks at one open end from several places: follow the wall to it, past it, round it, and close."""
+
+    def __init__(self, end: OpenEnd, route: tuple[int, ...], config: FollowingConfig) -> None:
+        super().__init__(config)
+        self.end = end
+        self.route = route
+        self._on_route = False
+        self._visited: list[Float[np.ndarray, 2]] = []
+
+    def follow(self, end: OpenEnd) -> None:
+        """Take note of where the end is now; one that has moved on is looked at afresh."""
+        if np.hypot(*(end.position_world - self.end.position_world)) > self._config.moved_m:
+            self.end = end
+            self._stage, self._failures, self.looks_done = 0, 0, 0
+            self._shortest_m, self._stalled = np.inf, 0
+            self._pilot = None
+            self._visited = []
+
+    def _arrived(self) -> None:
+        if self._on_route:
+            self._on_route = False
+            self._shortest_m, self._stalled = np.inf, 0
+            return
+        super()._arrived()
+
+    def _plan(self, around: Surroundings) -> bool:
+        planner = self._planner(around, self._config.window_m)
+        ideal = ideal_places(self.end, around.walls, self._config.looks)
+        whole: Planner | None = None
+        while self._stage < len(LOOKS):
+            places = self._fresh(
+                places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.looks)
+            )
+            self.doing = f"to look {LOOKS[self._stage]} the open end of wall {self.end.wall}"
+            if self._drive(planner, places):
+                return self._note()
+            if self._stage == 0 and self._follow_route(around, planner):
+                return True
+            whole = whole or self._planner(around, None)
+            places = self._fresh(
+                places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.looks)
+            )
+            if self._drive(whole, places) or self._plan_beyond(around, whole):
+                return self._note()
+            self._stage += 1
+        return self.looks_done == 0 and self._plan_anywhere(around, whole or self._planner(around, None))
+
+    def _fresh(self, places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+        """Keep the places that are not where an earlier look was made."""
+        for visited in self._visited:
+            places = places[np.hypot(*(places - visited).T) > 0.12]
+        return places
+
+    def _note(self) -> bool:
+        assert self._pilot is not None
+        self._visited.append(self._pilot.destination_world)
+        return True
+
+    def _follow_route(self, around: Surroundings, planner: Planner) -> bool:
+        """Approach the wall farthest along the route to which a way is known nearby."""
+        present = set(around.walls.ids.tolist())
+        for wall in reversed(self.route[1:]):
+            if wall in present and self._drive(planner, lane(wall, around.walls, self._config.looks.standoff_m)):
+                self._on_route = True
+                self.route = self.route[self.route.index(wall) :]
+                self.doing = f"along wall {wall} towards wall {self.end.wall}"
+                return True
+        return False
+
+    def _plan_beyond(self, around: Surroundings, planner: Planner) -> bool:
+        """Nobody can stand near the ideal place past the end: one farther off will do."""
+        if LOOKS[self._stage] not in ("past", "round"):
+            return False
+        places = places_beyond(self.end, around.walls, around.free_space, planner, self._config.looks)
+        return self._drive(planner, self._fresh(places))
+
+    def _plan_anywhere(self, around: Surroundings, planner: Planner) -> bool:
+        """No ideal place can be reached: any place that sees the end will do."""
+        for reach in (self._config.looks.near_m, self._config.looks.far_m):
+            places = places_that_see(self.end, around.free_space, planner, reach, self._config.looks)
+            if self._drive(planner, self._fresh(places)):
+                self.doing = f"to where the open end of wall {self.end.wall} can be seen"
+                return self._note()
+        self.trouble = self.trouble or "no place that the robot can reach sees it"
+        return False
+
+
+class PlaceErrand(Errand):
+    """Drives to one of a set of places."""
+
+    def __init__(self, places_world: Float[np.ndarray, "n 2"], doing: str, config: FollowingConfig) -> None:
+        super().__init__(config)
+        self._places = places_world
+        self.doing = doing
+
+    def _plan(self, around: Surroundings) -> bool:
+        if self._stage > 0:
+            return False
+        windows = (self._config.window_m, None)
+        found = any(self._drive(self._planner(around, window), self._places) for window in windows)
+        self.trouble = self.trouble if found else self.trouble or "no way leads there"
+        return found

@@ -1,0 +1,1 @@
+"""Which open end or place next, and what was given up and why."""

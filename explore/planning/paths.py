@@ -1,0 +1,280 @@
+"""Collision-free paths for the robot's disc over floor that was seen free."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt, label
+from skimage.graph import MCP_Geometric
+
+from ..floor.free_space import FreeSpace
+from .coarse_grid import BLOCK, blocks_with_any, cells_of
+
+BESIDE = 5
+"""Paths are sought so many blocks to each side of the shortest way by blocks: 1 m."""
+ESCAPE_COST = 30.0
+"""What a metre costs where the robot gets away from a wall that it is too near to."""
+
+
+@dataclass(frozen=True)
+class PathConfig:
+    """How near to walls a path may lead, and what it pays for it."""
+
+    radius_m: float = 0.2
+    """The robot's disc."""
+    margin_m: float = 0.025
+    """Least distance m kept beyond the radius, between cell centres."""
+    squeeze_m: float = 0.2
+    """Through gaps narrower than that, down to this clearance between cell centres, the robot squeezes where no other
+    way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells whether it fits."""
+    squeeze_cost: float = 20.0
+    """What a metre of squeezing costs on top."""
+    tight_m: float = 0.3
+    """Around a place where the body did not fit it is not tried again."""
+    standoff_m: float = 0.35
+    """Distance from walls that costs nothing; it yields in narrow passages, the margin does not."""
+    narrow_cost: float = 4.0
+    """A metre at the least clearance costs this much more than one at the stand-off."""
+    coast_m: float = 3.0
+    """Farther than this from any wall the scanner shows too little to tell where the robot is, ..."""
+    blind_cost: float = 4.0
+    """... and a metre costs so much more: a way along the walls is worth a detour."""
+    escape_m: float = 0.3
+    """Around the robot itself free cells count as passable however near a wall is: it may have to get away."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A way to one of the places asked for."""
+
+    points_world: Float[np.ndarray, "n 2"]
+    """Cell centres from the robot to the goal, m."""
+    cost: float
+    """Length in metres, with what narrow places cost on top."""
+    reached: int
+    """Which of the places asked for was the cheapest."""
+
+
+class Planner:
+    """Cheapest paths from one place over a free space as it was then, within a window of it."""
+
+    def __init__(
+        self,
+        free_space: FreeSpace,
+        start_world: Float[np.ndarray, "2"],
+        config: PathConfig,
+        window_m: float | None = None,
+    ) -> None:
+        """Look at the floor within `window_m` of the start in x and y, or at all of it."""
+        self._free_space, self._config = free_space, config
+        start = free_space.cells(start_world[None])[0]
+        reach = max(free_space.shape) if window_m is None else int(np.ceil(window_m / free_space.config.cell_m))
+        self._corner = np.maximum(start - reach, 0)
+        box = (slice(self._corner[0], start[0] + reach + 1), slice(self._corner[1], start[1] + reach + 1))
+        self._box = box
+        self._passable, self._roomy = passable(free_space, box, config)
+        self._clearance = free_space.clearance()[box].copy()
+        self._start = start - self._corner
+        self._escape = np.zeros_like(self._roomy)
+        self._open_start(free_space.is_free(box))
+
+    def to(self, places_world: Float[np.ndarray, "n 2"]) -> Path | None:
+        """Return the cheapest path to the cheapest of the places, or None if none can be reached.
+
+        The search keeps to the surroundings of the shortest way by blocks of cells, if it leads through there: the
+        path may cost more than the cheapest, if that lies farther off.
+        """
+        cells = self._free_space.cells(places_world) - self._corner
+        usable = np.flatnonzero(np.all((cells >= 0) & (cells < self._passable.shape), axis=1))
+        usable = usable[self._passable[tuple(cells[usable].T)]]
+        if not len(usable):
+            return None
+        corridor = self._corridor(cells[usable])
+        if corridor is None:
+            return None
+        found = self._cheapest(cells[usable], corridor)
+        if found is None:
+            # A block may hold cells that do not hang together, so that the way by blocks may be none.
+            usable = usable[self._is_connected[tuple(cells[usable].T)]]
+            found = self._cheapest(cells[usable], np.ones_like(corridor))
+        if found is None:
+            return None
+        way, cost, reached = found
+        return Path(
+            self._free_space.points(way + self._corner),
+            cost * self._free_space.config.cell_m,
+            int(usable[reached]),
+        )
+
+    def _corridor(self, goals: Int[np.ndarray, "g 2"]) -> Bool[np.ndarray, "p q"] | None:
+        """Return the blocks around the shortest way to the nearest of some cells; None if no way leads to any."""
+        squeezed = np.where(self._passable_blocks, 1.0 + self._config.squeeze_cost, -1.0)
+        costs = np.where(self._roomy_blocks, 1.0, squeezed)
+        costs[self._blind_blocks & (costs > 0.0)] += self._config.blind_cost
+        ends = np.unique(goals // BLOCK, axis=0)
+        search = MCP_Geometric(costs)
+        lengths, _ = search.find_costs([tuple(self._start // BLOCK)], [tuple(end) for end in ends], find_all_ends=False)
+        at_ends = lengths[tuple(ends.T)]
+        best = int(np.argmin(at_ends))
+        if not np.isfinite(at_ends[best]):
+            return None
+        corridor = np.zeros(costs.shape, dtype=bool)
+        for r, c in search.traceback(tuple(ends[best])):
+            corridor[max(r - BESIDE, 0) : r + BESIDE + 1, max(c - BESIDE, 0) : c + BESIDE + 1] = True
+        return corridor
+
+    def _cheapest(
+        self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]
+    ) -> tuple[Int[np.ndarray, "n 2"], float, int] | None:
+        """Return the cells of the cheapest path to the cheapest of some cells, its cost in cells, and to which of them.
+
+        It leads over the blocks of a corridor.
+        """
+        blocks = np.argwhere(corridor)
+        first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
+        box = (slice(BLOCK * first[0], BLOCK * end[0]), slice(BLOCK * first[1], BLOCK * end[1]))
+        metre = self._metre(box)
+        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape)] = -1.0
+        corner = BLOCK * first
+        goals, start = goals - corner, self._start - corner
+        inside = np.flatnonzero(np.all((goals >= 0) & (goals < metre.shape), axis=1))
+        inside = inside[metre[tuple(goals[inside].T)] > 0]
+        if not len(inside):
+            return None
+        ends = [tuple(cell) for cell in goals[inside].tolist()]
+        search = MCP_Geometric(metre)
+        costs, _ = search.find_costs([tuple(start.tolist())], ends, find_all_ends=False)
+        at_ends = costs[tuple(goals[inside].T)]
+        best = int(np.argmin(at_ends))
+        if not np.isfinite(at_ends[best]):
+            return None
+        return np.array(search.traceback(ends[best]), dtype=np.int64) + corner, float(at_ends[best]), int(inside[best])
+
+    def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
+        """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
+        metre = np.where(self._passable[box], metre_costs(self._clearance[box], self._roomy[box], self._config), -1.0)
+        blind = cells_of(self._blind_blocks, self._passable.shape)[box]
+        metre[blind & (metre > 0.0)] += self._config.blind_cost
+        metre[self._escape[box]] = ESCAPE_COST
+        return metre
+
+    @cached_property
+    def _is_connected(self) -> Bool[np.ndarray, "h w"]:
+        """Which cells hang together with the start."""
+        labels, _ = label(self._passable, structure=np.ones((3, 3)))
+        return np.asarray(labels == labels[tuple(self._start)])
+
+    @cached_property
+    def _roomy_blocks(self) -> Bool[np.ndarray, "p q"]:
+        return blocks_with_any(self._roomy)
+
+    @cached_property
+    def _blind_blocks(self) -> Bool[np.ndarray, "p q"]:
+        """Which blocks lie too far from any wall to see it well."""
+        return blind_blocks(self._free_space, self._box, self._config.coast_m)
+
+    @cached_property
+    def _passable_blocks(self) -> Bool[np.ndarray, "p q"]:
+        return blocks_with_any(self._passable)
+
+    def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+        """Return the centres of those cells (row, column of the whole grid) where the robot's centre may stay, m."""
+        local = cells - self._corner
+        local = local[np.all((local >= 0) & (local < self._roomy.shape), axis=1)]
+        return self._free_space.points(local[self._roomy[tuple(local.T)]] + self._corner)
+
+    def has_room(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return at which places, cells of the window, the body has room enough and need not squeeze."""
+        return self._roomy[tuple((self._free_space.cells(points_world) - self._corner).T)]
+
+    def clear_ahead(self, start_world: Float[np.ndarray, "2"], end_world: Float[np.ndarray, "2"]) -> bool:
+        """Return whether the straight way between two places leads over cells with room enough only."""
+        length = float(np.hypot(*(end_world - start_world)))
+        share = np.linspace(0.0, 1.0, max(int(np.ceil(length / (0.5 * self._free_space.config.cell_m))), 1) + 1)
+        cells = self._free_space.cells(start_world + share[:, None] * (end_world - start_world)) - self._corner
+        on_grid = np.all((cells >= 0) & (cells < self._roomy.shape), axis=1)
+        return bool(np.all(on_grid) and np.all(self._roomy[tuple(cells.T)]))
+
+    def _open_start(self, is_free: Bool[np.ndarray, "h w"]) -> None:
+        """Make the free cells around the robot passable at a price, where they bring it no nearer to a wall."""
+        reach = int(np.ceil(self._config.escape_m / self._free_space.config.cell_m))
+        r, c = self._start
+        box = (slice(max(r - reach, 0), r + reach + 1), slice(max(c - reach, 0), c + reach + 1))
+        rows, columns = self._roomy[box].shape
+        row, column = np.ogrid[box[0].start : box[0].start + rows, box[1].start : box[1].start + columns]
+        near = np.hypot(row - r, column - c) <= reach
+        self._escape[box] = near & ~self._passable[box] & is_free[box] & (self._clearance[box] >= self._clearance[r, c])
+        self._escape[r, c] = False
+        for cells in (self._passable, self._roomy):
+            cells[box] |= self._escape[box]
+            cells[r, c] = True
+
+
+def passable(
+    free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig
+) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """Return in which cells of a part of the grid the body fits, and in which it has room enough.
+
+    It fits wherever it drove, whatever beams say that were drawn at other poses.
+    """
+    is_free, clearance = free_space.is_free(box), free_space.clearance()[box]
+    roomy_cells = roomy(is_free, clearance, config)
+    fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
+    return fits | roomy_cells | free_space.driven(box), roomy_cells
+
+
+def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], coast_m: float) -> Bool[np.ndarray, "p q"]:
+    """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
+    side_m = BLOCK * free_space.config.cell_m
+    beside = int(np.ceil(coast_m / side_m))
+    (r0, r1, _), (c0, c1, _) = (part.indices(size) for part, size in zip(box, free_space.shape, strict=True))
+    above, left = min(beside, r0 // BLOCK), min(beside, c0 // BLOCK)
+    rows = slice(r0 - BLOCK * above, r1 + BLOCK * beside)
+    columns = slice(c0 - BLOCK * left, c1 + BLOCK * beside)
+    hit = blocks_with_any(free_space.evidence[rows, columns] > 0)
+    shape = -(-(r1 - r0) // BLOCK), -(-(c1 - c0) // BLOCK)
+    if not hit.any():
+        return np.ones(shape, dtype=bool)
+    distance = distance_transform_edt(~hit, sampling=side_m)
+    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > coast_m)
+
+
+def roomy(
+    is_free: Bool[np.ndarray, "*n"], clearance: Float[np.ndarray, "*n"], config: PathConfig
+) -> Bool[np.ndarray, "*n"]:
+    """Return in which cells the body has room enough, by whether they were seen free and their clearance, m."""
+    return is_free & (clearance >= config.radius_m + config.margin_m)
+
+
+def metre_costs(
+    clearance: Float[np.ndarray, "h w"], is_roomy: Bool[np.ndarray, "h w"], config: PathConfig
+) -> Float[np.ndarray, "h w"]:
+    """Return what a metre costs in each cell, if the body fits there."""
+    least = config.radius_m + config.margin_m
+    tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
+    return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)
+
+
+def sees(
+    free_space: FreeSpace, places_world: Float[np.ndarray, "n 2"], target_world: Float[np.ndarray, "2"], short_m: float
+) -> Bool[np.ndarray, " n"]:
+    """Return from which places no occupied cell stands between there and `short_m` before the target."""
+    way = target_world - places_world
+    length = np.hypot(way[:, 0], way[:, 1])
+    steps = int(np.ceil(length.max(initial=0.0) / free_space.config.cell_m)) + 1
+    share = np.linspace(0.0, 1.0, steps + 1) * np.clip(1.0 - short_m / np.maximum(length, 1e-9), 0.0, 1.0)[:, None]
+    cells = free_space.cells(places_world[:, None] + share[..., None] * way[:, None])
+    inside = free_space.inside(cells)
+    blocked = np.zeros(inside.shape, dtype=bool)
+    blocked[inside] = free_space.evidence[tuple(cells[inside].T)] > 0
+    return ~np.any(blocked | ~inside, axis=1)
+
+
+def cells_within(free_space: FreeSpace, centre_world: Float[np.ndarray, "2"], reach_m: float) -> Int[np.ndarray, "n 2"]:
+    """Return the cells of the grid whose centres lie within reach of a place."""
+    reach = int(np.ceil(reach_m / free_space.config.cell_m))
+    offsets = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = free_space.cells(centre_world[None])[0] + offsets
+    cells = cells[free_space.inside(cells)]
+    return cells[np.hypot(*(free_space.points(cells) - centre_world).T) <= reach_m]

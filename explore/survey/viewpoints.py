@@ -1,0 +1,89 @@
+"""From where to look at an open end: in front of it, past it, round it, and close (paper, section 3.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.geometry.lines import directions, normals
+from slam.map.chains import HEAD, OpenEnd
+from slam.map.stochastic_map import StochasticMap
+
+from ..floor.free_space import FreeSpace
+from ..planning.paths import Planner, cells_within, sees
+
+
+@dataclass(frozen=True)
+class LooksConfig:
+    """The places from which an end is looked at."""
+
+    standoff_m: float = 0.35
+    """Distance at which a wall is followed and its end rounded."""
+    close_m: float = 0.25
+    """Distance of the last, close look."""
+    slack_m: float = 0.25
+    """A place this near to the ideal one will do."""
+    near_m: float = 1.2
+    """Where none of the ideal places can be reached, any place within this that sees the end."""
+    far_m: float = 3.5
+    """And where there is none, any place within this."""
+    short_m: float = 0.12
+    """A line of sight need not come nearer than this to the end itself."""
+
+
+LOOKS = ("in front of", "past", "round", "close to")
+"""The looks in the order in which they are tried."""
+TURNS_RAD = np.deg2rad([10.0, 60.0, 120.0])
+"""How far the first three go round the end, from straight in front of its wall."""
+BEYOND_RAD = float(np.deg2rad(45.0))
+"""Seen from this far round, the face that follows is in sight, though at a flat angle."""
+
+
+def ideal_places(end: OpenEnd, walls: StochasticMap, config: LooksConfig) -> Float[np.ndarray, "4 2"]:
+    """Return the four ideal places, one for each of `LOOKS`, world frame, m."""
+    alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
+    into, outward = normals(alpha), _outward(end, alpha)
+    ring = config.standoff_m * (np.sin(TURNS_RAD)[:, None] * outward - np.cos(TURNS_RAD)[:, None] * into)
+    return end.position_world + np.vstack([ring, -config.close_m * into + 0.1 * outward])
+
+
+def places_near(
+    ideal_world: Float[np.ndarray, "2"], end: OpenEnd, free_space: FreeSpace, planner: Planner, config: LooksConfig
+) -> Float[np.ndarray, "n 2"]:
+    """Return passable places near an ideal one that see the end, the nearest to the ideal first."""
+    points = planner.passable_points(cells_within(free_space, ideal_world, config.slack_m))
+    points = points[np.argsort(np.hypot(*(points - ideal_world).T), kind="stable")]
+    return points[sees(free_space, points, end.position_world, config.short_m)]
+
+
+def places_beyond(
+    end: OpenEnd, walls: StochasticMap, free_space: FreeSpace, planner: Planner, config: LooksConfig
+) -> Float[np.ndarray, "n 2"]:
+    """Return passable places that see the end from past it, for where nobody can stand near the ideal ones."""
+    alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
+    points = places_that_see(end, free_space, planner, config.near_m, config)
+    offset = points - end.position_world
+    turn = np.arctan2(offset @ _outward(end, alpha), -offset @ normals(alpha))
+    return points[turn > BEYOND_RAD]
+
+
+def _outward(end: OpenEnd, alpha_rad: np.floating) -> Float[np.ndarray, "2"]:
+    """Return the direction in which a wall would go on past its end."""
+    along = directions(alpha_rad)
+    return along if end.side == HEAD else -along
+
+
+def places_that_see(
+    end: OpenEnd, free_space: FreeSpace, planner: Planner, reach_m: float, config: LooksConfig
+) -> Float[np.ndarray, "n 2"]:
+    """Return passable places within reach of the end from which it is in sight, in no particular order."""
+    points = planner.passable_points(cells_within(free_space, end.position_world, reach_m))
+    return points[sees(free_space, points, end.position_world, config.short_m)]
+
+
+def lane(wall: int, walls: StochasticMap, standoff_m: float, every_m: float = 0.25) -> Float[np.ndarray, "n 2"]:
+    """Return places along a wall at the distance at which it is followed, world frame, m."""
+    row = walls.belief.rows([wall])[0]
+    tail, head = walls.ends_world[row]
+    share = np.linspace(0.0, 1.0, max(int(np.hypot(*(head - tail)) / every_m), 1) + 1)
+    return tail + share[:, None] * (head - tail) - standoff_m * normals(walls.belief.means[row, 0])

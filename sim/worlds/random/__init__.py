@@ -1,0 +1,1 @@
+"""Buildings by chance, always the same for one seed."""

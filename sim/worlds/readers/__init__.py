@@ -1,0 +1,1 @@
+"""Readers of drawn maps, one file for each format."""

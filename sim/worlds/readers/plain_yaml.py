@@ -1,0 +1,66 @@
+"""A strict reader of small YAML files: one mapping of plain values and lists of them.
+
+YAML's aliases, merges and tags make a kilobyte into gigabytes and text into objects. A map's description needs none.
+"""
+
+import re
+from collections.abc import Iterator
+
+import yaml
+
+from ..drawing import WorldError, shorten
+
+FILE_MAX = 64 * 2**10
+DEEPEST = 4
+NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+WORDS: dict[str, bool | None] = {"true": True, "false": False, "null": None, "~": None, "": None}
+
+Value = str | float | bool | None | list["Value"] | dict[str, "Value"]
+
+
+def plain_mapping(data: bytes) -> dict[str, Value]:
+    """Return the mapping in a YAML file's bytes, every number as a float; raise WorldError for anything else."""
+    if len(data) > FILE_MAX:
+        raise WorldError(f"expected a YAML file of at most {FILE_MAX} bytes, found {len(data)}: shorten it")
+    try:
+        events = yaml.parse(data, Loader=yaml.SafeLoader)
+        documents = [_value(events, next(events), 0) for event in events if isinstance(event, yaml.DocumentStartEvent)]
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        if isinstance(error, WorldError):
+            raise
+        raise WorldError(f"expected a ROS map YAML, found {shorten(str(error))}: correct the file") from None
+    if len(documents) != 1 or not isinstance(documents[0], dict):
+        found = shorten(documents[0]) if len(documents) == 1 else f"{len(documents)} documents"
+        raise WorldError(f"expected a ROS map YAML with image: and resolution:, found {found}: correct it")
+    return documents[0]
+
+
+def _value(events: Iterator[yaml.Event], event: yaml.Event, depth: int) -> Value:
+    """Return the value that begins with an event, taking the rest of it from `events`."""
+    if isinstance(event, yaml.AliasEvent):
+        raise WorldError(f"expected values in the YAML file, found the alias *{shorten(event.anchor)}: write them out")
+    if (tag := getattr(event, "tag", None)) is not None:
+        raise WorldError(f"expected plain values in the YAML file, found the tag {shorten(tag)}: leave it out")
+    if isinstance(event, yaml.ScalarEvent):
+        return event.value if event.style else _scalar(event.value)
+    if depth == DEEPEST:
+        raise WorldError(f"expected values at most {DEEPEST} deep in the YAML file, found deeper ones: flatten it")
+    if isinstance(event, yaml.SequenceStartEvent):
+        return [_value(events, item, depth + 1) for item in _until(events, yaml.SequenceEndEvent)]
+    keys = _until(events, yaml.MappingEndEvent)
+    return {str(_value(events, key, depth + 1)): _value(events, next(events), depth + 1) for key in keys}
+
+
+def _until(events: Iterator[yaml.Event], end: type[yaml.Event]) -> Iterator[yaml.Event]:
+    """Yield events up to one of a kind; whoever takes them may take more in between."""
+    for event in events:
+        if isinstance(event, end):
+            return
+        yield event
+
+
+def _scalar(text: str) -> str | float | bool | None:
+    """Return what a value without quotes means."""
+    if NUMBER.fullmatch(text):
+        return float(text)
+    return WORDS.get(text.lower(), text)

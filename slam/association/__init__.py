@@ -1,0 +1,1 @@
+"""Which wall of the map each segment of a scan belongs to."""

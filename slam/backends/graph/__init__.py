@@ -1,0 +1,1 @@
+"""The stochastic map as a factor graph; the only importer of gtsam."""

@@ -1,0 +1,110 @@
+"""Poses, lines and their measurements as GTSAM sees them.
+
+GTSAM has no lines of the plane, but planes of space: the motion plane is embedded in Y-Z, a pose (x, y, heading) as
+the turn by heading about X at (0, x, y), a line (alpha, r) as the plane (0, cos alpha, sin alpha, -r). What leaves
+the motion plane (three directions of a pose, the tilt of a plane) meets no measurement of the rest and stays at zero.
+In this embedding the charts are the same for every alpha: a plane's is (-d alpha, tilt, -d r), a pose's is
+(d heading, -, -, -, d x, d y) in the body frame.
+"""
+
+from math import cos, sin, sqrt, tan
+
+import gtsam
+import numpy as np
+from jaxtyping import Float
+
+POSE_ROWS = (4, 5, 0)
+"""Where x, y and heading stand in the chart of a pose, which has 6 rows."""
+LINE_ROWS = (0, 2)
+"""Where -alpha and -r stand in the chart of a line, which has 3 rows."""
+HELD = 1e-6
+"""Standard deviation, m and rad, of what is held: the first pose, and wheels that say they never slip."""
+OFF_PLANE = 1e-2
+"""Standard deviation, m and rad, of what leaves the motion plane: of a motion's part and of a tilt in a sighting.
+
+Any number gives the same answer, but it is to be one: poses that tilt more freely than walls tell drift off the plane,
+until it is known so unevenly that Cholesky refuses it and QR goes astray.
+"""
+
+_POSES, _LINES = gtsam.symbol("x", 0), gtsam.symbol("l", 0)
+
+
+def pose_key(index: int) -> int:
+    """Return the key of the pose with this index."""
+    return _POSES + index
+
+
+def line_key(line: int) -> int:
+    """Return the key of the line with this id."""
+    return _LINES + line
+
+
+def pose3(pose: Float[np.ndarray, "3"]) -> gtsam.Pose3:
+    """Embed a pose (x, y, heading)."""
+    return gtsam.Pose3(gtsam.Rot3.Rx(float(pose[2])), np.array([0.0, pose[0], pose[1]]))
+
+
+def pose_of(value: gtsam.Pose3) -> Float[np.ndarray, "3"]:
+    """Return (x, y, heading) of an embedded pose."""
+    matrix = value.matrix()
+    return np.array([matrix[1, 3], matrix[2, 3], np.arctan2(matrix[2, 1], matrix[1, 1])])
+
+
+def plane(alpha: float, r: float) -> Float[np.ndarray, "4"]:
+    """Embed a line as the coefficients of a plane."""
+    return np.array([0.0, cos(alpha), sin(alpha), -r])
+
+
+def line_of(value: gtsam.OrientedPlane3) -> Float[np.ndarray, "2"]:
+    """Return (alpha, r) of an embedded line."""
+    _, x, y, d = value.planeCoefficients()
+    return np.array([np.arctan2(y, x), -d])
+
+
+def origin_factor() -> gtsam.PriorFactorPose3:
+    """Hold the first pose as the frame's origin."""
+    return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(), _noise(np.zeros((3, 3))))
+
+
+def odometry_factor(
+    index: int, motion: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]
+) -> gtsam.BetweenFactorPose3:
+    """Say how the robot moved to pose `index`; GTSAM takes the error in the frame after the motion, `cov` before it."""
+    c, s = cos(motion[2]), sin(motion[2])
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return gtsam.BetweenFactorPose3(pose_key(index - 1), pose_key(index), pose3(motion), _noise(turn @ cov @ turn.T))
+
+
+def line_factor(
+    index: int, line: int, seen: tuple[float, float, float, float, float], epsilon: float
+) -> gtsam.OrientedPlane3Factor:
+    """Say where a line was seen from pose `index`: the model of `slam.estimation.models.innovations`.
+
+    `seen` is (alpha, r, C_alpha_alpha, C_alpha_r, C_r_r) in the robot frame, `epsilon` the angle by which it departs
+    from the prediction now. The plane factor's error is (sin(epsilon), r - r_predicted) where the model has
+    (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_predicted). The latter's tangent at the present epsilon is the
+    former's with r / cos(epsilon) in place of r and t0 + r tan(epsilon) in place of t0.
+    """
+    alpha, r, along, cross, across = seen
+    t0 = cross / along
+    scale = cos(epsilon) - t0 * sin(epsilon) / r
+    b = (across - cross * t0) * scale * scale
+    t = t0 + r * tan(epsilon)
+    # Upper triangular W with W'W the inverse of [[a, -t a], [-t a, b + t t a]], a = C_alpha_alpha.
+    W = np.zeros((3, 3))
+    W[0, 0] = sqrt(1.0 / along + t * t / b)
+    W[0, 2] = t / (b * W[0, 0])
+    W[1, 1] = 1.0 / OFF_PLANE
+    W[2, 2] = 1.0 / sqrt(b + t * t * along)
+    return gtsam.OrientedPlane3Factor(
+        plane(alpha, r / cos(epsilon)),
+        gtsam.noiseModel.Gaussian.SqrtInformation(W),
+        pose_key(index),
+        line_key(line),
+    )
+
+
+def _noise(cov_body: Float[np.ndarray, "3 3"]) -> gtsam.noiseModel.Gaussian:
+    cov = OFF_PLANE**2 * np.eye(6)
+    cov[np.ix_(POSE_ROWS, POSE_ROWS)] = cov_body + HELD**2 * np.eye(3)
+    return gtsam.noiseModel.Gaussian.Covariance(cov)

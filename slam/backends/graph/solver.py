@@ -1,0 +1,256 @@
+"""Poses and lines on their way to the least-squares solution, step by step.
+
+Here the first pose is the origin. What is entered is collected, and handed over when `settle` is called.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.special import chdtri
+
+from ...geometry.poses import compose, wrap
+from .ahead import Ahead
+from .factors import line_factor, line_key, odometry_factor, origin_factor
+from .guess import guess
+from .isam import GraphConfig, Isam
+from .loose import Loose, wrapped
+from .record import Record
+
+MOST_TURN = 1.2
+"""Sightings are linearised no farther than this from the prediction, rad: beyond pi/2 a line is seen from behind."""
+
+BEYOND = float(chdtri(3, 1e-9))
+"""A pose may depart by this much, in chi-square, from where it was expected: further off once in 1e9 scans."""
+
+
+class DivergedError(RuntimeError):
+    """A solution is not finite, or is where the prediction rules it out: the next one would be linearised nowhere."""
+
+
+class Solver:
+    """Poses, the lines shown (those whose estimates are asked for, in ascending order of ids) and iSAM2."""
+
+    def __init__(
+        self,
+        config: GraphConfig,
+        record: Record,
+        poses: Float[np.ndarray, "p 3"],
+        lines: Float[np.ndarray, "n 2"],
+        anew: bool = True,
+    ) -> None:
+        """Make the graph of a record, linearised at `poses` and, in the order of the record, at `lines`.
+
+        With `anew` the sightings are linearised there too, else as the record has it.
+        """
+        self._config, self._record = config, record
+        self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
+        self.isam = Isam(config)
+        self._loose = Loose(config.loose)
+        self._is_settled = False
+        self._pose_cov = np.zeros((0, 0))
+        self._keys: list[int] = []
+        self.ids = np.zeros(0, dtype=np.int64)
+        """The lines shown."""
+        self.lines = np.zeros((0, 2))
+        """Their (alpha, r)."""
+        self._linearised_at = np.zeros((0, 2))
+        self._astray = np.zeros(0)
+        """How far each line is from where it is linearised, in thresholds."""
+        self.pose = np.array(poses[0], dtype=np.float64)
+        """The last pose entered: predicted until it is settled."""
+        self.last = 0
+        """Index of that pose."""
+        self._settled_at = -1
+        """Index of the last pose that is settled."""
+        self._ahead = Ahead(self.pose)
+        """Where the wheels alone lead from there."""
+        self._expected_cov = np.zeros((0, 0))
+        """Covariance of the last settled pose before the present solution, body frame; empty before the first."""
+
+        self.isam.enter(origin_factor())
+        self.isam.enter_pose(0, self.pose)
+        for pose in poses[1:]:
+            self.enter_pose(pose)
+        for (line, known), (alpha, r) in zip(record.lines.items(), lines.tolist(), strict=True):
+            self.isam.enter_line(line, alpha, r)
+            for number in known.sightings:
+                epsilon = wrapped(record.seen[number][0] - alpha + float(poses[record.seen_from[number], 2]))
+                self.enter_sighting(line, number, epsilon if anew else record.epsilons[number], alpha)
+        self._show(list(record.lines), lines)
+        self.hide(np.flatnonzero([not known.shown for known in record.lines.values()]))
+
+    # -- entering ---------------------------------------------------------------------------------------------------
+
+    def enter_poses(self) -> None:
+        """Make all motions of the record poses of the graph."""
+        for motion in self._record.motions[self.last :]:
+            self.enter_pose(compose(self.pose, motion))
+
+    def enter_pose(self, pose: Float[np.ndarray, "3"]) -> None:
+        """Enter the next motion of the record; it leads about to `pose`."""
+        self.pose, self.last = np.array(pose, dtype=np.float64), self.last + 1
+        self.isam.enter_pose(self.last, self.pose)
+        motion, cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
+        self.isam.enter(odometry_factor(self.last, motion, cov))
+        self._ahead.move(motion, cov)
+        self._is_settled = False
+
+    def enter_scan(
+        self, rows: Int[np.ndarray, " m"], seen: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]
+    ) -> None:
+        """Enter sightings of lines shown, from the last pose; a new pose is linearised where they put it."""
+        if self.last and self.isam.is_new(self.last):
+            motion, motion_cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
+            self.pose = guess(self.pose, motion, motion_cov, self.lines[rows], seen, cov)
+            self.isam.move_pose(self.last, self.pose)
+        alpha = self.lines[rows, 0]
+        epsilon = wrap(seen[:, 0] - alpha + self.pose[2]).tolist()
+        for k in np.lexsort((seen[:, 1], seen[:, 0], rows)).tolist():
+            line = int(self.ids[rows[k]])
+            number = self._record.see(self.last, line, seen[k], cov[k])
+            self.enter_sighting(line, number, epsilon[k], float(alpha[k]))
+
+    def enter_lines(
+        self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"], seen: Float[np.ndarray, "m 2"],
+        cov: Float[np.ndarray, "m 2 2"],
+    ) -> None:  # fmt: skip
+        """Enter new lines of the record, each with its first sighting, from the last pose."""
+        for k, (line, (alpha, r)) in enumerate(zip(ids, lines.tolist(), strict=True)):
+            self.isam.enter_line(line, alpha, r)
+            self.enter_sighting(line, self._record.see(self.last, line, seen[k], cov[k]), 0.0, alpha)
+        self._show(ids, lines)
+
+    def enter_sighting(self, line: int, number: int, epsilon: float, alpha: float, again: bool = False) -> None:
+        """Enter a sighting that departs by `epsilon` from its line, which has the direction `alpha`.
+
+        With `again` it replaces an earlier factor of the same sighting.
+        """
+        seen = self._record.seen[number]
+        epsilon = self._record.epsilons[number] = min(max(epsilon, -MOST_TURN), MOST_TURN)
+        self.isam.enter(line_factor(self._record.seen_from[number], line, seen, epsilon), number)
+        self._loose.note(line, number, seen, alpha, again)
+        self._is_settled = False
+
+    def leave_sightings(self, line: int, numbers: Sequence[int]) -> None:
+        """Take the factors of a line's sightings out; all must be settled. A line with none left drops out too."""
+        for number in numbers:
+            self.isam.leave(number)
+            self._loose.leave(line, number)
+        self._is_settled = False
+
+    def hide(self, rows: Int[np.ndarray, " m"]) -> None:
+        """No longer show the lines in these rows."""
+        for line in self.ids[rows].tolist():
+            self.isam.forget(line)
+            self._loose.drop(line)
+        kept = np.ones(len(self.ids), dtype=bool)
+        kept[rows] = False
+        self.ids, self.lines = self.ids[kept], self.lines[kept]
+        self._linearised_at, self._astray = self._linearised_at[kept], self._astray[kept]
+        self._keys = [line_key(line) for line in self.ids.tolist()]
+
+    def _show(self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"]) -> None:
+        self.ids = np.concatenate([self.ids, np.asarray(ids, dtype=np.int64)])
+        self._keys += [line_key(line) for line in ids]
+        self.lines = np.concatenate([self.lines, lines])
+        self._linearised_at = np.concatenate([self._linearised_at, lines])
+        self._astray = np.concatenate([self._astray, np.zeros(len(ids))])
+
+    # -- solving ----------------------------------------------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Solve for what was entered since the last time.
+
+        Raises DivergedError for a solution that the prediction rules out, and what GTSAM raises: RuntimeError,
+        ValueError or IndexError. The points of linearisation are then those of the last solution that held.
+        """
+        if self._is_settled:
+            return
+        self._expected_cov = self.pose_cov() if self._settled_at >= 0 else np.zeros((0, 0))
+        self._push()
+        for _ in range(self._config.passes):
+            if not self._tighten() and self._astray.max(initial=0.0) <= self._config.closure:
+                break
+            self._push()
+        if self.isam.is_waiting:
+            self._push()
+        self._loose.calm()
+        self._is_settled, self._settled_at, self._ahead = True, self.last, Ahead(self.pose)
+
+    def _push(self) -> None:
+        """Hand over what was collected, linearise anew what is astray, and estimate."""
+        astray = np.flatnonzero(self._astray > 1.0)
+        self.isam.push(self.last, relinearise=bool(len(astray)))
+        self.pose = self.isam.pose(self.last)
+        self._pose_cov = np.zeros((0, 0))  # Asked of iSAM2 when wanted.
+        self._hold_pose()
+        if not self._keys:
+            return
+        self._linearised_at[astray] = self.isam.lines([self._keys[row] for row in astray.tolist()])
+        moved = self.isam.moved(self._keys)
+        if not np.abs(moved[:, 0]).max() <= MOST_TURN or not np.all(np.isfinite(moved[:, 1])):
+            raise DivergedError("expected lines that turn by less than 1.2 rad at once, found one that turns further")
+        self.lines = self._linearised_at + moved
+        self.lines[:, 0] = wrap(self.lines[:, 0])
+        self._astray = np.max(np.abs(moved) / self._thresholds, axis=1)
+
+    def _hold_pose(self) -> None:
+        """Hold the pose against its prediction; raises DivergedError where both cannot be.
+
+        Within a few thresholds of linearisation any solution is as good as its factors, whatever was expected.
+        """
+        off = self.pose - self._ahead.pose
+        off[2] = wrap(off[2])
+        linear = self._thresholds[[1, 1, 0]]
+        beyond = float(np.sum(np.square(off / linear)))
+        if BEYOND < beyond < np.inf:
+            if not len(self._expected_cov):  # The first solution of a graph made anew: nothing was expected.
+                return
+            cov = np.diag(linear**2) + self._ahead.pose_cov(self._expected_cov)
+            beyond = float(off @ np.linalg.solve(cov, off))
+        if not beyond <= BEYOND:
+            raise DivergedError(f"expected a pose within chi-square {BEYOND:.0f} of its prediction, found {beyond:.3g}")
+
+    def _tighten(self) -> int:
+        """Collect anew the sightings that their line's present direction puts wrong; return how many."""
+        count = 0
+        for line, numbers in self._loose.touched().items():
+            row = int(np.searchsorted(self.ids, line))
+            alpha = float(self.lines[row, 0])
+            for number in self._loose.suspects(line, numbers, alpha):
+                index, seen = self._record.seen_from[number], self._record.seen[number]
+                heading = float(self.pose[2] if index == self.last else self.isam.pose(index)[2])
+                epsilon = wrapped(seen[0] - alpha + heading)
+                if abs(epsilon - self._record.epsilons[number]) > self._loose.turn(seen):
+                    self.leave_sightings(line, [number])
+                    self.enter_sighting(line, number, epsilon, alpha, again=True)
+                    count += 1
+        return count
+
+    # -- asking -----------------------------------------------------------------------------------------------------
+
+    def poses(self, linearisation: bool = False) -> Float[np.ndarray, "p 3"]:
+        """Return the estimates of all poses when it was settled, or the points at which they are linearised."""
+        return self.isam.all(linearisation).poses(self.last + 1)
+
+    def all_lines(self, linearisation: bool = False) -> Float[np.ndarray, "n 2"]:
+        """Return the estimates of all lines of the record, shown or not, or where they are linearised."""
+        return self.isam.all(linearisation).lines(list(self._record.lines))
+
+    def start(self) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
+        """Return where to begin anew: the points of linearisation of all that was entered, settled or not."""
+        values = self.isam.linearisation()
+        return values.poses(self.last + 1), values.lines(list(self._record.lines))
+
+    def pose_cov(self) -> Float[np.ndarray, "3 3"]:
+        """Return the covariance of the last pose that is settled, body frame."""
+        if not len(self._pose_cov):
+            self._pose_cov = self.isam.pose_cov(self._settled_at)
+        return self._pose_cov
+
+    def joint_cov(self, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "s s"]:
+        """Return the covariance of the last pose (body frame) and the lines (alpha, r) in these rows, by one query."""
+        if not len(rows):
+            return self.pose_cov().copy()
+        return self.isam.joint_cov(self.last, [self._keys[row] for row in rows.tolist()])

@@ -1,0 +1,1 @@
+"""What the Kalman filters share."""

@@ -1,0 +1,1 @@
+"""What an estimator offers, and the models of motion and measurement that all of them share."""

@@ -1,0 +1,148 @@
+"""Which sightings may move the estimate: those of a clear direction, on walls of which all sightings together agree.
+
+Around a corner of short faces a line fits six beams of each scan well enough, and another line from every place. What
+makes the direction clear is then that it took in a beam of the next face: the sightings that are let through are the
+wrong ones. One scan cannot tell such a line from a wall; all scans together can. So they can where the robot, far
+from a wall that bends by a few degrees, sees of it now one side and then the other: each sighting is straight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.special import gammaincc
+
+from ..extraction.segments import Segments
+from ..geometry.lines import directions
+from ..geometry.poses import to_world, wrap
+
+
+@dataclass(frozen=True)
+class FirmnessConfig:
+    """When a direction is clear, and when a wall is not straight."""
+
+    heading_rad: float = float(np.deg2rad(3.0))
+    """A segment with a larger sigma of direction is matched and stored but moves no estimate: where a line's direction
+    keeps changing by many degrees, so does the direction in which it fixes the robot, and every change adds
+    information that was never measured (pose ANEES in `rooms` 3.5 with such segments, 1.1 without). Between 3 and 6
+    degrees one in six of five or six beams holds a beam of another wall."""
+    few_heading_rad: float = float(np.deg2rad(1.0))
+    """The same for a segment of fewer than five beams: along a wall seen at a grazing angle they are as good as they
+    say, above this they hold beams of other walls too often."""
+    crooked_m: float = 1.0
+    """A shorter piece of a crooked wall moves nothing even where no other wall is in sight."""
+    excess: float = 1.2
+    """Chi-square over degrees of freedom of all fits: misfits of 0.45 times the noise. Smaller ones any real wall shows
+    over thousands of beams."""
+    bend_rad: float = float(np.deg2rad(0.5))
+    """Directions that differ along the wall by less, root mean square, may be the robot's own turn on its way there."""
+    chance: float = 1e-5
+    """Straight walls are taken for crooked this rarely by each of the three tests."""
+
+
+def are_clear(segments: Segments, config: FirmnessConfig = FirmnessConfig()) -> Bool[np.ndarray, " s"]:
+    """Return which segments have enough beams and a clear direction."""
+    return ~segments.is_tentative & (segments.cov[:, 0, 0] < config.heading_rad**2)
+
+
+def as_told(
+    cov: Float[np.ndarray, "m 2 2"], few: Bool[np.ndarray, " m"], config: FirmnessConfig = FirmnessConfig()
+) -> Float[np.ndarray, "m 2 2"]:
+    """Return the covariances of (alpha, r) of sightings that together move the estimate, of which `few` show few beams.
+
+    Beside a clear sighting one of few beams says where the robot stands, not how it is turned: such a line over the
+    corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
+    place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
+    """
+    if few.all():
+        return cov
+    turn = np.where(few, config.heading_rad, 0.0)[:, None] * cov[:, :, 0] / cov[:, :1, 0]
+    return cov + turn[:, :, None] * turn[:, None]
+
+
+class Firmness:
+    """Sums over the sightings of each wall; ids are those of the map and only grow."""
+
+    def __init__(self, config: FirmnessConfig = FirmnessConfig()) -> None:
+        self._config = config
+        self._fits = np.zeros((0, 2))
+        self._first = np.full((0, 3), np.nan)
+        self._directions = np.zeros((0, 2, 2))
+        # Of the clear ones: information times how far along the wall, and that times the same, and times direction.
+        self._along = np.zeros((0, 3))
+        self._crooked = np.zeros(0, dtype=bool)
+
+    def see(self, segments: Segments, owners: Int[np.ndarray, " s"], pose_world: Float[np.ndarray, "3"]) -> None:
+        """Add one scan, taken at a pose in the world; `owners` holds the wall of each segment, -1 for none."""
+        used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
+        ids, seen = owners[used], segments.take(used)
+        alpha, information = wrap(seen.lines[:, 0] + pose_world[2]), 1.0 / seen.cov[:, 0, 0]
+        middle = to_world(seen.ends.mean(axis=1), pose_world)
+        self._make_room(int(ids.max(initial=-1)) + 1)
+        new = np.isnan(self._first[ids, 0])
+        self._first[ids[new]] = np.column_stack([alpha, middle])[new]
+        np.add.at(self._fits, ids, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
+        off = wrap(alpha - self._first[ids, 0])
+        along = np.vecdot(middle - self._first[ids, 1:], directions(self._first[ids, 0]))
+        clear = are_clear(seen, self._config)
+        np.add.at(self._directions, (ids, clear.astype(int)), np.stack([information, information * off], axis=-1))
+        np.add.at(self._along, ids, (information * clear * along * np.stack([np.ones_like(off), along, off])).T)
+        self._crooked[ids] = self._misfit(ids) | self._in_conflict(ids) | self._bends(ids)
+
+    def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
+        """Return which segments of one scan, each on the wall of that id, may move the estimate.
+
+        Where nothing else would, a long crooked wall does: it bends by a degree or two, which the wheels lose in 0.2 m.
+
+        A few beams tell where the robot stands, not where the wall does: its clear sightings together know its
+        direction better. Three beams from one wall's corner over the next to a third are a line, known to 0.1 degrees
+        and 90 off, within the gate of a wall of vague direction.
+        """
+        few = segments.is_tentative & (segments.cov[:, 0, 0] < self._config.few_heading_rad**2)
+        crooked = self.are_crooked(ids)
+        few &= self._directions[ids, 1, 0] * segments.cov[:, 0, 0] > 1.0
+        told = are_clear(segments, self._config) | few
+        if (told & ~crooked).any():
+            return told & ~crooked
+        return told & (segments.lengths_m >= self._config.crooked_m)
+
+    def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        """Return which walls are surely not straight: by their fits, or by what vague and clear sightings say."""
+        self._make_room(int(ids.max(initial=-1)) + 1)
+        return self._crooked[ids]
+
+    def _misfit(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        chi2, dof = self._fits[ids].T
+        misfit = chi2 > self._config.excess * dof
+        misfit[misfit] = gammaincc(0.5 * dof[misfit], 0.5 * chi2[misfit]) < self._config.chance
+        return misfit
+
+    def _in_conflict(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        information, sums = np.moveaxis(self._directions[ids], -1, 0)
+        both = (information > 0.0).all(axis=1)
+        information, sums = information[both], sums[both]
+        apart = np.diff(sums / information, axis=1)[:, 0] ** 2 / np.sum(1.0 / information, axis=1)
+        conflict = np.zeros(len(ids), dtype=bool)
+        conflict[both] = gammaincc(0.5, 0.5 * apart) < self._config.chance
+        return conflict
+
+    def _bends(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        """Return where the clear directions change along the wall: by a line through them, weighted."""
+        information, sums = self._directions[ids, 1].T
+        first, second, mixed = self._along[ids].T
+        middle = first / np.maximum(information, 1e-9)
+        spread, trend = second - middle * first, mixed - middle * sums
+        gain = trend**2 / np.maximum(spread, 1e-9)
+        bends = gain > self._config.bend_rad**2 * information
+        bends[bends] = gammaincc(0.5, 0.5 * gain[bends]) < self._config.chance
+        return bends
+
+    def _make_room(self, count: int) -> None:
+        missing = count - len(self._first)
+        if missing <= 0:
+            return
+        self._fits = np.concatenate([self._fits, np.zeros((missing, 2))])
+        self._first = np.concatenate([self._first, np.full((missing, 3), np.nan)])
+        self._directions = np.concatenate([self._directions, np.zeros((missing, 2, 2))])
+        self._along = np.concatenate([self._along, np.zeros((missing, 3))])
+        self._crooked = np.concatenate([self._crooked, np.zeros(missing, dtype=bool)])

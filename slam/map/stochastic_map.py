@@ -1,0 +1,48 @@
+"""The map: a belief about lines, and how far along each line its wall has been seen."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..estimation.backend import Belief
+from ..geometry.lines import directions, distance_to_segments, normals
+
+
+@dataclass(frozen=True)
+class StochasticMap:
+    """Walls in the order of `belief.ids`."""
+
+    belief: Belief
+    extents: Float[np.ndarray, "n 2"]
+    """From and to along t = J n(alpha), m, measured from the anchor; the free side is on the left."""
+    sightings: Int[np.ndarray, " n"]
+    """In how many scans each wall was seen with enough beams to be fused."""
+    tentative: Bool[np.ndarray, " n"]
+    """Walls that were not seen well enough yet to be followed or chained."""
+    crooked: Bool[np.ndarray, " n"]
+    """Walls whose beams, over many scans, do not lie on a line (`firmness`): matched and chained, but they move no
+    estimate that another wall can move, and what is stated of them is not to be believed."""
+
+    def __len__(self) -> int:
+        return len(self.extents)
+
+    @property
+    def ids(self) -> Int[np.ndarray, " n"]:
+        """Ids of the walls, ascending."""
+        return self.belief.ids
+
+    @cached_property
+    def ends_world(self) -> Float[np.ndarray, "n 2 2"]:
+        """First and last point of each wall, world frame, m: walking on, the free side is on the left. Read-only."""
+        alpha, d = self.belief.means[:, 0], self.belief.means[:, 1]
+        feet = self.belief.anchors + d[:, None] * normals(alpha)
+        ends = feet[:, None, :] + self.extents[..., None] * directions(alpha)[:, None, :]
+        ends.flags.writeable = False
+        return ends
+
+    @cached_property
+    def distances_m(self) -> Float[np.ndarray, " n"]:
+        """How far each wall is from where the belief puts the robot."""
+        return distance_to_segments(self.belief.pose_world[None, :2], self.ends_world)[0]

@@ -1,0 +1,213 @@
+"""Bends that the map knows, where a scan shows one straight piece.
+
+Near a wall that turns by a degree or two, one line fits dozens of beams of both its parts: a second line saves less
+than chance does, and yet the one line is wrong by many of the sigmas that so many beams state, the same way in scan
+after scan. The map, which has seen each part alone, knows where to cut.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..estimation.gates import gate_level
+from ..extraction.segments import Segments
+from ..geometry.lines import directions, normals
+from ..geometry.poses import to_robot, to_world, wrap
+from .merging import same_line
+from .stochastic_map import StochasticMap
+
+
+@dataclass(frozen=True)
+class BendsConfig:
+    """Where two walls make a bend, and which segments pass over it."""
+
+    reach_m: float = 0.1
+    """Largest gap between the end of one wall and the beginning of the next. They may overlap: a line over both was
+    given to one of them, which then reaches past the bend."""
+    largest_rad: float = float(np.deg2rad(10.0))
+    """A sharper bend is seen in every scan."""
+    least_rad: float = float(np.deg2rad(0.2))
+    """Walls that overlap and turn less are not ended where their lines cross: they may be one wall entered twice ..."""
+    slight_rad: float = float(np.deg2rad(2.0))
+    """... nor those that turn more: which of them a beam met is plain, and one of them may be a line laid across a
+    step."""
+    beside_m: float = 0.08
+    """Distance across a segment within which a bend lies on it."""
+    known: float = 0.9999
+    """Probability level at which the two walls are not one line: in a straight building two pieces of one wall may
+    stand in the map for a while."""
+    cut_reach_m: float = 0.5
+    """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
+    met either of them near the bend."""
+    across_m: float = 0.25
+    """A wall that reaches so far beyond a bend on both sides was laid across it."""
+    past_shown_m: float = 0.15
+    """The same for a bend that a scan shows: a beam of the other side was taken in, at 4 m one in 0.13 m."""
+    sharpest_rad: float = float(np.deg2rad(30.0))
+    """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
+    young_sightings: int = 10
+    """A wall seen this often is not forgotten for a bend that one scan shows: all scans together tell (`kinks`)."""
+    shown: float = 0.99
+    """Probability level at which two neighbours in a scan turn: that they are two, the cut between them tells, too."""
+    past_m: float = 0.05
+    """Ends are known no better: a segment goes on at least so far on both sides of a bend, and walls that overlap by
+    less do not."""
+
+
+def bends_within(
+    segments: Segments,
+    walls: StochasticMap,
+    config: BendsConfig = BendsConfig(),
+    cut: Collection[tuple[int, int]] = (),
+) -> Float[np.ndarray, " b"]:
+    """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief.
+
+    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`kinks`).
+    """
+    if not len(segments):
+        return np.zeros(0)
+    bends = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
+    alpha_world = walls.belief.means[bends.rows[:, 0], 0]
+    points, alpha = to_robot(bends.points_world, walls.belief.pose_world), alpha_world - walls.belief.pose_world[2]
+    offset = points[:, None] - segments.ends[None, :, 0]
+    along = np.vecdot(offset, directions(segments.lines[:, 0]))
+    across = np.vecdot(offset, normals(segments.lines[:, 0]))
+    length = segments.lengths_m
+    on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
+    on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
+    found = points[_are_known(bends, on.any(axis=1), walls, config)]
+    return np.arctan2(found[:, 1], found[:, 0])
+
+
+def meetings(
+    walls: StochasticMap, range_m: float, config: BendsConfig = BendsConfig(), cut: Collection[tuple[int, int]] = ()
+) -> tuple[Int[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
+    """Return ids of walls that overlap, before and after a bend, and how far along each from its anchor they meet, m.
+
+    Within `range_m` of the robot; `cut` as above.
+    """
+    bends = _bends(walls, range_m, config, cut)
+    slight = (bends.turn_rad > config.least_rad) & (bends.turn_rad < config.slight_rad)
+    asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
+    known = _are_known(bends, asked, walls, config)
+    rows = bends.rows[known]
+    from_anchor = bends.points_world[known][:, None] - walls.belief.anchors[rows]
+    along = np.vecdot(from_anchor, directions(walls.belief.means[rows, 0]))
+    # Where the lines cross a little outside the overlap, its end is near enough.
+    short, far = walls.extents[rows[:, 1], 0] - along[:, 1], along[:, 0] - walls.extents[rows[:, 0], 1]
+    return walls.ids[rows], along + (np.maximum(short, 0.0) - np.maximum(far, 0.0))[:, None]
+
+
+def laid_across(
+    walls: StochasticMap, wall: int, along_m: float, config: BendsConfig = BendsConfig()
+) -> Int[np.ndarray, " n"]:
+    """Return the ids of the walls laid, like `wall`, across the bend that lies so far along it from its anchor."""
+    (row,) = walls.belief.rows([wall])
+    (alpha, d), anchor = walls.belief.means[row], walls.belief.anchors[row]
+    bend = anchor + d * normals(alpha) + along_m * directions(alpha)
+    return walls.ids[_across(walls, bend[None], np.array([alpha]), config.across_m, config)[0]]
+
+
+def mistaken(segments: Segments, walls: StochasticMap, config: BendsConfig = BendsConfig()) -> Int[np.ndarray, " n"]:
+    """Return the ids of walls laid across a bend that this scan shows, and few scans before it.
+
+    From 4 m the sides of a bend of a few degrees are one line of eight beams; from a step nearer they are two, and the
+    clearer of them passes every gate of that line and turns the robot by half the bend.
+    """
+    after = np.roll(np.arange(len(segments)), -1)
+    turn = wrap(segments.lines[after, 0] - segments.lines[:, 0])
+    variance = segments.cov[:, 0, 0] + segments.cov[after, 0, 0]
+    between = segments.ends[after, 0] - segments.ends[:, 1]
+    shown = ~segments.is_tentative & ~segments.is_tentative[after] & (np.abs(turn) < config.sharpest_rad)
+    shown &= (turn**2 > gate_level(config.shown, 1) * variance) & (np.linalg.norm(between, axis=1) < config.cut_reach_m)
+    before = np.flatnonzero(shown)
+    pose = walls.belief.pose_world
+    points = to_world(segments.ends[before, 1] + 0.5 * between[before], pose)
+    alpha = segments.lines[before, 0] + pose[2] + 0.5 * turn[before]
+    laid = _across(walls, points, alpha, config.past_shown_m, config).any(axis=0)
+    return walls.ids[laid & (walls.sightings < config.young_sightings)]
+
+
+def _across(
+    walls: StochasticMap,
+    bends_world: Float[np.ndarray, "b 2"],
+    alpha: Float[np.ndarray, " b"],
+    past_m: float,
+    config: BendsConfig,
+) -> Bool[np.ndarray, "b n"]:
+    """Return which walls reach so far past each of the bends, about which the normals are `alpha`, on both sides."""
+    means = walls.belief.means[:, 0]
+    offset = bends_world[:, None, None] - walls.ends_world
+    along, across = (np.vecdot(offset, axis[:, None]) for axis in (directions(means), normals(means)))
+    laid = (along[..., 0] > past_m) & (along[..., 1] < -past_m)
+    laid &= np.abs(across[..., 0]) < config.beside_m
+    return laid & (np.abs(wrap(means - alpha[:, None])) < config.largest_rad)
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """Where walls may make a bend."""
+
+    rows: Int[np.ndarray, "b 2"]
+    """Of the walls before and after it."""
+    points_world: Float[np.ndarray, "b 2"]
+    """Where it lies, m: where the lines cross, if both walls end or overlap there; else amid the two ends."""
+    turn_rad: Float[np.ndarray, " b"]
+    """From one normal to the other, without its sign."""
+    cross: Bool[np.ndarray, " b"]
+    """Whether it lies where the lines cross."""
+    overlap: Bool[np.ndarray, " b"]
+    """Whether the walls overlap, by more than ends are known to."""
+    is_cut: Bool[np.ndarray, " b"]
+    """Whether it is known that they are two."""
+
+
+def _are_known(
+    bends: _Bends, asked: Bool[np.ndarray, " b"], walls: StochasticMap, config: BendsConfig
+) -> Bool[np.ndarray, " b"]:
+    """Return which of the bends asked for lie between walls that are surely not one straight wall."""
+    known = asked & bends.is_cut
+    open_to_doubt = np.flatnonzero(asked & ~bends.is_cut)
+    if len(open_to_doubt):
+        used, places = np.unique(bends.rows[open_to_doubt], return_inverse=True)
+        joint = walls.belief.joint(walls.ids[used])
+        known[open_to_doubt] = [not same_line(joint.take(pair), config.known) for pair in places.reshape(-1, 2)]
+    return known
+
+
+def _bends(walls: StochasticMap, range_m: float, config: BendsConfig, cut: Collection[tuple[int, int]]) -> _Bends:
+    """Return where bends may lie; walls that begin beyond `range_m` have none that a scan of that range shows."""
+    rows = np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
+    alpha, ends = walls.belief.means[rows, 0], walls.ends_world[rows]
+    turn = wrap(alpha - alpha[:, None])
+    # Every other wall's ends as seen from the head of each: along it, and across.
+    offset = ends[None] - ends[:, None, 1:]
+    along = np.vecdot(offset, directions(alpha)[:, None, None])
+    across = np.vecdot(offset, normals(alpha)[:, None, None])[..., 0]
+    gap, runs_on = along[..., 0], along[..., 1] > 0.0
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
+    is_cut = _are_pairs(walls.ids[rows], cut)
+    reach = np.where(is_cut, config.cut_reach_m, config.reach_m)
+    is_bend = (gap < reach) & (gap > -length[:, None]) & runs_on
+    is_bend &= (np.abs(across) < config.beside_m) & (np.abs(turn) < config.largest_rad)
+    before, after = np.nonzero(is_bend)
+    gap, across, turn = gap[is_bend], across[is_bend], turn[is_bend]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = gap + across / np.tan(turn)
+    cross = (crossing > np.minimum(gap, 0.0) - config.reach_m) & (crossing < np.maximum(gap, 0.0) + config.reach_m)
+    at = np.where(cross, crossing, 0.5 * gap)
+    points = ends[before, 1] + at[:, None] * directions(alpha[before])
+    pair = np.stack([rows[before], rows[after]], axis=-1)
+    return _Bends(pair, points, np.abs(turn), cross, gap < -config.past_m, is_cut[is_bend])
+
+
+def _are_pairs(ids: Int[np.ndarray, " n"], pairs: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n n"]:
+    """Return for each two of the ids, which ascend, whether they are one of the pairs, in either order."""
+    are_pairs = np.zeros((len(ids), len(ids)), dtype=bool)
+    wanted = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
+    wanted = wanted[np.isin(wanted, ids).all(axis=1)]
+    one, other = np.searchsorted(ids, wanted).T
+    are_pairs[one, other] = are_pairs[other, one] = True
+    return are_pairs

@@ -1,0 +1,94 @@
+"""Every back end in every school: whether any run ends by an exception.
+
+.venv/bin/python -m studies.exploration.schools --plans DIR --out results/schools-short.jsonl
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from rich.table import Table
+
+from experiments.scenario import TrialConfig, UsageError
+from experiments.terminal.console import plain_console
+from slam.backends import BACKENDS
+
+from ..runner.rows import rows_of
+
+
+@dataclass(frozen=True)
+class SchoolsStudy:
+    """Explore the first steps of each plan with each back end, with noise, and print a row for each back end."""
+
+    plans: Path
+    """A folder of plans."""
+    named: str = "cml_*.json"
+    """Which files of the folder, as the shell would write it."""
+    backends: tuple[str, ...] = tuple(reversed(BACKENDS))
+    """The estimators, one after the other."""
+    seed: int = 1
+    """Decides all noise."""
+    max_steps: int = 1500
+    """A run is stopped after this many scans."""
+    jobs: int = 1
+    """Number of processes."""
+    out: Path = Path("results/schools-short.jsonl")
+    """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
+
+    def trials(self) -> list[TrialConfig]:
+        """Return the trials, one back end after the other; raises UsageError for a folder without plans."""
+        names = sorted(str(path) for path in self.plans.glob(self.named) if path.is_file())
+        if not names:
+            raise UsageError(f"expected a folder of plans, found no file {self.named} in {self.plans}: check it")
+        return [
+            TrialConfig(name, backend, seed=self.seed, max_steps=self.max_steps)
+            for backend in self.backends
+            for name in names
+        ]
+
+
+def table(rows: Sequence[dict[str, Any]], backends: Sequence[str]) -> Table:
+    """Return a row for each back end: runs, those that an exception ended, other failures, recoveries, its step."""
+    shown = Table(title=f"{len(rows)} runs", title_justify="left")
+    shown.add_column("back end")
+    for column in ["runs", "exceptions", "failed otherwise", "recoveries", "runs with any", "steps", "step ms"]:
+        shown.add_column(column, justify="right")
+    for backend in backends:
+        own = [row for row in rows if row["backend"] == backend]
+        if own:
+            raised = [row for row in own if row.get("raised")]
+            recoveries = [row.get("recoveries") or 0 for row in own]
+            steps = [row.get("steps") or 0 for row in own]
+            times = [row["step_ms_mean"] for row in own if row.get("step_ms_mean") is not None]
+            failed = sum(row["status"] not in ("complete", "stopped") for row in own) - len(raised)
+            counts = (len(own), len(raised), failed, sum(recoveries), np.count_nonzero(recoveries), sum(steps))
+            shown.add_row(backend, *map(str, counts), f"{np.mean(times):.1f}" if times else "-")
+    return shown
+
+
+def main() -> int:
+    """Run the study that the command line names and return the exit status: 1 where an exception ended a run."""
+    study = tyro.cli(SchoolsStudy, prog="studies.exploration.schools")
+    rows: list[dict[str, Any]] = []
+    try:
+        trials = study.trials()
+        for row in rows_of(trials, study.out, study.jobs):
+            rows.append(row)
+            if sys.stderr.isatty():
+                print(f"\r{len(rows)} of {len(trials)}", end="", file=sys.stderr, flush=True)
+    except UsageError as error:
+        print(f"schools_study: {error}", file=sys.stderr)
+        return 2
+    plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, study.backends))
+    for row in rows:
+        if row["status"] not in ("complete", "stopped"):
+            print(f"{row['file']} {row['backend']}: {row['status']} at step {row.get('steps')}: {row['reason']}")
+    return 1 if any(row.get("raised") for row in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

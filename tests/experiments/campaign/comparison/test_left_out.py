@@ -1,0 +1,96 @@
+"""A complete run without an ANEES is in no mean of it, and every table says so."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.campaign import store as of_store
+from experiments.campaign.comparison.tables import write_tables
+from experiments.campaign.pages.page import page_of
+from experiments.campaign.plan import Campaign, trials
+from experiments.campaign.store import opened
+from experiments.campaign.work import Done, pack
+from experiments.commands.cli import main
+from studies.exploration.suite import table
+from tests.experiments.campaign.running import run
+from viz.reports.report import html, latex
+
+CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot",), 3, arms=("closed",), max_steps=4)
+WORDS = (
+    *("--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"),
+    *("--trials", "3", "--modes", "closed", "--max-steps", "4", "--jobs", "1"),
+)
+
+
+def lacking(record, trial):
+    """The trial as one that completed, without its ANEES where its covariance is said to have been no good."""
+    summary = record.summary | {"status": "complete"}
+    if (trial.backend, trial.seed) != ("full-ekf", 2):
+        return replace(record, summary=summary)
+    summary |= {"pose_anees": None, "map_anees": None}
+    summary["marks"]["end"] |= {"map_anees": None, "pose_anees_so_far": None}
+    nees = record.arrays["pose_nees"].copy()
+    nees[1] = np.nan
+    return replace(record, summary=summary, arrays=record.arrays | {"pose_nees": nees})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A campaign of three runs a back end, all complete; one of the full EKF has a covariance that is no good."""
+    folder = run(tmp_path_factory.mktemp("lacking") / "campaign", CAMPAIGN)
+    with opened(folder, CAMPAIGN) as store:
+        for trial in trials(CAMPAIGN):
+            store.save(Done(trial, pack(lacking(store.record(trial), trial))))
+        write_tables(folder, CAMPAIGN, trials(CAMPAIGN), store.record)
+    return folder
+
+
+def test_the_comparison_counts_it_beside_the_means(folder):
+    said = json.loads((folder / "comparison.json").read_text())
+    for rows in (said["pooled"], said["cells"]):
+        counts = {row["backend"]: row["without"] for row in rows}
+        assert {counts["full-ekf"][name] for name in ("pose_anees", "map_anees")} == {1}
+        assert set(counts["block-ekf"].values()) == {0}
+        assert {row["backend"]: row["map_anees"]["runs"] for row in rows} == {"block-ekf": 3, "full-ekf": 2}
+    at_end = {row["backend"]: row["without"] for row in said["marks"] if row["metres"] == "end"}
+    assert (at_end["full-ekf"]["map_anees"], at_end["block-ekf"]["map_anees"]) == (1, 0)
+    (anees,) = [row for row in said["backends"] if row["measure"] == "map_anees"]
+    assert (anees["runs"], anees["pairs_without_value"]) == (2, 1)
+    with (folder / "steps.csv").open() as file:
+        missing = [(row["backend"], row["step"], row["without_nees"]) for row in csv.DictReader(file)]
+    assert [row for row in missing if row[2] != "0"] == [("full-ekf", "1", "1")]
+
+
+def test_the_report_says_so_as_a_page_and_as_latex(folder):
+    page = page_of(folder)
+    tables = [table for section in page.sections for table in section.tables]
+    (honesty,) = [table for table in tables if "without: pose, map" in table.header]
+    at = honesty.header.index("without: pose, map")
+    assert {row[0]: row[at] for row in honesty.rows} == {"block-ekf": "0, 0", "full-ekf": "1, 1"}
+    (against,) = [table for table in tables if table.title == "Back ends against full-ekf"]
+    at = against.header.index("left out")
+    assert {row[2]: row[at] for row in against.rows}["pose ANEES"] == "1"
+    assert {row[2]: row[at] for row in against.rows}["error of the walls"] == "0"
+    assert b"they are in no mean of it" in html(page)
+    assert b"without: pose, map" in latex(tables)
+
+
+def test_the_command_says_so_when_it_ends(folder, capsys, monkeypatch):
+    monkeypatch.setattr(of_store, "config_record", lambda config: {"versions": {}, "commit": None})
+    assert main(["compare", *WORDS, "--out", str(folder)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    expected = "1 of 6 complete runs have no {} ANEES (a covariance that is not positive definite): they are in no mean"
+    assert [line for line in said if "in no mean" in line] == [f"{expected.format(n)} of it" for n in ("pose", "map")]
+
+
+def test_the_suite_says_so_in_its_table():
+    plain = {"status": "complete", "coverage": 1.0, "contours_closed": 1, "contours_reachable": 1, "world": "w"}
+    plain |= dict.fromkeys(("false_matches", "duplicate_lines", "collisions"), 0) | {"errorless": False}
+    rows = [plain | {"pose_anees": 1.0, "map_anees": value} for value in (2.0, None, 4.0)]
+    shown = table([*rows, plain | {"errorless": True, "map_anees": None, "pose_anees": None}], by_world=False)
+    cells = {str(column.header): list(column.cells) for column in shown.columns}
+    assert cells["map ANEES"] == ["3.00"]
+    assert cells["without: pose, map"] == ["0, 1"]

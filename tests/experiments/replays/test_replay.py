@@ -1,0 +1,105 @@
+"""A recording played back: identical scans, the back end alone, the truth in place of a part."""
+
+import numpy as np
+import pytest
+
+from experiments.artifacts.results import write_results
+from experiments.commands.cli import main
+from experiments.replays.oracles import true_odometry
+from experiments.replays.recordings import recorded
+from experiments.replays.replay import ReplayOptions, read_run, replay
+from experiments.scenario import TrialConfig
+from experiments.trial import run_trial
+from sim.logs.recorded_robot import RecordedRobot
+from slam.geometry.poses import compose
+from slam.robot import MotionCommand
+from studies.runner.study_table import bootstrap
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A short noisy run and the folder that it left."""
+    result = run_trial(TrialConfig("paper-fig4", seed=3, max_steps=60))
+    folder = tmp_path_factory.mktemp("run")
+    assert write_results(result, folder) == []
+    return result, folder
+
+
+def test_the_same_back_end_gives_the_same_estimate_bit_for_bit(made):
+    result, folder = made
+    again = replay(read_run(folder / "log.npz"), "full-ekf")
+    assert again.ending.status == "complete"
+    np.testing.assert_array_equal(again.log.estimated_world, result.log.estimated_world)
+    np.testing.assert_array_equal(again.log.estimated_cov, result.log.estimated_cov)
+
+
+def test_a_log_on_disk_replays_like_the_run_in_memory(made):
+    result, folder = made
+    on_disk = replay(read_run(folder / "log.npz"), "invariant-ekf").log
+    in_memory = replay(recorded(result), "invariant-ekf").log
+    np.testing.assert_array_equal(on_disk.estimated_world, in_memory.estimated_world)
+
+
+def test_the_true_association_makes_one_line_of_each_wall_and_no_false_match(made):
+    result, _ = made
+    again = replay(recorded(result), "full-ekf", ReplayOptions("true"))
+    assert again.summary["false_matches"] == again.summary["duplicate_lines"] == 0
+    walls = again.votes.walls_of(again.last.map.ids)
+    assert len(set(walls.tolist())) == len(walls)
+
+
+def test_perfect_extraction_is_off_by_the_stated_noise(made):
+    result, _ = made
+    run = recorded(result)
+    again = replay(run, "full-ekf", ReplayOptions("true", perfect_extraction=True))
+    segments = again.last.segments
+    faces = again.votes.truth.lines
+    pose = run.true_poses_world[-1]
+    in_robot = np.column_stack(
+        [faces[:, 0] - pose[2], faces[:, 1] - np.cos(faces[:, 0]) * pose[0] - np.sin(faces[:, 0]) * pose[1]]
+    )
+    for line, cov in zip(segments.lines, segments.cov, strict=True):
+        off = in_robot - line
+        off[:, 0] = (off[:, 0] + np.pi) % (2 * np.pi) - np.pi
+        nearest = np.einsum("fi,ij,fj->f", off, np.linalg.inv(cov), off).min()
+        assert 0.0 < nearest < 30.0
+
+
+def test_true_motions_lead_along_the_true_path(made):
+    poses = recorded(made[0]).true_poses_world
+    at = poses[0]
+    for motion, pose in zip(true_odometry(poses)[1:], poses[1:], strict=True):
+        at = compose(at, motion)
+        np.testing.assert_allclose(at, pose, atol=1e-9)
+
+
+def test_a_recording_ends(made):
+    recording = recorded(made[0]).recording
+    robot = RecordedRobot(recording)
+    for _ in range(len(recording) - 1):
+        robot.sense()
+        robot.drive(MotionCommand(0.0, 0.0))
+    with pytest.raises(EOFError, match="end of the recording"):
+        robot.drive(MotionCommand(0.0, 0.0))
+
+
+def test_what_is_no_log_gets_one_line_and_status_2(made, tmp_path, capsys):
+    _, folder = made
+    (tmp_path / "log.npz").write_bytes(b"not an archive")
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    (alone / "log.npz").write_bytes((folder / "log.npz").read_bytes())
+    for log in (tmp_path / "none.npz", tmp_path / "log.npz", alone / "log.npz", tmp_path):
+        assert main(["replay", str(log)]) == 2
+        said = capsys.readouterr().err.strip()
+        assert said.startswith("chainslam: expected")
+        assert "\n" not in said
+        assert "found" in said
+
+
+def test_the_interval_of_a_mean_holds_it_and_shrinks_with_the_runs():
+    values = np.random.default_rng(5).chisquare(3, 400) / 3
+    low, high = bootstrap(values)
+    few = bootstrap(values[:40])
+    assert low < values.mean() < high
+    assert high - low < few[1] - few[0]

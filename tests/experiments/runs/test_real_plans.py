@@ -1,0 +1,34 @@
+"""Missions in the two real buildings that come with the tests."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.scenario import TrialConfig
+from experiments.trial import run_trial
+
+PLANS = Path(__file__).parents[2] / "data" / "plans"
+
+
+@pytest.mark.usefixtures("_unchecked")
+@pytest.mark.parametrize("name", ["apartment", "school"])
+def test_the_first_metres_in_a_real_building_go_well(name):
+    summary = run_trial(TrialConfig(str(PLANS / f"{name}.json"), max_steps=40)).summary
+    assert (summary["status"], summary["steps"], summary["collisions"]) == ("stopped", 40, 0)
+    assert summary["path_length_m"] > 0.8
+    assert summary["pose_rmse_m"] < 0.05
+    assert summary["lines"] >= 3
+    assert summary["false_matches"] == 0
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("_unchecked")
+@pytest.mark.parametrize(("name", "contours"), [("apartment", 2), ("school", 3)])
+def test_a_real_building_is_explored_to_its_end(name, contours):
+    config = TrialConfig(str(PLANS / f"{name}.json"), "invariant-ekf", errorless=True)
+    summary = run_trial(config).summary
+    assert summary["status"] == "complete"
+    assert summary["contours_closed"] == summary["contours_reachable"] == contours
+    assert summary["coverage"] > 0.97
+    assert summary["swept"] > 0.99
+    assert summary["collisions"] == summary["false_matches"] == 0

@@ -1,0 +1,48 @@
+"""A run whose estimator finds no solution any more ends as failed, with all that it has computed."""
+
+import pytest
+
+from experiments.scenario import TrialConfig
+from experiments.scoring.smoothing import smooth
+from experiments.trial import run_trial
+from slam.backends.graph.isam import Isam
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+
+
+@pytest.mark.parametrize("backend", ["graph", "graph-batch"])
+def test_a_run_that_no_solver_can_go_on_with_keeps_all_its_results(backend, monkeypatch):
+    push = Isam.push
+
+    def fails(self, last, relinearise=False):
+        if any(number >= 150 for number in self._entering):
+            raise RuntimeError("Indeterminate linear system detected")
+        return push(self, last, relinearise)
+
+    monkeypatch.setattr(Isam, "push", fails)
+    result = run_trial(TrialConfig("rooms", backend, seed=1, max_steps=40))
+    assert result.summary["status"] == "failed"
+    assert result.summary["reason"].startswith("UnsolvableError: expected a least-squares solution of")
+    assert result.log is not None
+    assert result.summary["steps"] == len(result.log) >= 10
+    assert result.summary["pose_anees"] > 0.0
+    assert result.summary["lines"] > 0
+    assert len(result.scenario.backend.belief.ids) > 0
+    assert len(result.scenario.backend.trajectory()) >= len(result.log)
+
+
+class Broken:
+    """A smoother that does not even tell what it believes."""
+
+    @property
+    def belief(self):
+        raise RuntimeError("no solution")
+
+    def finish(self):
+        raise RuntimeError("no solution")
+
+    predict = update = grow = merge = remove = finish
+
+
+def test_a_smoother_that_broke_down_costs_no_results():
+    assert smooth(Broken(), None, 3) is None

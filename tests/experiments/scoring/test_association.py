@@ -1,0 +1,154 @@
+"""Which wall a line came from, beam by beam, against plain loops over beams."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.scoring.association import OVERLAP_M, UNLABELLED, Votes, duplicate_lines, duplicate_pairs
+from experiments.scoring.truth import truth_of
+from sim.robot import RobotConfig
+from slam.extraction.segments import Segments
+
+WALLS = np.array([0, 0, 1, 2, 2, 3])
+"""Of six faces: two walls have two each."""
+BEAMS = 40
+
+
+@pytest.fixture
+def truth(world):
+    n = len(WALLS)
+    made = truth_of(world, RobotConfig())
+    return replace(made, faces=np.zeros((n, 2, 2)), lines=np.zeros((n, 2)), walls=WALLS, rings=np.zeros(n, int))
+
+
+def segments_of(spans):
+    n, none = len(spans), np.zeros((len(spans), 2))
+    return Segments(none, np.zeros((n, 2, 2)), np.zeros((n, 2, 2)), np.array(spans), np.full(n, 5), none.astype(int),
+                    np.zeros(n))  # fmt: skip
+
+
+def beams_of(first, last):
+    """The beams from the first to the last, on over the seam."""
+    found = [first]
+    while found[-1] != last:
+        found.append((found[-1] + 1) % BEAMS)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_votes_and_labels_are_those_of_plain_loops(truth, seed):
+    rng, votes = np.random.default_rng(seed), Votes(truth)
+    counts, fused = {}, []
+    for _ in range(12):
+        face_of_beam = np.repeat(rng.integers(-1, 6, 10), 4)
+        spans = [tuple(rng.integers(0, BEAMS, 2).tolist()) for _ in range(3)]
+        owners = rng.integers(-1, 5, 3)
+        votes.add(segments_of(spans), owners, face_of_beam)
+        for span, owner in zip(spans, owners.tolist(), strict=True):
+            if owner < 0:
+                continue
+            faces = [int(face_of_beam[beam]) for beam in beams_of(*span)]
+            line = counts.setdefault(owner, [0] * 6)
+            for face in faces:
+                if face >= 0:
+                    line[face] += 1
+            walls = [sum(1 for f in faces if f >= 0 and WALLS[f] == wall) for wall in range(4)]
+            fused.append((owner, walls.index(max(walls)) if max(walls) >= 0.8 * len(faces) else UNLABELLED))
+    assert {line: beams.tolist() for line, beams in votes.beams.items()} == counts
+    assert votes.fused == fused
+    labels = {}
+    for line, beams in counts.items():
+        walls = [sum(b for b, wall in zip(beams, WALLS, strict=True) if wall == w) for w in range(4)]
+        wall = walls.index(max(walls))
+        labels[line] = wall if max(walls) else UNLABELLED
+        mine = [b if w == wall else -1 for b, w in zip(beams, WALLS, strict=True)]
+        assert votes.face_of(line) == (mine.index(max(mine)) if max(walls) else UNLABELLED)
+    ids = np.array(sorted(counts))
+    assert votes.walls_of(ids).tolist() == [labels[line] for line in ids]
+    assert votes.faces_of(np.array([99, *ids])).tolist() == [
+        UNLABELLED,
+        *(votes.face_of(line) for line in sorted(counts)),
+    ]
+    assert votes.false_matches() == sum(wall not in (UNLABELLED, labels[line]) for line, wall in fused)
+
+
+@pytest.mark.parametrize(("other", "label"), [(2, 1), (3, UNLABELLED)])
+@pytest.mark.parametrize("missing", [-1, 3])
+def test_a_segment_is_of_one_wall_by_four_fifths_of_all_its_beams(truth, other, label, missing):
+    """Of ten beams; those that hit nothing count against it, too."""
+    face_of_beam, votes = np.full(BEAMS, missing), Votes(truth)
+    face_of_beam[: 10 - other] = 2
+    votes.add(segments_of([(0, 9)]), np.array([4]), face_of_beam)
+    assert votes.fused == [(4, label)]
+
+
+def test_a_segment_that_hit_nothing_is_of_no_wall(truth):
+    votes = Votes(truth)
+    votes.add(segments_of([(0, 9)]), np.array([4]), np.full(BEAMS, -1))
+    assert votes.fused == [(4, UNLABELLED)]
+    assert (votes.face_of(4), votes.false_matches()) == (UNLABELLED, 0)
+
+
+def test_a_wall_of_two_faces_is_one_and_its_longer_face_stands_for_it(truth):
+    votes = Votes(truth, {1: np.array([30, 31, 60, 0, 0, 0]), 2: np.array([0, 0, 62, 30, 31, 0])})
+    assert (votes.face_of(1), votes.face_of(2)) == (1, 2)
+    assert votes.walls_of(np.array([1, 2])).tolist() == [0, 1]
+
+
+def test_merging_adds_beams_once_and_follows_lines_that_were_merged_before(truth):
+    votes = Votes(truth, {k: 10 * np.eye(6, dtype=np.int64)[face] for k, face in enumerate((0, 1, 2, 5))})
+    votes.merge(1, 0)
+    assert (votes.merges, votes.false_merges) == (1, 0), "two faces of one wall"
+    votes.merge(2, 1)
+    assert (votes.merges, votes.false_merges) == (2, 1)
+    expected = [10, 10, 10, 0, 0, 0]
+    assert [votes.beams[line].tolist() for line in (0, 1, 2)] == [expected, expected, expected]
+    assert votes.beams[3].tolist() == [0, 0, 0, 0, 0, 10]
+    votes.add(segments_of([(0, 3)]), np.array([0]), np.full(BEAMS, 3))
+    assert votes.beams[2].tolist() == [10, 10, 10, 4, 0, 0]
+    # One that no beam tells of.
+    votes.merge(3, 7)
+    assert (votes.merges, votes.false_merges, votes.beams[7].tolist()) == (3, 1, [0, 0, 0, 0, 0, 10])
+    votes.merge(8, 9)
+    assert votes.beams[8].tolist() == votes.beams[9].tolist() == [0] * 6
+    assert votes.false_merges == 1
+
+
+def along(*spans):
+    """Walls on the x axis from here to there."""
+    return np.array([[[a, 0.0], [b, 0.0]] for a, b in spans])
+
+
+@pytest.mark.parametrize(("overlap_m", "count"), [(OVERLAP_M, 1), (OVERLAP_M - 1e-6, 0)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_lines_of_one_wall_that_overlap_over_twenty_centimetres_are_one_too_many(make_map, overlap_m, count, turned):
+    assert OVERLAP_M == 0.2
+    faces = along((0.0, 1.0), (1.0 - overlap_m, 2.0))
+    walls = make_map(faces[..., ::-1] if turned else faces, np.zeros(3))
+    every, labels = np.ones(2, bool), np.zeros(2, np.int64)
+    assert duplicate_lines(walls, labels, every) == count
+    assert duplicate_lines(walls, labels, np.array([True, False])) == 0
+    assert duplicate_lines(walls, np.array([0, 1]), every) == 0
+    assert duplicate_lines(walls, np.array([-1, -1]), every) == 0
+
+
+def test_each_line_too_many_is_told_with_the_first_that_it_overlaps(make_map):
+    faces = along((0.0, 1.0), (3.0, 4.0), (0.5, 3.5), (0.2, 0.6), (3.6, 9.0), (0.0, 9.0))
+    walls = make_map(faces, np.zeros(3), ids=np.array([2, 3, 5, 7, 11, 13]))
+    pairs = duplicate_pairs(walls, np.array([4, 4, 4, 4, 4, 6]), np.ones(6, bool))
+    assert pairs == [(2, 5), (2, 7), (3, 11)]
+    among = np.array([False, True, True, True, True, True])
+    # The fourth overlaps the third by a tenth of a metre only.
+    assert duplicate_pairs(walls, np.array([4, 4, 4, 4, 4, 6]), among) == [(3, 5), (3, 11)]
+    labels = np.array([9, 4, 4, 9, 4, 9])
+    assert sorted(duplicate_pairs(walls, labels, np.ones(6, bool))) == [(2, 7), (2, 13), (3, 5), (3, 11)]
+    assert duplicate_pairs(walls, labels, np.zeros(6, bool)) == []
+
+
+def test_a_wall_that_is_not_along_an_axis_is_measured_along_itself(make_map):
+    turn = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
+    walls = make_map(along((0.0, 1.0), (0.79, 2.0)) @ turn + 5.0, np.zeros(3))
+    assert duplicate_lines(walls, np.zeros(2, np.int64), np.ones(2, bool)) == 1
+    apart = replace(walls, extents=walls.extents * 0.9)
+    assert duplicate_lines(apart, np.zeros(2, np.int64), np.ones(2, bool)) == 0

@@ -1,0 +1,100 @@
+"""Which cells of the floor were seen, against loops over cells and beams."""
+
+import numpy as np
+import pytest
+import shapely
+
+from experiments.scoring.swept import CELL_M, Floor, swept, visible_floor
+from sim.lidar import RangeFinder
+from sim.robot import RobotConfig
+from sim.worlds import World
+
+ROOM = shapely.Polygon(
+    [(1.0, -2.0), (4.02, -2.0), (4.02, 0.01), (1.0, 0.01)], [[(2, -1), (2, -1.5), (3, -1.5), (3, -1)]]
+)
+POSE = np.array([1.5, -0.7, 0.4])
+
+
+def cells():
+    """Row, column and middle of each cell of the floor's grid."""
+    for row in range(41):
+        for column in range(61):
+            yield row, column, 1.0 + (column + 0.5) * CELL_M, -2.0 + (row + 0.5) * CELL_M
+
+
+def test_the_floor_is_cut_into_cells_of_five_centimetres():
+    floor = Floor(ROOM)
+    assert floor.free.shape == floor.seen.shape == (41, 61)
+    for row, column, x, y in cells():
+        assert floor.free[row, column] == shapely.contains_xy(ROOM, x, y)
+    assert not floor.seen.any()
+
+
+def test_a_region_covers_the_free_cells_within_it():
+    floor, disc = Floor(ROOM), shapely.Point(2.0, -1.0).buffer(0.4)
+    floor.cover(disc)
+    first = floor.seen.copy()
+    for row, column, x, y in cells():
+        assert floor.seen[row, column] == shapely.contains_xy(disc.intersection(ROOM), x, y)
+    floor.cover(shapely.Point(3.5, -0.5).buffer(0.2))
+    assert floor.seen[first].all()
+    assert floor.seen.sum() > first.sum()
+
+
+@pytest.mark.parametrize("range_max_m", [0.6, 4.0])
+@pytest.mark.parametrize(
+    "bearings", [np.linspace(-np.pi, np.pi, 90, endpoint=False), np.linspace(-np.pi / 2, np.pi / 2, 46)]
+)
+def test_a_cell_is_seen_if_it_lies_before_the_return_of_its_nearest_beam(bearings, range_max_m):
+    rng = np.random.default_rng(2)
+    ranges = rng.uniform(0.2, 2.0, len(bearings))
+    ranges[::7], ranges[3::11] = np.nan, np.inf
+    floor = Floor(ROOM)
+    floor.look(POSE, bearings, ranges, range_max_m)
+    half, checked = 0.5 * (bearings[1] - bearings[0]), {True: 0, False: 0}
+    for row, column, x, y in cells():
+        off = np.angle(np.exp(1j * (np.arctan2(y - POSE[1], x - POSE[0]) - POSE[2] - bearings)))
+        nearest = int(np.argmin(np.abs(off)))
+        distance = np.hypot(x - POSE[0], y - POSE[1])
+        # Beyond the range the grid may hold any cell within its square; where beams end, either neighbour may count.
+        if max(abs(x - POSE[0]), abs(y - POSE[1])) > range_max_m - CELL_M or abs(abs(off[nearest]) - half) < 1e-9:
+            continue
+        reach = ranges[nearest] if not np.isnan(ranges[nearest]) else range_max_m
+        expected = bool(floor.free[row, column] and abs(off[nearest]) < half and distance <= reach)
+        assert floor.seen[row, column] == expected, (row, column)
+        checked[expected] += 1
+    assert min(checked.values()) > 20
+
+
+def test_nothing_beyond_the_range_in_either_direction_is_seen():
+    bearings = np.linspace(-np.pi, np.pi, 90, endpoint=False)
+    floor = Floor(ROOM)
+    floor.look(POSE, bearings, np.full(90, np.inf), 0.6)
+    rows, columns = np.nonzero(floor.seen)
+    x, y = 1.0 + (columns + 0.5) * CELL_M, -2.0 + (rows + 0.5) * CELL_M
+    assert np.abs(x - POSE[0]).max() <= 0.6
+    assert np.abs(y - POSE[1]).max() <= 0.6
+    assert (x.min() - 1.0, x.max() - 2.1, y.min() + 1.3, y.max() + 0.1) == pytest.approx((0, 0, 0, 0), abs=CELL_M)
+
+
+def test_the_swept_share_is_of_what_can_be_seen_and_only_grows():
+    world = World("room", shapely.geometry.polygon.orient(ROOM), POSE, {})
+    config = RobotConfig()
+    target = visible_floor(world, config)
+    finder = RangeFinder(world.faces, config.lidar)
+    poses = np.array([POSE, [3.5, -0.5, 0.0], [3.5, -1.7, 1.0]])
+    ranges = np.array([finder.cast(pose)[0] for pose in poses])
+    seen, shares = np.zeros_like(target), []
+    for k, pose in enumerate(poses):
+        floor = Floor(world.free)
+        floor.look(pose, finder.bearings_rad, ranges[k], config.lidar.range_max_m)
+        seen |= floor.seen
+        shares.append(np.sum(seen & target) / np.sum(target))
+        assert swept(world, config, poses[: k + 1], finder.bearings_rad, ranges[: k + 1]) == pytest.approx(shares[-1])
+    assert 0.4 < shares[0] < shares[1] < shares[2] <= 1.0
+
+
+def test_where_the_body_does_not_fit_nothing_can_be_seen_or_swept():
+    world = World("slit", shapely.box(0.0, 0.0, 5.0, 0.3), np.array([1.0, 0.15, 0.0]), {})
+    assert not visible_floor(world, RobotConfig()).any()
+    assert swept(world, RobotConfig(), POSE[None], np.linspace(-1.0, 1.0, 9), np.ones((1, 9))) == 0.0

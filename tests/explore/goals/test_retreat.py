@@ -1,0 +1,209 @@
+"""Back along its own way: out of what it touched, and out of where its own floor locks it in."""
+
+from dataclasses import dataclass, field, replace
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+
+from explore.floor.floor_memory import FloorMemory
+from explore.floor.free_space import FloorTooLargeError, FreeSpace
+from explore.floor.touches import REACH_M, Touches
+from explore.following.wall_following import FollowingConfig, Surroundings
+from explore.goals.retreat import Retreat
+from explore.mission import MissionConfig, explore_mission
+from explore.outcome import Outcome
+from explore.planning.paths import PathConfig, Planner
+from explore.strategies import STRATEGIES
+from sim.lidar import LidarConfig, RangeFinder
+from sim.robot import SimulatedRobot
+from sim.worlds import World
+from slam.backends import BACKENDS
+from slam.geometry.poses import compose
+from slam.robot import MotionCommand, Odometry, Scan
+
+FACES = np.array(
+    [[[0.0, 0.0], [9.0, 0.0]], [[9.0, 0.0], [9.0, 3.0]], [[9.0, 3.0], [0.0, 3.0]], [[0.0, 3.0], [0.0, 0.0]]]
+)
+STEP = np.array([0.15, 0.0, 0.0])
+
+
+@dataclass
+class Idle:
+    """A decider that never knows where to go."""
+
+    set_aside: dict = field(default_factory=dict)
+    goal: None = None
+    walls_to_follow: tuple = ()
+    needs_floor: bool = True
+    still_open: tuple = ()
+    left_places: tuple = ()
+    doing: str = "nothing"
+    outcome: Outcome = Outcome.ENDS_LEFT
+    closing_words: str = "nothing is left"
+    started_over: int = 0
+
+    def command(self, around, chains, graph):
+        return None
+
+    def interrupt(self, around):
+        pass
+
+    def start_over(self):
+        self.started_over += 1
+
+
+class Stubborn(FloorMemory):
+    """Cannot make anything of its last scans."""
+
+    def begin_anew(self, walls):
+        pass
+
+
+def scan_at(pose):
+    finder = RangeFinder(FACES, LidarConfig())
+    return Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+
+
+@pytest.fixture
+def driven(scene_of):
+    """Drive 4 m along a hall; what comes of it."""
+
+    def make(memory=FloorMemory):
+        scene, floor = replace(scene_of(0), faces=FACES), memory(FreeSpace())
+        retreat = Retreat(Idle(), floor, FollowingConfig())
+        pose = np.array([1.0, 1.5, 0.0])
+        for step in range(28):
+            floor.see(scene.walls(pose), scan_at(pose))
+            if step < 27:
+                floor.move(Odometry(STEP, np.zeros((3, 3))))
+                retreat.moved(MotionCommand(0.15, 0.0), Odometry(STEP, np.zeros((3, 3))))
+                pose = compose(pose, STEP)
+        around = Surroundings(scene.walls(pose), floor.free_space, scan_at(pose))
+        return floor, retreat, around
+
+    return make
+
+
+def shut(grid, pose, forget):
+    angle = np.linspace(0.0, 2.0 * np.pi, 400)
+    ring = [pose[:2] + r * np.stack([np.cos(angle), np.sin(angle)], axis=-1) for r in (0.1, 0.15, 0.2, 0.25)]
+    cells = grid.cells(np.concatenate(ring))
+    grid.evidence[tuple(cells.T)] = 6
+    grid._mark(*np.array([cells.min(axis=0), cells.max(axis=0) + 1]).T.ravel().tolist())
+    if forget:
+        grid._driven[:] = False
+
+
+def way_back(grid, pose):
+    return Planner(grid, pose[:2], PathConfig()).to(np.array([[1.5, 1.5]]))
+
+
+def test_what_the_robot_drove_through_is_passable_whatever_is_drawn_over_it(driven):
+    floor, retreat, around = driven()
+    grid, pose = floor.free_space, around.pose_world
+    shut(grid, pose, forget=False)
+    assert way_back(grid, pose) is not None
+    assert retreat.command(around, (), nx.DiGraph()) is None
+    assert retreat.outcome is Outcome.ENDS_LEFT
+    grid._driven[:] = False
+    assert way_back(grid, pose) is None
+
+
+def test_the_way_goes_where_the_walls_go(driven):
+    floor, _, around = driven()
+    floor._follow(around.walls)
+    before = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
+    shift = np.array([0.0, -0.4])
+    around.walls.belief.anchors[:] += shift
+    floor._follow(around.walls)
+    after = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
+    assert len(after) >= 0.9 * len(before)
+    np.testing.assert_allclose((after.mean(axis=0) - before.mean(axis=0))[::-1] * 0.05, shift, atol=0.06)
+
+
+def test_a_robot_locked_in_where_it_drove_begins_its_floor_anew_and_backs_out(driven):
+    floor, retreat, around = driven()
+    shut(floor.free_space, around.pose_world, forget=True)
+    commands = [retreat.command(around, (), nx.DiGraph()) for _ in range(3)]
+    assert [command.forward_m for command in commands] == pytest.approx([-0.15] * 3)
+    assert retreat._inner.started_over == 1
+    assert way_back(floor.free_space, around.pose_world) is not None
+    assert "back along its way" in retreat.doing
+
+
+def test_a_robot_that_cannot_get_back_has_failed_and_says_at_which_step(driven):
+    floor, retreat, around = driven(Stubborn)
+    shut(floor.free_space, around.pose_world, forget=True)
+    steps = 0
+    while retreat.command(around, (), nx.DiGraph()) is not None:
+        steps += 1
+    assert 5 <= steps <= 8  # a metre back first
+    assert retreat.outcome is Outcome.FAILED
+    assert retreat.outcome.status == "failed"
+    assert retreat.closing_words == f"locked in at step {steps}"
+
+
+def test_a_robot_far_off_all_bounds_is_told_in_one_line():
+    grid, scan = FreeSpace(), Scan(np.linspace(-3.1, 3.1, 180), np.full(180, 1.0), 0.01, 4.0, 0.0)
+    grid.integrate(np.zeros(3), scan)
+    shape = grid.shape
+    for x in (1e4, 2.5e6, 1e300, np.nan):
+        with pytest.raises(FloorTooLargeError, match=r"within 500 m by 500 m.*its estimate is lost"):
+            grid.integrate(np.array([x, x, 0.0]), scan)
+    assert grid.shape == shape
+    grid.integrate(np.array([100.0, 100.0, 0.0]), scan)
+
+
+def test_the_body_met_something_in_front_and_perhaps_what_is_nearest_on_the_side_to_which_it_moved():
+    touches, near = Touches(), np.array([[0.15, 0.14], [-0.19, 0.0], [0.5, 0.0]])
+    touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
+    assert touches.is_new
+    aside = 0.2 * near[0] / np.hypot(*near[0])
+    np.testing.assert_allclose(touches.meet(near), [[0.2, 0.0], aside])
+    assert not touches.is_new
+    touches.move(Odometry(np.array([-0.1, 0.0, 0.0]), np.eye(3), touched=True), MotionCommand(-0.1, 0.0))
+    np.testing.assert_allclose(touches.meet(near[:1]), [[-0.2, 0.0]])
+    np.testing.assert_allclose(touches.meet(np.array([[-0.2 - 1.1 * REACH_M, 0.0]])), [[-0.2, 0.0]])
+    np.testing.assert_allclose(touches.points_robot[:2], [[0.3, 0.0], aside + np.array([0.1, 0.0])])
+    assert len(touches.points_robot) == 4
+
+
+class Glass(SimulatedRobot):
+    """Its beams go through some walls that its body does not."""
+
+    def __init__(self, world, glass, seed):
+        super().__init__(world, seed)
+        self._faces = np.concatenate([self._faces, glass])
+
+
+@pytest.mark.usefixtures("_unchecked")
+@pytest.mark.parametrize("seed", range(3))
+def test_after_a_touch_the_robot_moves_away_and_does_not_try_the_same_place_again(seed):
+    """In the passage between two rooms stands a post that no beam sees: it is met before it is known."""
+    rng = np.random.default_rng(seed)
+    gap_m, y = rng.uniform(0.5, 0.9), rng.uniform(0.8, 1.3)
+    walls = shapely.union(shapely.box(2.0, 0.0, 2.0 + rng.uniform(0.1, 0.8), y), shapely.box(2.0, y + gap_m, 2.4, 3.0))
+    room = shapely.orient_polygons(shapely.box(0, 0, 4.5, 3).difference(walls))
+    at = np.array([2.2, y + gap_m * rng.uniform(0.3, 0.7)])
+    glass = np.array([[at, at + np.array([0.0, 0.05])]])
+    world = World("drawn", room, np.array([0.8, 1.5, rng.uniform(-3, 3)]), {})
+    backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
+    robot = Glass(world, glass, seed)
+    touched, poses = [], []
+    for step in explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=160)):
+        poses.append(robot.true_pose[:2])
+        if step.odometry.touched:
+            touched.append(step.index)
+    poses = np.array(poses)
+    assert touched, "the post was never met"
+    assert step.ended is not None
+    for k in touched:
+        later = poses[k : k + 9]
+        away = np.hypot(*(at - later).T) - np.hypot(*(at - poses[k]))
+        assert len(later) < 9 or away.max() > 0.05
+        assert away.min() > -0.02
+    places = poses[touched]
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(len(places))
+    assert apart.min() > 0.05, f"{len(touched)} touches"

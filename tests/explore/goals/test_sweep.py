@@ -1,0 +1,26 @@
+"""The last layer: where it goes, and what it remembers of its visits."""
+
+import numpy as np
+import pytest
+
+from explore.goals.sweep import Sweep, SweepConfig
+from explore.strategies import Place
+
+
+@pytest.mark.parametrize("trouble", ["", "the way was blocked"])
+def test_a_border_is_visited_twice_and_what_came_of_it_is_kept(trouble):
+    sweep, place = Sweep(SweepConfig(), is_on=True), Place(np.array([[1.0, 1.0], [1.1, 1.0]]), "unseen floor is left")
+    for _ in range(2):
+        assert not sweep.was_in_vain(place.centre_world)
+        sweep.ended(place, trouble)
+    assert sweep.was_in_vain(place.centre_world)
+    assert [left.trouble for left in sweep.left] == [trouble, trouble]
+    np.testing.assert_allclose(sweep.left[0].position_world, [1.05, 1.0])
+
+
+def test_it_goes_to_unseen_floor_only_when_it_is_on(scene_of, look):
+    scene = scene_of(0, 0)
+    look(scene, scene.places[:1], 1.5)
+    situation = scene.situation(np.append(scene.places[0], 0.0), [])
+    assert Sweep(SweepConfig(), is_on=True).choose(situation).target.kind == "unseen"
+    assert Sweep(SweepConfig(), is_on=False).choose(situation) is None

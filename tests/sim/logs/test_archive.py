@@ -1,0 +1,142 @@
+"""Archives that hold something else than they should are told apart before their numbers are read."""
+
+import io
+import os
+import zipfile
+
+import numpy as np
+import pytest
+
+from sim.logs import archive
+from sim.logs.archive import ArchiveError, read_archive
+
+LAYOUT = {"ranges": "float s k", "time": "float s"}
+
+
+def npz(path, **arrays):
+    np.savez_compressed(path, **({"ranges": np.ones((3, 2)), "time": np.arange(3)} | arrays))
+    return path
+
+
+def member(shape, content=b"", descr="<f8"):
+    """The bytes of an array that says of itself what it likes."""
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(stream, {"shape": shape, "fortran_order": False, "descr": descr})
+    return stream.getvalue() + content
+
+
+def zipped(path, members):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, content in members:
+            file.writestr(name, content)
+    return path
+
+
+def test_arrays_come_back_as_they_were_in_one_type_and_order(tmp_path):
+    ranges = np.asfortranarray(np.arange(6.0).reshape(3, 2)).astype(">f4")
+    path = npz(tmp_path / "a.npz", ranges=ranges, extra=np.array([1 + 2j]), some=np.array([True]), word="naïve")
+    found = read_archive(path, LAYOUT, {"some": "bool n", "none": "int", "word": "text"})
+    assert found.keys() == {"ranges", "time", "some", "word"}
+    np.testing.assert_array_equal(found["ranges"], ranges)
+    assert {found[name].dtype for name in LAYOUT} == {np.dtype(np.float64)}
+    assert str(found["word"]) == "naïve"
+    assert read_archive(path.read_bytes(), LAYOUT).keys() == LAYOUT.keys()
+
+
+@pytest.mark.parametrize(
+    ("arrays", "found"),
+    [
+        ({"ranges": np.ones((3, 2, 1))}, r"ranges of shape \(3, 2, 1\), not \(s, k\)"),
+        ({"time": np.float64(3)}, r"time of shape \(\), not \(s\)"),
+        ({"time": np.arange(4)}, "where s is 3"),
+        ({"time": np.array(["a", "b", "c"])}, "time of type <U1, not float"),
+        ({"time": np.array([1j, 2j, 3j])}, "time of type complex128"),
+        ({"time": np.array([b"1", b"2", b"3"])}, r"time of type \|S1"),
+        ({"time": np.array([object()] * 3)}, "time of type object"),
+        ({"time": np.array([(1, 2)] * 3, dtype="i4,i4")}, "time of type"),
+        ({"time": np.array(["2020-01-01"] * 3, dtype="M8[D]")}, "time of type datetime64"),
+        ({"time": np.array([2**63] * 3, dtype=np.uint64)}, None),
+    ],
+)
+def test_another_layout_is_told(tmp_path, arrays, found):
+    path = npz(tmp_path / "a.npz", **arrays)
+    if found is None:
+        assert read_archive(path, LAYOUT)["time"][0] == 2.0**63
+        with pytest.raises(ArchiveError, match="beyond 64 bits"):
+            read_archive(path, {"time": "int s"})
+    else:
+        with pytest.raises(ArchiveError, match=found):
+            read_archive(path, LAYOUT)
+
+
+def test_nothing_is_unpickled(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return (os.mkdir, (str(tmp_path / "sprung"),))
+
+    path = npz(tmp_path / "a.npz", other=np.array([Trap()], dtype=object))
+    assert read_archive(path, LAYOUT).keys() == LAYOUT.keys()
+    with pytest.raises(ArchiveError, match="other of type object"):
+        read_archive(path, LAYOUT, others="float")
+    assert not (tmp_path / "sprung").exists()
+
+
+def test_sizes_are_judged_by_the_headers_alone(tmp_path, monkeypatch):
+    huge = zipped(tmp_path / "a.npz", [("ranges.npy", member((10**9, 10**9))), ("time.npy", member((10**9,)))])
+    with pytest.raises(ArchiveError, match="more than 1024 MiB"):
+        read_archive(huge, LAYOUT)
+    bomb = zipped(tmp_path / "b.npz", [("time.npy", member((3,), bytes(10**7)))])
+    with pytest.raises(ArchiveError, match="other contents than its header says"):
+        read_archive(bomb, {"time": "float s"})
+    short = zipped(tmp_path / "c.npz", [("time.npy", member((3,), bytes(23)))])
+    with pytest.raises(ArchiveError, match="other contents than its header says"):
+        read_archive(short, {"time": "float s"})
+    monkeypatch.setattr(archive, "LIMIT_BYTES", 100)
+    with pytest.raises(ArchiveError, match="more than"):
+        read_archive(npz(tmp_path / "d.npz"), LAYOUT)
+
+
+@pytest.mark.parametrize("shape", [(-1,), "(" * 5000, (2**70,), ("a",), None], ids=lambda s: repr(s)[:9])
+def test_absurd_headers_are_told(tmp_path, shape):
+    if isinstance(shape, str):
+        text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}".ljust(6000).encode()
+    else:
+        text = repr({"descr": "<f8", "fortran_order": False, "shape": shape}).ljust(200).encode()
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    with pytest.raises(ArchiveError):
+        read_archive(zipped(tmp_path / "a.npz", [("time.npy", content)]), {"time": "float s"})
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_what_is_no_archive_of_arrays_is_told(tmp_path):
+    whole = npz(tmp_path / "whole.npz").read_bytes()
+    np.save(tmp_path / "one.npy", np.arange(3))
+    broken = bytearray(whole)
+    broken[60] ^= 0xFF
+    contents = {
+        "empty": b"",
+        "text": b"not an archive",
+        "array": (tmp_path / "one.npy").read_bytes(),
+        "short": whole[: len(whole) // 2],
+        "broken": bytes(broken),
+    }
+    for content in contents.values():
+        with pytest.raises(ArchiveError):
+            read_archive(content, LAYOUT)
+    with pytest.raises(ArchiveError, match="time twice"):
+        read_archive(zipped(tmp_path / "a.npz", [("time.npy", member((0,)))] * 2), {"time": "float s"})
+    with pytest.raises(ArchiveError, match="no ranges"):
+        read_archive(zipped(tmp_path / "b.npz", [("time.npy", member((0,)))]), LAYOUT)
+    os.mkfifo(tmp_path / "pipe")
+    for place in (tmp_path, tmp_path / "pipe", tmp_path / "nowhere"):
+        with pytest.raises(OSError, match=r"folder|plain|No such"):
+            read_archive(place, LAYOUT)
+
+
+def test_an_archive_without_its_first_bytes_is_told(tmp_path):
+    path = npz(tmp_path / "a.npz")
+    path.write_bytes(path.read_bytes()[62:])
+    with pytest.raises(ArchiveError, match="no archive of arrays"):
+        read_archive(path.read_bytes(), LAYOUT)
+    with pytest.raises(OSError, match="Invalid argument"):
+        read_archive(path, LAYOUT)

@@ -1,0 +1,239 @@
+"""What the beams of many scans say of a bend that none of them shows, and what the map makes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.estimation.backend import Belief
+from slam.extraction.extract import extract
+from slam.geometry.poses import compose, inverse
+from slam.map.change_points import Kink, Kinks, KinksConfig, _places, _turns
+from slam.mapper import Mapper, MapperConfig
+from slam.robot import Odometry, Scan
+
+SIGMA_M = 0.01
+WALL = 7
+
+
+def bent(turn_rad, at_m=0.0, half_m=6.0):
+    """Return the faces of a wall along y = 0, free side below, which turns at `at_m`."""
+    bend, end = np.array([at_m, 0.0]), half_m - at_m
+    return np.array([[[half_m, -end * np.tan(turn_rad)], bend], [bend, [-half_m, 0.0]]])
+
+
+def scans(faces, poses, rng, sigma_m=SIGMA_M):
+    """Yield noisy scans from poses; the noise stated is 10 mm."""
+    finder = RangeFinder(faces, LidarConfig())
+    for k, pose in enumerate(poses):
+        ranges = finder.cast(pose)[0]
+        noise = sigma_m * rng.standard_normal(len(ranges)) if sigma_m else 0.0
+        yield Scan(finder.bearings_rad, ranges + noise, SIGMA_M, 4.0, 0.1 * k)
+
+
+def belief_of(pose):
+    """Return a belief in one wall along y = 0, free side below, anchored at the origin."""
+    line = np.array([[np.pi / 2, 0.0]])
+    return Belief(pose, np.eye(3), np.array([WALL]), np.zeros((1, 2)), line, lambda ids: None)
+
+
+def seen(kinks, pose, scan):
+    """Show a scan to the sums, every segment of five beams or more as one of the wall; return its segments, too."""
+    segments = extract(scan)
+    rows = np.flatnonzero(~segments.is_tentative)
+    return segments, kinks.see(belief_of(pose), scan, segments, np.stack([rows, np.full(len(rows), WALL)], axis=-1))
+
+
+def random_poses(rng, count):
+    """Return poses before the wall, 0.5 to 2.5 m from it and up to 3 m along it."""
+    return np.column_stack([rng.uniform(-3, 3, count), rng.uniform(-2.5, -0.5, count), rng.uniform(-3, 3, count)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_turn_at_a_place_is_that_of_a_dense_least_squares(seed):
+    """Of three walls at once, the second of which was not seen; far from their anchors."""
+    rng = np.random.default_rng(seed)
+    of, place_of = np.repeat([0, 2], [40, 25]), np.repeat([0, 2], [3, 2])
+    along = np.concatenate([np.sort(rng.uniform(28, 32, 40)), np.sort(rng.uniform(-9, -7, 25))])
+    sigma = rng.uniform(0.005, 0.02, 65)
+    across, places = sigma * rng.standard_normal(65), np.array([28.9, 30.0, 30.7, -8.5, -7.4])
+    information, sums = _turns(along, across, sigma, of, places, place_of, 1)
+    for k, place in enumerate(places):
+        ours = of == place_of[k]
+        turned = np.maximum(along[ours] - place, 0.0)
+        A = np.stack([np.ones(len(turned)), along[ours], turned], axis=-1) / sigma[ours, None]
+        expected = np.linalg.lstsq(A, across[ours] / sigma[ours], rcond=None)[0]
+        np.testing.assert_allclose(sums[k] / information[k], expected[2], rtol=1e-6)
+        np.testing.assert_allclose(1.0 / information[k], np.linalg.inv(A.T @ A)[2, 2], rtol=1e-6)
+
+
+def test_places_lie_between_the_first_and_the_last_beam_of_each_wall():
+    place, of = _places(np.array([-0.6, 0.1, 0.55, 0.26, 0.3, 1.2, 1.25]), np.array([0, 0, 0, 2, 2, 5, 5]), 7, 0.25)
+    np.testing.assert_array_equal(of, [0, 0, 0, 0, 0])
+    np.testing.assert_array_equal(place, [-2, -1, 0, 1, 2])
+
+
+def test_a_lone_beam_at_a_place_itself_has_none():
+    place, of = _places(np.array([45.0, -0.1, 0.1]), np.array([0, 1, 1]), 2, 0.25)
+    np.testing.assert_array_equal(of, [1])
+    np.testing.assert_array_equal(place, [0])
+
+
+@pytest.mark.parametrize("turn_deg", [0.4, 0.7, -0.7])
+def test_a_bend_that_no_scan_shows_is_found_where_it_is(turn_deg):
+    """Whatever the robot believes its heading to be, and whether the noise that is stated is there or not."""
+    rng = np.random.default_rng(3)
+    for sigma_m, heading_error in ((SIGMA_M, 0.0), (SIGMA_M, 0.02), (0.0, 0.0)):
+        kinks, poses = Kinks(), random_poses(rng, 400)
+        for pose, scan in zip(poses, scans(bent(np.deg2rad(turn_deg), 0.4), poses, rng, sigma_m), strict=True):
+            if len(extract(scan)) > 1:
+                continue
+            _, kink = seen(kinks, pose + np.array([0.0, 0.0, heading_error]), scan)
+            if kink is not None:
+                break
+        assert kink is not None
+        assert abs(kink.turn_rad - np.deg2rad(turn_deg)) < 4.0 * kink.sigma_rad
+        along = pose[0] - pose[1] / np.tan(pose[2] + kink.bearing_rad)
+        assert along == pytest.approx(0.4, abs=0.6)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_straight_wall_never_bends(seed):
+    rng = np.random.default_rng(seed)
+    kinks, poses = Kinks(KinksConfig(sigmas=5.0)), random_poses(rng, 700)
+    for pose, scan in zip(poses, scans(bent(0.0), poses, rng), strict=True):
+        assert seen(kinks, pose, scan)[1] is None
+
+
+@pytest.mark.parametrize("heading", [1.5, -1.6, 3.1])
+def test_the_scan_cut_at_the_bend_has_a_side_before_and_one_after(heading):
+    """Also where the wall lies across the scan's seam; a piece that stands alone has no neighbour."""
+    pose = np.array([0.2, -1.2, heading])
+    (scan,) = scans(bent(np.deg2rad(0.2)), [pose], np.random.default_rng(1), 0.0)
+    segments = extract(scan)
+    bearing = np.arctan2(1.2, -0.2) - heading
+    pieces = extract(scan, bends_rad=np.array([bearing]))
+    kinks, kink = Kinks(), Kink(WALL, 0, bearing, 0.0, np.deg2rad(0.2), np.deg2rad(0.03))
+    before, after = kinks.sides_of(kink, segments, pieces, scan)
+    assert sorted([before, after]) == [0, 1] == list(range(len(pieces)))
+    one, other = pieces.ends[[before, after]].mean(axis=1)
+    assert one[0] * other[1] - one[1] * other[0] > 0, "counter-clockwise"
+    assert kinks.sides_of(kink, segments, pieces.take(np.array([0])), scan) is None
+    assert kinks.sides_of(replace(kink, turn_rad=np.deg2rad(8.0)), segments, pieces, scan) is None, "not that turn"
+
+
+@pytest.mark.parametrize(("rules", "is_bend"), [(KinksConfig(), False), (KinksConfig(ends=0, least_beams=1), True)])
+def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_bend):
+    """In cml_Vipiteno2 44 beams of a wall of 7 m and one of a face of 0.1 m made a turn of 19 degrees of six sigmas."""
+    kinks, found = Kinks(rules), False
+    poses = np.column_stack([np.linspace(1.0, 0.0, 60), np.full(60, -1.0), np.zeros(60)])
+    for pose, scan in zip(poses, scans(bent(0.0), poses, np.random.default_rng(5), 0.0), strict=True):
+        segments = extract(scan)
+        last = segments.beams[0, 1]
+        ranges = scan.ranges_m.copy()
+        ranges[last] += 0.03
+        taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
+        found |= kinks.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
+    assert found == is_bend
+
+
+@pytest.mark.parametrize(("turn_deg", "is_bend"), [(0.05, False), (0.1, False), (0.3, True), (8.0, True)])
+def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg, is_bend):
+    """However sure the turn is after 1,500 scans from one place, all taken for one straight wall."""
+    pose, kinks, found = np.array([0.0, -1.0, 0.0]), Kinks(), False
+    straight, bending = (next(scans(bent(np.deg2rad(turn)), [pose], None, 0.0)) for turn in (0.0, turn_deg))
+    segments = extract(straight)
+    for _ in range(1500):
+        found |= kinks.see(belief_of(pose), bending, segments, np.array([[0, WALL]])) is not None
+        if found:
+            break
+    assert found == is_bend
+
+
+def test_pairs_are_renamed_when_entries_are_merged():
+    kinks = Kinks()
+    kinks.keep_apart(9, 4)
+    assert kinks.cut == {(4, 9)}
+    kinks.merge(2, 9)
+    assert kinks.cut == {(2, 4)}
+    kinks.forget([4])
+    assert not kinks.cut
+    kinks.keep_apart(1, 2)
+    kinks.merge(1, 2)
+    assert not kinks.cut
+
+
+def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, away_m=1.0):
+    """Drive along a bent wall and back, exact wheels; return the update of each step."""
+    way = np.concatenate([np.linspace(-4, 4, steps // 2), np.linspace(4, -4, steps - steps // 2)])
+    poses = np.column_stack([way, np.full(steps, -away_m), np.zeros(steps)])
+    mapper = Mapper(BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), MapperConfig(kinks=kinks))
+    updates = []
+    for k, scan in enumerate(scans(bent(turn_rad), poses, np.random.default_rng(seed), sigma)):
+        if k:
+            motion = compose(inverse(poses[k - 1]), poses[k])
+            mapper.predict(Odometry(motion, np.diag([0.01, 0.01, np.deg2rad(1.0)]) ** 2))
+        updates.append(mapper.step(scan))
+    return updates
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_a_wall_that_bends_becomes_two_and_stays_two(backend):
+    turn = np.deg2rad(0.8)
+    updates = drive(KinksConfig(), turn, backend)
+    walls = updates[-1].map
+    assert len(walls) == 2
+    first = next(k for k, update in enumerate(updates) if len(update.map) == 2)
+    assert all(len(update.map) == 2 for update in updates[first:])
+    alpha = walls.belief.means[:, 0]
+    assert abs(alpha[0] - alpha[1]) == pytest.approx(turn, abs=np.deg2rad(0.1))
+    assert max(update.map.belief.pose_world[2] for update in updates[first + 15 :]) < np.deg2rad(0.45)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_sides_of_a_bend_never_overlap(seed):
+    """Each fits, within the noise, a piece of the other."""
+    updates = drive(KinksConfig(), np.deg2rad(0.6), steps=300, sigma=0.01, seed=seed)
+    last = updates[-1].map
+    one, other = np.sort(last.ends_world[..., 0], axis=-1)[np.argsort(last.ends_world[..., 0].min(axis=-1))]
+    assert -0.5 < one[1] < 0.5
+    assert abs(other[0] - one[1]) < 0.06
+
+
+@pytest.mark.parametrize("away_m", [2.5, 3.0])
+def test_a_bend_that_only_many_scans_together_show_makes_two_walls_of_one(away_m):
+    """From so far one line fits both sides in every scan; without the sums over the scans they stay one wall."""
+    turn = np.deg2rad(0.5)
+    updates = drive(KinksConfig(), turn, steps=120, sigma=0.01, away_m=away_m)
+    assert len(updates[15].map) == 1
+    first = next(k for k, update in enumerate(updates) if len(update.map) == 2)
+    assert all(len(update.map) == 2 for update in updates[first:])
+    alpha = updates[-1].map.belief.means[:, 0]
+    assert abs(alpha[0] - alpha[1]) == pytest.approx(turn, abs=np.deg2rad(0.25))
+
+
+def test_a_straight_wall_stays_one_and_no_number_is_changed():
+    off, on = (drive(kinks, 0.0)[-1].map for kinks in (KinksConfig(sigmas=np.inf), KinksConfig()))
+    assert len(on) == 1
+    np.testing.assert_array_equal(on.belief.means, off.belief.means)
+    np.testing.assert_array_equal(on.extents, off.extents)
+
+
+def test_sums_of_what_exact_lines_say_do_not_depend_on_how_a_wall_was_grown_along():
+    """Sightings at places before and after those known before are added where they belong."""
+    kinks, rng = Kinks(), np.random.default_rng(2)
+    for first, count in ((3, 4), (-2, 3), (0, 12), (-4, 1)):
+        terms = rng.uniform(size=(2, count))
+        before = {place: kinks_at(kinks, place) for place in range(first, first + count)}
+        now = kinks._add_to(WALL, first, terms)
+        for k, place in enumerate(range(first, first + count)):
+            np.testing.assert_allclose(now[:, k], before[place] + terms[:, k])
+            np.testing.assert_allclose(kinks_at(kinks, place), before[place] + terms[:, k])
+
+
+def kinks_at(kinks, place):
+    """Return the sums of the wall at one place."""
+    begin, sums = kinks._sums.get(WALL, (0, np.zeros((2, 0))))
+    return sums[:, place - begin].copy() if begin <= place < begin + sums.shape[1] else np.zeros(2)

@@ -1,0 +1,178 @@
+"""What becomes of a wall's extent, and of the wall, scan by scan: corners before its end, beams that others take."""
+
+import numpy as np
+import pytest
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.estimation.backend import Belief, Joint
+from slam.extraction.extract import extract
+from slam.geometry.lines import normals, through
+from slam.map.extents import Walls, WallsConfig
+from slam.robot import Scan
+
+CONFIG = WallsConfig()
+
+
+def belief_of(faces, pose):
+    """Return a belief in the lines of these faces (free side on the left), anchored in their middles."""
+    faces = np.asarray(faces, dtype=float)
+    lines, anchors = through(faces), faces.mean(axis=1)
+    means = np.column_stack([lines[:, 0], lines[:, 1] - np.vecdot(normals(lines[:, 0]), anchors)])
+    mean = np.concatenate([pose, means.ravel()])
+    return Belief(
+        np.asarray(pose), 1e-6 * np.eye(3), np.arange(len(faces)), anchors, means,
+        lambda ids: Joint(mean, 1e-6 * np.eye(len(mean)), anchors),
+    )  # fmt: skip
+
+
+def scan_of(faces, pose):
+    finder = RangeFinder(np.asarray(faces, dtype=float).reshape(-1, 2, 2), LidarConfig())
+    return Scan(finder.bearings_rad, finder.cast(np.asarray(pose))[0], 0.01, 4.0, 0.0)
+
+
+def see(walls, known, shown, owners, pose):
+    """Let the walls, lines through the faces `known`, see a scan of the faces `shown`; return the ids forgotten."""
+    scan = scan_of(shown, pose)
+    segments = extract(scan)
+    assert len(segments) == len(owners)
+    forgotten = walls.see(
+        belief_of(known, pose), scan, segments, np.array(owners, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    )
+    return forgotten.tolist()
+
+
+BEFORE_BEND = [[0.0, 0.0], [2.0, 0.0]]
+BEYOND_BEND = [[2.0, 0.0], [3.5, 0.26]]
+TAKEN_FOR_STRAIGHT = [[0.0, 0.0], [2.6, 0.0]]
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_end_past_a_corner_moves_back_once_two_scans_in_turn_show_the_next_wall_there(mirrored):
+    """From afar the two sides of a bend of 10 degrees are one wall, which then reaches 0.6 m past the corner."""
+
+    def laid(face):
+        return [[3.5 - x, y] for x, y in reversed(face)] if mirrored else face
+
+    pose = [1.7 if mirrored else 1.8, 1.0, 0.0]
+    before, beyond, straight = laid(BEFORE_BEND), laid(BEYOND_BEND), laid(TAKEN_FOR_STRAIGHT)
+    both, owners = ([beyond, before], [1, 0]) if mirrored else ([before, beyond], [0, 1])
+    side, outward = (0, -1.0) if mirrored else (1, 1.0)
+
+    def reaches_past(walls):
+        end = walls.map(belief_of([before, beyond][: len(walls._ids)], pose)).ends_world[0, side]
+        return outward * (end - before[side])[0]
+
+    walls = Walls()
+    see(walls, [before], [straight], [0], pose)
+    assert reaches_past(walls) > 0.4
+    see(walls, [before, beyond], both, owners, pose)
+    assert reaches_past(walls) > 0.4
+    see(walls, [before, beyond], [straight], [0], pose)  # in between one scan shows none: the count begins anew
+    see(walls, [before, beyond], both, owners, pose)
+    assert reaches_past(walls) > 0.4
+    see(walls, [before, beyond], both, owners, pose)
+    assert abs(reaches_past(walls)) < 0.02
+
+
+WALL, BEHIND = [[2.0, -1.0], [2.0, 1.0]], [[2.05, -1.0], [2.05, 1.0]]
+"""Seen from the origin."""
+
+
+@pytest.mark.parametrize(("sightings", "claimed_after"), [(1, CONFIG.claims), (5, CONFIG.claims), (10, None)])
+def test_a_wall_all_of_whose_beams_another_takes_is_forgotten_unless_it_was_seen_often(sightings, claimed_after):
+    pose, walls = [0.0, 0.0, 0.0], Walls()
+    for _ in range(CONFIG.established_sightings):
+        see(walls, [WALL], [WALL], [0], pose)
+    for _ in range(sightings):
+        assert see(walls, [WALL, BEHIND], [BEHIND], [1], pose) == []
+    known = [WALL, BEHIND]
+    forgotten = [see(walls, known, [WALL], [0], pose) for _ in range(CONFIG.claims)]
+    assert forgotten == [[]] * (CONFIG.claims - 1) + [[] if claimed_after is None else [1]]
+
+
+def test_a_wall_seen_in_between_is_not_claimed():
+    pose, walls = [0.0, 0.0, 0.0], Walls()
+    see(walls, [WALL], [WALL], [0], pose)
+    for _ in range(4):
+        assert see(walls, [WALL, BEHIND], [BEHIND], [1], pose) == []
+        for _ in range(CONFIG.claims - 1):
+            assert see(walls, [WALL, BEHIND], [WALL], [0], pose) == []
+
+
+FRONT = [[1.0, -1.0], [1.0, 1.0]]
+"""Seen from the origin by a beam every 3.5 to 7 cm."""
+ELSEWHERE = [[-4.0, -1.0], [-2.0, -1.0]]
+ORIGIN, AWAY = [0.0, 0.0, 0.0], [-3.5, 0.0, 0.0]
+"""From `AWAY` the wall in front is out of range."""
+
+
+def extent_of(walls, known, pose=ORIGIN):
+    """Return from where to where along y the first wall reaches, m."""
+    return walls.map(belief_of(known, pose)).ends_world[0, :, 1].tolist()
+
+
+@pytest.mark.parametrize("sightings", [1, 2])
+def test_a_wall_seen_once_is_tentative_and_forgotten_when_it_is_not_seen_again(sightings):
+    walls = Walls()
+    for _ in range(sightings):
+        see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    assert walls.map(belief_of([FRONT], ORIGIN)).tentative.tolist() == [sightings < 2]
+    forgotten = [see(walls, [FRONT, ELSEWHERE], [ELSEWHERE], [1], AWAY) for _ in range(CONFIG.patience_steps + 1)]
+    assert forgotten == [[]] * CONFIG.patience_steps + [[0] if sightings < 2 else []]
+
+
+def with_a_hole(low, high):
+    """Return the wall in front with a hole from `low` to `high` along it, m."""
+    return [[[1.0, -1.0], [1.0, low]], [[1.0, high], [1.0, 1.0]]]
+
+
+def test_a_wall_is_cut_back_to_its_last_hit_once_two_scans_in_turn_show_beams_behind_it():
+    walls = Walls()
+    see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    whole = extent_of(walls, [FRONT])
+    for _ in range(2):  # what one scan shows, and the next does not, is a fault of it
+        see(walls, [FRONT], with_a_hole(0.3, 0.9), [0], ORIGIN)
+        assert extent_of(walls, [FRONT]) == whole
+        see(walls, [FRONT], [FRONT], [0], ORIGIN)
+    for _ in range(2):
+        see(walls, [FRONT], with_a_hole(0.3, 0.9), [0], ORIGIN)
+    low, high = extent_of(walls, [FRONT])
+    assert low == whole[0]
+    assert 0.25 < high <= 0.3
+
+
+@pytest.mark.parametrize(
+    "shown", [with_a_hole(0.02, 0.05), [[[1.0, -1.0], [1.0, 0.86]]]], ids=["one beam through it", "its end is nearer"]
+)
+def test_a_lone_beam_or_some_beside_its_end_cut_no_wall(shown):
+    """Two beams pass within 0.1 m of the end: ends and corners are known no better."""
+    walls, pose = Walls(), [0.0, 0.8, 0.0]
+    see(walls, [FRONT], [FRONT], [0], pose)
+    whole = extent_of(walls, [FRONT], pose)
+    for _ in range(4):
+        see(walls, [FRONT], shown, [0], pose)
+    assert extent_of(walls, [FRONT], pose) == whole
+
+
+def test_a_corner_seen_more_sharply_moves_the_end_back():
+    """From 2 m, at a grazing angle, beams stand 0.2 m apart on the wall: its corner is known no better."""
+    walls, far, near = Walls(), [0.1, 0.5, 0.0], [1.6, 0.5, 0.0]
+    side = [[2.0, 0.0], [2.0, 1.5]]
+    see(walls, [BEFORE_BEND], [[[0.0, 0.0], [2.05, 0.0]], [[2.05, 0.0], [2.05, 1.5]]], [0, -1], far)
+    assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.05, abs=1e-3)
+    see(walls, [BEFORE_BEND], [BEFORE_BEND, side], [0, -1], near)
+    assert walls.map(belief_of([BEFORE_BEND], near)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
+    see(walls, [BEFORE_BEND], [[[0.0, 0.0], [1.95, 0.0]], [[1.95, 0.0], [1.95, 1.5]]], [0, -1], far)
+    assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("length_m", "is_kept"), [(0.04, False), (0.06, True)])
+def test_a_wall_shorter_than_its_ends_are_known_is_none(length_m, is_kept):
+    walls, pose, face = Walls(), [0.8, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
+    scan = scan_of([face], pose)
+    segments = extract(scan)
+    assert len(segments) == 1
+    segments.ends[0, :, 1] = [-0.5 * length_m, 0.5 * length_m]
+    nothing = np.zeros(0, dtype=np.int64)
+    forgotten = walls.see(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64), nothing)
+    assert forgotten.tolist() == ([] if is_kept else [0])

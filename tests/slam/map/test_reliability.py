@@ -1,0 +1,243 @@
+"""Straight walls stay straight whatever the noise; lines laid around corners are found out."""
+
+import numpy as np
+import pytest
+import shapely
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.extraction.extract import extract
+from slam.extraction.segments import Segments
+from slam.geometry.poses import compose, inverse, to_world
+from slam.map.reliability import Firmness, FirmnessConfig, are_clear, as_told
+from slam.mapper import Mapper
+from slam.robot import Odometry, Scan
+
+SIGMA_M = 0.01
+STEPS = shapely.Polygon([
+    (0, 0), (4, 0), (4, 4), (2.16, 4), (2.16, 3.9), (2.11, 3.9), (2.11, 3.84), (2.06, 3.84), (2.06, 3.78),
+    (2.0, 3.78), (2.0, 4), (0, 4),
+])  # fmt: skip
+"""A room with a jamb of steps of 5 cm: at 10 mm of noise a line down the stairs fits the few beams of any one scan."""
+
+
+def faces_of(polygon):
+    polygon = shapely.orient_polygons(polygon)
+    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+
+
+def scans(faces, poses, rng):
+    finder = RangeFinder(faces, LidarConfig())
+    for k, pose in enumerate(poses):
+        ranges, hit = finder.cast(pose)
+        yield (
+            k,
+            Scan(finder.bearings_rad, ranges + SIGMA_M * rng.standard_normal(len(ranges)), SIGMA_M, 4.0, 0.1 * k),
+            hit,
+        )
+
+
+def sighting(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
+    """Return one segment with a direction and how well it is known."""
+    cov = np.diag([sigma_rad**2, 1e-5])[None]
+    ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
+    chi2 = beams - 2.0 if chi2 is None else chi2
+    return Segments(np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none, np.array([chi2]))
+
+
+OWNER = np.array([0])
+POSE = np.zeros(3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_real_scans_of_straight_walls_make_no_wall_crooked(seed):
+    """Faces from 0.1 m to 4 m, seen 120 times from everywhere, each segment given to the face of its middle beam."""
+    rng = np.random.default_rng(seed)
+    blocks = [shapely.box(x, y, x + w, y + h) for x, y, w, h in rng.uniform([1, 1, 0.1, 0.1], [3, 3, 0.7, 0.7], (2, 4))]
+    room = shapely.box(0, 0, 4, 4).difference(shapely.union_all(blocks))
+    faces = faces_of(room)
+    places = rng.uniform(0, 4, (500, 2))
+    places = places[shapely.contains_xy(room.buffer(-0.25), places[:, 0], places[:, 1])][:120]
+    poses = np.column_stack([places, rng.uniform(-np.pi, np.pi, len(places))])
+    firmness = Firmness()
+    for k, scan, hit in scans(faces, poses, rng):
+        segments = extract(scan)
+        first, last = segments.beams.T
+        beams = len(scan.ranges_m)
+        runs = [hit[np.arange(a, b + 1 + beams * (b < a)) % beams] for a, b in segments.beams]
+        pure = np.array([len(set(run)) == 1 for run in runs], dtype=bool)
+        middle = (first + (last - first) % beams // 2) % beams
+        firmness.see(segments, np.where(pure & ~segments.is_tentative, hit[middle], -1), poses[k])
+    assert not firmness.are_crooked(np.arange(len(faces))).any()
+
+
+def test_a_clear_sighting_far_from_all_vague_ones_gives_the_wall_away():
+    """A wall's end of 7 cm: 35 looks know its direction to 10 degrees each; one took in a beam of the next face."""
+    rng = np.random.default_rng(1)
+    for off, crooked in ((np.deg2rad(-31.0), True), (np.deg2rad(-8.0), False)):
+        firmness = Firmness()
+        for _ in range(35):
+            firmness.see(sighting(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, POSE)
+        firmness.see(sighting(off, np.deg2rad(2.8)), OWNER, POSE)
+        assert firmness.are_crooked(OWNER).tolist() == [crooked]
+
+
+def test_directions_are_those_in_the_world_across_the_cut_at_half_a_turn():
+    rng = np.random.default_rng(2)
+    firmness = Firmness()
+    for _ in range(60):
+        heading = rng.uniform(-np.pi, np.pi)
+        vague, clear = np.deg2rad(8.0), np.deg2rad(2.0)
+        firmness.see(
+            sighting(np.pi - heading + vague * rng.standard_normal(), vague), OWNER, np.array([0.0, 0.0, heading])
+        )
+        firmness.see(
+            sighting(np.pi - heading + clear * rng.standard_normal(), clear), OWNER, np.array([0.0, 0.0, heading])
+        )
+    assert not firmness.are_crooked(OWNER).any()
+
+
+def test_fits_that_are_a_little_bad_every_time_tell_after_a_while():
+    firmness = Firmness()
+    told = []
+    for _ in range(60):
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=16.0), OWNER, POSE)
+        told.append(bool(firmness.are_crooked(OWNER)[0]))
+    assert not told[2]
+    assert told[-1]
+    for _ in range(2000):
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=11.0), np.array([1]), POSE)
+    assert not firmness.are_crooked(np.array([1]))[0], "a tenth too much is what real walls show"
+
+
+def test_a_wall_never_seen_is_not_crooked():
+    assert Firmness().are_crooked(np.array([3])).tolist() == [False]
+
+
+def test_clear_are_many_beams_and_a_known_direction():
+    config = FirmnessConfig()
+    assert are_clear(sighting(0.0, 0.5 * config.heading_rad)).all()
+    assert not are_clear(sighting(0.0, 2.0 * config.heading_rad)).any()
+    assert not are_clear(sighting(0.0, 0.01, beams=4)).any()
+
+
+def test_a_line_laid_down_the_stairs_is_found_out_and_moves_nothing_more():
+    """Passing to and fro before the steps: what the map says of the jamb, and which walls still move the estimate."""
+    rng = np.random.default_rng(3)
+    x = 2.08 + 0.5 * np.sin(np.linspace(0, 8 * np.pi, 160))
+    poses = np.column_stack([x, 3.2 + 0.1 * np.cos(np.linspace(0, 6 * np.pi, 160)), np.full(160, 0.5 * np.pi)])
+    backend = BACKENDS["full-ekf"].make(poses[0].copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
+    moved: list[set[int]] = []
+    update = backend.update
+
+    def overheard(first, second):
+        moved.append(set(second.ids.tolist()))
+        update(first, second)
+
+    backend.update = overheard
+    mapper = Mapper(backend)
+    crooked: list[set[int]] = []
+    for k, scan, _ in scans(faces_of(STEPS), poses, rng):
+        if k:
+            mapper.predict(Odometry(compose(inverse(poses[k - 1]), poses[k]), np.diag([0.003, 0.003, 0.002]) ** 2))
+        walls = mapper.step(scan).map
+        crooked.append(set(walls.ids[walls.crooked].tolist()))
+    assert crooked[-1]
+    assert len(crooked[-1]) < 5, "the four walls of the room are straight"
+    for before, ids in zip(crooked[:-1], moved[1:], strict=True):
+        assert not before & ids
+
+
+def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction():
+    firmness, few = Firmness(), sighting(0.0, 0.01, beams=3)
+    assert not firmness.may_move(few, OWNER).any(), "of this wall nothing is known"
+    for _ in range(200):
+        firmness.see(sighting(0.0, 0.12, beams=6), OWNER, POSE)
+    assert not firmness.may_move(few, OWNER).any(), "only vague sightings"
+    firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
+    assert not firmness.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
+    assert firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).all()
+    for _ in range(5):
+        firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
+    assert firmness.may_move(few, OWNER).all()
+    assert not firmness.may_move(sighting(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
+    for _ in range(300):
+        firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
+    assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
+    assert not firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).any()
+
+
+def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
+    """Refused, the only wall in sight cost 8 degrees of heading in 3.5 m; its bend is one."""
+    firmness, straight = Firmness(), 1
+    for _ in range(60):
+        firmness.see(sighting(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, POSE)
+        firmness.see(sighting(0.0, 0.02, beams=8), np.array([straight]), POSE)
+    assert firmness.are_crooked(np.array([0, straight])).tolist() == [True, False]
+    long, short = (sighting(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
+    assert firmness.may_move(long, OWNER).tolist() == [True]
+    assert firmness.may_move(short, OWNER).tolist() == [False]
+    both = long.take(np.array([0, 0]))
+    assert firmness.may_move(both, np.array([0, straight])).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("middle_m", [0.5, -1.0])
+def test_beside_a_clear_sighting_few_beams_tell_their_distance_at_their_middle_and_no_direction(middle_m):
+    """A line that beams met `middle_m` along it from the foot of the robot's perpendicular."""
+    to_robot = np.array([[1.0, 0.0], [middle_m, 1.0]])  # (alpha, across at the middle) to (alpha, r)
+    cov = to_robot @ np.diag([1e-6, 4e-6]) @ to_robot.T
+    wide, clear = as_told(np.stack([cov, cov]), np.array([True, False]))
+    at_middle = np.linalg.inv(to_robot)
+    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + np.deg2rad(3.0) ** 2, 4e-6]), atol=1e-12)
+    np.testing.assert_array_equal(clear, cov)
+    np.testing.assert_array_equal(as_told(cov[None], np.array([True])), cov[None], "alone it is all that there is")
+
+
+def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():
+    """Three exact beams over a bend of 5 degrees are a line, known to 0.16 degrees and 0.75 off (0.6 in heading)."""
+    faces = np.array([[[0.0, 0.0], [3.0, 0.0]], [[3.0, 0.0], [4.0, 0.09]], [[8.5, 0.3], [8.5, 1.3]]])
+    finder = RangeFinder(faces, LidarConfig())
+    poses = np.array([[4.6, 1.0, 0.1 * k] for k in range(10)] + [[5.8, 0.69, 1.0]])
+    mapper = Mapper(BACKENDS["full-ekf"].make(poses[0].copy(), 1e-8 * np.eye(3)))
+    for k, pose in enumerate(poses):
+        if k:
+            motion = compose(inverse(poses[k - 1]), pose)
+            mapper.predict(Odometry(motion, np.diag([0.02, 0.02, np.deg2rad(1.0)]) ** 2))
+        update = mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.1 * k))
+    assert 3 in update.segments.beam_counts[update.matches.pairs[:, 0]], "the line over two faces is matched"
+    assert abs(update.map.belief.pose_world[2] - 1.0) < np.deg2rad(0.15)
+
+
+def seen_along(turn_rad, rng, drift_rad=0.0, sigma_rad=0.009):
+    """Return whether a wall is crooked that turns by so much at its middle and is seen piece by piece from 4 m.
+
+    The robot's heading drifts by so much on its way along it.
+    """
+    firmness = Firmness()
+    for share in np.linspace(0.0, 1.0, 40):
+        alpha = turn_rad * (share > 0.5) + drift_rad * share + sigma_rad * rng.standard_normal()
+        heading = rng.uniform(-np.pi, np.pi)
+        piece = sighting(alpha - heading, sigma_rad)
+        middle = np.array([1.0, 3.0 * share])  # the wall x = 1, walked along upwards
+        place = middle - to_world(piece.ends.mean(axis=1), np.array([0.0, 0.0, heading]))[0]
+        firmness.see(piece, OWNER, np.append(place, heading))
+    return bool(firmness.are_crooked(OWNER)[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sides_of_a_bend_seen_one_after_the_other_give_it_away(seed):
+    rng = np.random.default_rng(seed)
+    assert seen_along(np.deg2rad(2.4), rng)
+    assert seen_along(np.deg2rad(-2.4), rng)
+    assert not seen_along(0.0, rng)
+    assert not seen_along(0.0, rng, drift_rad=np.deg2rad(1.0), sigma_rad=np.deg2rad(0.05)), "so much the robot may turn"
+
+
+def test_a_wall_seen_turned_from_one_place_does_not_bend():
+    """Along the wall nothing changes: what differs is the robot's heading."""
+    firmness, rng = Firmness(), np.random.default_rng(7)
+    for k in range(200):
+        off = np.deg2rad(3.0) * (k > 100) + 0.01 * rng.standard_normal()
+        firmness.see(sighting(off, 0.01), OWNER, POSE)
+    assert not firmness.are_crooked(OWNER)[0]

@@ -1,0 +1,254 @@
+"""What the studies of back ends rest on: sightings told wall by wall, noise as stated, rings of corridors."""
+
+import csv
+from dataclasses import replace
+
+import jaxtyping
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.campaign.scores.score import offsets
+from experiments.replays.corridor import FIRM_RAD, Loop, drive, on_ring
+from experiments.replays.oracles import as_stated
+from experiments.replays.recordings import record, recorded
+from experiments.replays.replay import ReplayOptions, replay
+from experiments.replays.sightings import ride, sightings_of, start
+from experiments.reproductions.runs.origin import Study as OriginStudy
+from experiments.reproductions.runs.standing import slope, stand
+from experiments.scenario import TrialConfig, UsageError
+from experiments.trial import run_trial
+from slam.backends import BACKENDS
+from slam.backends.full_ekf import FullEkf
+from slam.estimation.models import innovations
+from slam.geometry.poses import compose, to_world, wrap
+from studies.consistency.bias import Study as BiasStudy
+from studies.consistency.faults import Fault, faulty
+from studies.consistency.heading import Study as HeadingStudy
+from studies.consistency.loops import SCORES, Study
+from studies.runner.study_table import bootstrap
+
+few = settings(max_examples=20, deadline=None, derandomize=True)
+
+
+@pytest.mark.parametrize("perfect", [True, False])
+def test_a_back_end_alone_gets_what_the_mapper_would_hand_it_bit_for_bit(perfect):
+    run = recorded(run_trial(TrialConfig("paper-fig4", seed=4, max_steps=25)))
+    ridden = ride(BACKENDS["full-ekf"].make(run.start_pose.copy(), run.start_cov.copy()), sightings_of(run, perfect))
+    mapped = replay(run, "full-ekf", ReplayOptions("true", perfect))
+    np.testing.assert_array_equal(ridden.estimated_world, mapped.log.estimated_world)
+    np.testing.assert_array_equal(ridden.estimated_cov, mapped.log.estimated_cov)
+    assert ridden.pose_nees.mean() / 3 == pytest.approx(mapped.summary["pose_anees"], rel=1e-9)
+
+
+@few
+@given(seed=st.integers(0, 2**32))
+def test_a_sighting_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
+    """Whitened by the model's own R at the truth, the innovation is the draw, however far off the direction is."""
+    rng = np.random.default_rng(seed)
+    pose, alpha, r = np.array([1.0, -2.0, 0.4]), rng.uniform(-3, 3, 6), rng.uniform(0.5, 4.0, 6)
+    t0, along, across = rng.uniform(-2, 2, 6), rng.uniform(1e-3, 0.15, 6), rng.uniform(1e-3, 0.02, 6)
+    turn = np.tile(np.eye(2), (6, 1, 1))
+    turn[:, 1, 0] = t0
+    cov = turn @ (np.stack([along, across], -1)[..., None] ** 2 * np.eye(2)) @ turn.swapaxes(1, 2)
+    draws = rng.standard_normal((6, 2))
+    seen = as_stated(np.stack([alpha, r], axis=-1), cov, draws)
+    n = np.stack([np.cos(alpha + pose[2]), np.sin(alpha + pose[2])], axis=-1)
+    anchors = pose[:2] + r[:, None] * n
+    model = innovations(pose, anchors, np.stack([alpha + pose[2], np.zeros(6)], axis=-1), seen, cov)
+    white = model.e / np.sqrt(np.diagonal(model.R, axis1=1, axis2=2))
+    facing = np.cos(along * draws[:, 0]) - t0 * np.sin(along * draws[:, 0]) / seen[:, 1] > 0.1
+    np.testing.assert_allclose(white[facing], draws[facing], atol=1e-9)
+
+
+def test_a_recording_is_made_once_and_kept(tmp_path):
+    config = TrialConfig("paper-fig4", seed=2, max_steps=20)
+    new, kept = record(config, tmp_path), record(config, tmp_path)
+    np.testing.assert_array_equal(new.recording.ranges_m, kept.recording.ranges_m)
+    np.testing.assert_array_equal(new.true_poses_world, kept.true_poses_world)
+    (home,) = tmp_path.iterdir()
+    home.rename(tmp_path / home.name.replace("fig4", "fig8"))
+    with pytest.raises(UsageError, match="another"):
+        record(TrialConfig("paper-fig8", seed=2), tmp_path)
+
+
+@pytest.mark.parametrize("length_m", [30.0, 200.0])
+def test_a_ring_closes_smoothly(length_m):
+    way = np.linspace(0.0, length_m, 4001)
+    poses = on_ring(way, length_m)
+    np.testing.assert_allclose(poses[-1] - poses[0], 0.0, atol=1e-9)
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    np.testing.assert_allclose(steps, length_m / 4000, rtol=1e-3)
+    off = poses[:-1, 2] - np.arctan2(*np.diff(poses[:, :2], axis=0).T[::-1])
+    np.testing.assert_allclose(np.sin(0.5 * off), 0.0, atol=0.03)
+
+
+def test_every_back_end_meets_the_same_ring_and_nothing_is_seen_in_the_gap():
+    one, again = drive(Loop(30.0, gap_m=6.0), 7), drive(Loop(30.0, gap_m=6.0), 7)
+    for a, b in zip(one.again, again.again, strict=True):
+        np.testing.assert_array_equal(a.lines, b.lines)
+    seen = np.array([len(a) + len(b) for a, b in zip(one.again, one.first, strict=True)])
+    way = 0.25 * np.arange(len(seen))
+    gap = (way > 24.0) & (way < 30.0)
+    assert not seen[gap].any()
+    assert np.mean(seen[~gap]) > 3
+    assert not len(one.first[-1])
+    assert max(np.sqrt(looks.cov[:, 0, 0].max(initial=0.0)) for looks in one.again) < FIRM_RAD
+
+
+@pytest.fixture
+def _unchecked():
+    """Without the shape checks that pytest adds: they cost more than the filters do."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
+def mean_anees(told, loops=16):
+    """Return each ring's pose ANEES of the invariant filter, from a sure start."""
+    found = []
+    for seed in range(1, loops + 1):
+        seen = drive(Loop(20.0, after_m=5.0), seed)
+        make = BACKENDS["invariant-ekf"].make
+        found.append(ride(make(*start(seed, seen.true_poses_world[0], "zero")), seen.told(told)).pose_nees.mean() / 3)
+    return np.array(found)
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_the_study_has_teeth():
+    """A filter that is told half of the noise is rejected by its interval, and one that is told all of it is not."""
+    honest, fooled = mean_anees(1.0), mean_anees(0.5)
+    print(f"told all {honest.mean():.2f} {bootstrap(honest)}, told half {fooled.mean():.2f} {bootstrap(fooled)}")
+    assert bootstrap(fooled)[0] > 1.15
+    low, high = bootstrap(honest)
+    assert low < 1.15
+    assert high > 0.85
+
+
+def test_a_study_goes_on_where_it_was_left(tmp_path):
+    def study(seeds, backends=("full-ekf", "block-ekf")):
+        Study(backends, (20.0,), gap_m=(0.0,), seeds=seeds, jobs=1, out=tmp_path / "loops.csv").run()
+        return (tmp_path / "loops.csv").read_text().splitlines()
+
+    first = study(1)
+    assert len(first) == 3
+    both = study(2)
+    assert len(both) == 5
+    assert set(first) < set(both)
+    assert study(2) == both
+    assert both[0].endswith(",".join(SCORES))
+    (tmp_path / "loops.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(UsageError, match="another"):
+        study(1)
+
+
+@pytest.mark.parametrize(("p0", "seeds", "least"), [("small", range(1, 9), 1.2), ("large", range(1, 4), 5.0)])
+def test_the_origin_matters_to_lines_that_are_measured_from_it_alone(p0, seeds, least):
+    """Equation (4): the same drives, the world put 100 m away."""
+    study = OriginStudy(length_m=20.0, p0=p0)
+    here, there, apart = study.ridden(FullEkf, True, 1)
+    assert apart < 1e-9
+    assert there == pytest.approx(here, rel=1e-6)
+    found = np.array([study.ridden(FullEkf, False, seed) for seed in seeds])
+    assert found[:, 2].min() > 1e-3
+    here, there, _ = found.mean(axis=0)
+    print(f"pose ANEES measured from the origin: {here:.1f}, with the origin 100 m away {there:.0f}")
+    assert there > least * here
+
+
+def test_a_map_that_has_only_moved_keeps_its_shape():
+    """Offsets of points from their lines: all of a small shift and turn, none once they are undone."""
+    rng = np.random.default_rng(8)
+    lines = np.stack([rng.uniform(-np.pi, np.pi, 9), rng.uniform(1.0, 5.0, 9)], axis=-1)
+    n, t = (
+        np.stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])], -1),
+        np.stack([-np.sin(lines[:, 0]), np.cos(lines[:, 0])], -1),
+    )
+    points = lines[:, 1, None, None] * n[:, None] + np.array([-1.0, 2.0])[:, None] * t[:, None]
+    assert offsets(points, lines) == pytest.approx((0.0, 0.0), abs=1e-12)
+    off, shape = offsets(to_world(points.reshape(-1, 2), np.array([0.02, -0.01, 1e-3])).reshape(-1, 2, 2), lines)
+    assert off > 0.01
+    assert shape < 1e-5
+    points[0] += 0.05 * n[0]
+    assert offsets(points, lines)[1] > 0.005
+
+
+def test_a_fault_changes_what_is_reported_and_nothing_else():
+    run = recorded(run_trial(TrialConfig("paper-fig4", seed=4, max_steps=12)))
+    old = run.recording
+    assert faulty(run, Fault()) is run
+    again = faulty(run, Fault("range-noise", old.sigma_m))
+    np.testing.assert_array_equal(again.recording.ranges_m, old.ranges_m)
+    np.testing.assert_array_equal(again.true_face_of_beam, run.true_face_of_beam)
+    louder = faulty(run, Fault("range-noise", 2 * old.sigma_m)).recording
+    assert louder.sigma_m == 2 * old.sigma_m
+    assert np.nanmax(np.abs(louder.ranges_m - old.ranges_m)) > 2 * old.sigma_m
+    longer = faulty(run, Fault("wheel-scale", 0.1)).recording
+    np.testing.assert_allclose(longer.odometry, 1.1 * old.odometry)
+    bent = faulty(run, Fault("heading", 10.0)).recording.odometry - old.odometry
+    way = np.hypot(*old.odometry[:, :2].T)
+    np.testing.assert_allclose(bent, np.outer(way, [0.0, 0.0, np.deg2rad(10.0)]), atol=1e-15)
+    off = faulty(run, Fault("range", 0.02)).recording.ranges_m - old.ranges_m
+    np.testing.assert_allclose(off[np.isfinite(off)], 0.02, atol=1e-12)
+    with pytest.raises(ValueError, match="expected a fault"):
+        faulty(run, Fault("gravity", 1.0))
+
+
+def test_the_bias_study_sends_every_fault_through_every_back_end(tmp_path, capsys):
+    def study(**more):
+        BiasStudy(
+            world="paper-fig4", seeds=1, backends=("block-ekf", "full-ekf"), faults=("range",), range_m=(0.02,),
+            max_steps=25, jobs=1, out=tmp_path / "bias.csv", recordings=tmp_path / "recordings", **more,
+        ).run()  # fmt: skip
+        with (tmp_path / "bias.csv").open() as file:
+            return {(r["association"], r["fault"], r["backend"]): r for r in csv.DictReader(file)}
+
+    rows = study()
+    assert len(rows) == 4
+    for name in ("block-ekf", "full-ekf"):
+        assert float(rows["true", "range", name]["shape_cm"]) > float(rows["true", "none", name]["shape_cm"])
+    assert "range 20 mm" in capsys.readouterr().out
+    rows = study(association="own")
+    assert len(rows) == 8
+    assert "false matches" in capsys.readouterr().out
+
+
+def test_a_robot_that_turns_back_comes_home_before_it_closes_the_ring():
+    loop = Loop(24.0, homings=2, after_m=4.0)
+    way = loop.way_m
+    assert np.count_nonzero(way == 0.0) == 3
+    np.testing.assert_allclose(np.abs(np.diff(way)), loop.step_m)
+    assert way[loop.closing_step] == 24.0
+    assert way[: loop.closing_step].max() < 24.0
+    seen = drive(loop, 1)
+    moved = np.array([compose(pose, motion) for pose, motion in zip(seen.true_poses_world, seen.odometry[1:])])  # noqa: B905
+    off = moved - seen.true_poses_world[1:]
+    assert np.abs(off[:, :2]).max() < 0.1
+    assert np.abs(wrap(off[:, 2])).max() < 0.05
+    homewards = np.flatnonzero(np.diff(way) < 0)
+    ahead = np.sum((seen.true_poses_world[homewards + 1] - seen.true_poses_world[homewards])[:, :2]
+                   * np.stack([np.cos(h := seen.true_poses_world[homewards, 2]), np.sin(h)], -1), axis=1)  # fmt: skip
+    assert ahead.min() > 0.2
+
+
+def test_the_map_of_anees_is_drawn_from_rows_that_are_kept(tmp_path, capsys):
+    study = HeadingStudy(
+        backends=("full-ekf",), length_m=(20.0,), heading_deg=(0.6, 2.4), homings=(0, 1), seeds=1, jobs=1,
+        out=tmp_path / "heading.csv", picture=tmp_path / "heading.svg",
+    )  # fmt: skip
+    study.run()
+    assert len((tmp_path / "heading.csv").read_text().splitlines()) == 1 + 2 * 2
+    assert (tmp_path / "heading.svg").read_bytes().startswith(b"<?xml")
+    assert "full-ekf, 1 times back, 20 m, 2.4:" in capsys.readouterr().out
+    with pytest.raises(UsageError, match="kind of picture"):
+        replace(study, picture=tmp_path / "heading.bmp").run()
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_standing_still_only_a_consistent_filter_learns_nothing():
+    for name, least in (("invariant-ekf", -1e-12), ("full-ekf", -1.0)):
+        trace, bound = stand(name, "large", 30, 1)
+        assert bound.min() >= least
+        assert (trace[-1] > 1 - 1e-9) == (name == "invariant-ekf")
+    assert slope(stand("block-ekf", "large", 100, 1)[0]) == pytest.approx(-1.1, abs=0.25)

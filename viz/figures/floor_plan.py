@@ -1,0 +1,127 @@
+"""The map as a floor plan in SVG, one unit a metre, which `chainslam explore map.svg` reads as a world again.
+
+What is dark is wall: beside each chain its walls as solid bands, a closed island as a solid block, in the colour of the
+chain. What is light is decoration: the grid, the way of the robot, the rings around open ends.
+"""
+
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+import shapely
+from jaxtyping import Float
+
+from explore.certificate import Certificate
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+
+from .. import palette
+
+WALL_M = 0.1
+MARGIN_M = 0.8
+SCALE = 100
+"""Printed, the plan is this many times smaller than the building."""
+MITRE = 5.0
+WAY, END, BAR = "#B9C3D6", "#FFB77A", "#B8B8B8"
+"""Light enough to be read as decoration."""
+
+
+def floor_plan(
+    walls: StochasticMap,
+    chains: tuple[Chain, ...],
+    certificate: Certificate,
+    path_world: Float[np.ndarray, "s 3"],
+    title: str,
+) -> bytes:
+    """Return the SVG file; its y axis points down, so its world is the map's moved to the view's lower left corner."""
+    bands = [_band(chain, index, walls, certificate) for index, chain in enumerate(chains)]
+    corners = [path_world[:, :2], *(np.reshape(shapely.bounds(band), (2, 2)) for band in bands)]
+    x0, y0 = np.floor(np.min(np.concatenate(corners), axis=0) - MARGIN_M)
+    x1, y1 = np.ceil(np.max(np.concatenate(corners), axis=0) + MARGIN_M)
+    width, height = float(x1 - x0), float(y1 - y0)
+    page = Element(
+        "svg", xmlns="http://www.w3.org/2000/svg", viewBox=f"0 0 {width:g} {height:g}",
+        width=f"{1000 / SCALE * width:g}mm", height=f"{1000 / SCALE * height:g}mm",
+    )  # fmt: skip
+    page.set("data-metres-per-unit", "1")
+    SubElement(page, "title").text = title
+    SubElement(
+        page, "desc"
+    ).text = f"1:{SCALE}, drawn in metres; the lower left corner is ({x0:g}, {y0:g}) of the map, whose y points up"
+    plan = _Plan(page, np.array([x0, y1]))
+    _grid(plan, width, height)
+    plan.line(path_world[:, :2], stroke=WAY, stroke_width="0.03")
+    closed = 0
+    for chain, band in zip(chains, bands, strict=True):
+        colour = palette.CLOSED[closed % len(palette.CLOSED)] if chain.is_closed else palette.OPEN
+        closed += chain.is_closed
+        plan.area(band, fill=colour)
+    for end in certificate.open_ends:
+        ring = plan.circle(end.position_world, 0.2, fill="none", stroke=END, stroke_width="0.05")
+        SubElement(ring, "title").text = f"open end of wall {end.wall}: {end.why}"
+    start = plan.circle(path_world[0, :2], 0.12, id="start", fill="none", stroke=BAR, stroke_width="0.03")
+    start.set("data-heading-deg", f"{np.rad2deg(path_world[0, 2]):.3f}")
+    label = SubElement(page, "text", x="0.2", y=f"{height - 0.2:g}", fill="#8A8A8A")
+    label.set("font-size", "0.35")
+    label.set("font-family", "sans-serif")
+    label.text = f"{title}; grid 1 m"
+    indent(page)
+    return tostring(page, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _band(chain: Chain, index: int, walls: StochasticMap, certificate: Certificate) -> shapely.Geometry:
+    """Return the solid side of a chain: a band beside it, or all of a closed island."""
+    area = next((contour for contour in certificate.contours if contour.chain == index), None)
+    if area is not None and area.is_island:
+        return area.polygon
+    if area is not None:
+        return area.polygon.buffer(WALL_M, join_style="mitre", mitre_limit=MITRE).difference(area.polygon)
+    ends = walls.ends_world[walls.belief.rows(chain.walls)]
+    way = shapely.LineString(np.concatenate([ends[:1, 0], chain.corners_world, ends[-1:, 1]]))
+    # On the right of the way: the free side is on its left.
+    return shapely.make_valid(way.buffer(-WALL_M, single_sided=True, join_style="mitre", mitre_limit=MITRE))
+
+
+def _grid(plan: "_Plan", width: float, height: float) -> None:
+    for x in np.arange(0.0, width + 0.5):
+        plan.straight((x, 0.0), (x, height))
+    for y in np.arange(0.0, height + 0.5):
+        plan.straight((0.0, y), (width, y))
+
+
+class _Plan:
+    """Draws in the map's metres onto a page whose y points down."""
+
+    def __init__(self, page: Element, corner_world: Float[np.ndarray, "2"]) -> None:
+        self._page, self._corner = page, corner_world
+
+    def _on_page(self, points_world: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        return (points_world - self._corner) * [1.0, -1.0]
+
+    def _path(self, points_world: Float[np.ndarray, "n 2"]) -> str:
+        return "M" + " L".join(f"{x:.4f},{y:.4f}" for x, y in self._on_page(points_world))
+
+    def _add(self, tag: str, **attributes: str) -> Element:
+        return SubElement(self._page, tag, {key.replace("_", "-"): value for key, value in attributes.items()})
+
+    def straight(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Draw a line of the grid, given on the page."""
+        (x1, y1), (x2, y2) = start, end
+        self._add(
+            "line", x1=f"{x1:g}", y1=f"{y1:g}", x2=f"{x2:g}", y2=f"{y2:g}", stroke=palette.GRID, stroke_width="0.015"
+        )
+
+    def line(self, points_world: Float[np.ndarray, "n 2"], **attributes: str) -> None:
+        """Draw a line through points."""
+        self._add("path", d=self._path(points_world), fill="none", **attributes)
+
+    def area(self, shape: shapely.Geometry, **attributes: str) -> None:
+        """Fill polygons, their holes left free."""
+        parts = [part for part in shapely.get_parts(shape) if isinstance(part, shapely.Polygon)]
+        rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+        path = " ".join(f"{self._path(shapely.get_coordinates(ring)[:-1])} Z" for ring in rings)
+        self._add("path", d=path, fill_rule="evenodd", **attributes)
+
+    def circle(self, centre_world: Float[np.ndarray, "2"], radius_m: float, **attributes: str) -> Element:
+        """Draw a circle and return it."""
+        x, y = self._on_page(centre_world[None])[0]
+        return self._add("circle", cx=f"{x:.4f}", cy=f"{y:.4f}", r=f"{radius_m:g}", **attributes)

@@ -1,0 +1,266 @@
+"""Pictures of a map, in the manner of the paper's figures: a grid of one metre, open ends circled."""
+
+import warnings
+from dataclasses import dataclass, field
+from io import BytesIO
+from textwrap import wrap
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Ellipse, Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import MultipleLocator
+
+from explore.goal import SetAside
+from slam.map.chains import Chain
+from slam.map.stochastic_map import StochasticMap
+
+from .. import palette
+from ..shapes import ellipses
+from ..text import literal
+
+WALL_M = 0.1
+"""How thick true walls are drawn around the floor, m."""
+MARGIN_M = 0.6
+ROBOT_M = 0.2
+ENLARGED = 10.0
+"""How much ellipses are enlarged that could not be seen else."""
+GRID_ORDER = 1.2
+"""Between the true floor and what is drawn on it."""
+LETTER_INCH = 0.072
+"""Mean width of a letter of the subtitle ..."""
+TITLE_LETTER_INCH = 0.115
+"""... and of the title."""
+LEAST_WIDTH_INCH = 5.0
+LEGEND_INCH = 2.3
+"""Width of a column of the legend."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a picture of a map shows, all in one world frame."""
+
+    map: StochasticMap
+    chains: tuple[Chain, ...]
+    path_world: Float[np.ndarray, "s 3"]
+    """The estimated poses; the first is the start, the last is the robot."""
+    title: str
+    subtitle: str = ""
+    set_aside: tuple[SetAside, ...] = ()
+    true_path_world: Float[np.ndarray, "s 3"] | None = None
+    corners_world: Float[np.ndarray, "c 2"] = field(default_factory=lambda: np.zeros((0, 2)))
+    """Corners whose covariance is known, m."""
+    corner_covs: Float[np.ndarray, "c 2 2"] = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
+    """Rings of the true floor, the exterior first; empty where the truth is not known."""
+
+
+def draw_map(picture: Picture) -> Figure:
+    """Return the picture as a figure of one set of axes."""
+    low, high = _extent(picture)
+    inch_per_m = float(np.clip(9.0 / (high - low).max(), 0.05, 0.9))
+    width, height = np.maximum((high - low) * inch_per_m, (LEAST_WIDTH_INCH, 0.0)).tolist()
+    low[0], high[0] = 0.5 * (low[0] + high[0]) + np.array([-0.5, 0.5]) * width / inch_per_m
+    figure = Figure(dpi=150, facecolor=palette.PAGE)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    _prepare(axes, low, high)
+    handles = [
+        *_floor(axes, picture, 72.0 * inch_per_m),
+        *_walls(axes, picture),
+        *_paths(axes, picture),
+        *_ends(axes, picture),
+        *_corner_ellipses(axes, picture),
+        *_robot(axes, picture),
+    ]
+    title = wrap(picture.title, int(width / TITLE_LETTER_INCH))
+    words = wrap(picture.subtitle, int(width / LETTER_INCH))
+    columns = int(width // LEGEND_INCH)
+    below, above = 0.45 + 0.17 * -(-len(handles) // columns), 0.4 + 0.16 * len(words) + 0.24 * len(title)
+    whole = np.array([width + 0.8, height + below + above])
+    figure.set_size_inches(*whole)
+    axes.set_position((0.5 / whole[0], below / whole[1], width / whole[0], height / whole[1]))
+    _write(axes, words, 0.12 / height, size=9, color="#5A5A5A")
+    _write(axes, title, (0.22 + 0.16 * len(words)) / height, size=13, weight="bold")
+    figure.legend(handles=handles, loc="lower center", ncols=columns, frameon=False, fontsize=8, handlelength=2.2)
+    return figure
+
+
+def _write(axes: Axes, lines: list[str], above: float, **look: Any) -> None:
+    axes.text(0.0, 1.0 + above, literal("\n".join(lines)), transform=axes.transAxes, va="bottom", **look)
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as the bytes of a PNG file, the same for the same figure."""
+    return saved(figure, "png")
+
+
+def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
+    """Return a figure as the bytes of a file, the same for the same figure; svg and pdf stay sharp at any size."""
+    buffer = BytesIO()
+    unsaid = {"png": "Software", "svg": "Date", "pdf": "CreationDate"}
+    with mpl.rc_context({"svg.hashsalt": "chainslam"}), warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(buffer, format=kind, metadata={unsaid[kind]: None})
+    return buffer.getvalue()
+
+
+def _extent(picture: Picture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+    points = [picture.path_world[:, :2], picture.map.ends_world.reshape(-1, 2), *picture.true_floor]
+    stacked = np.concatenate(points)
+    return stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
+
+
+def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_facecolor(palette.PAGE)
+    step = 1.0 if (high - low).max() <= 45 else 5.0
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_formatter(lambda value, _: f"{value:.0f}" if round(value / step) % 2 == 0 else "")
+    axes.grid(color=palette.GRID, linewidth=0.6)
+    for axis in (axes.xaxis, axes.yaxis):
+        # Above the floor, below all else; `axisbelow` knows only below the floor and above the paths.
+        axis.set_zorder(GRID_ORDER)
+    axes.tick_params(length=0, labelsize=7, labelcolor="#8A8A8A")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _floor(axes: Axes, picture: Picture, points_per_m: float) -> list[Patch | Line2D]:
+    """Fill the true floor and draw the true walls around it: a broad line, then the floor over its inner half."""
+    if not picture.true_floor:
+        return []
+    vertices = np.concatenate([np.concatenate([ring, ring[:1]]) for ring in picture.true_floor])
+    codes = np.concatenate(
+        [[Path.MOVETO] + [Path.LINETO] * (len(ring) - 1) + [Path.CLOSEPOLY] for ring in picture.true_floor]
+    )
+    path = Path(vertices, codes)
+    broad = 2.0 * WALL_M * points_per_m
+    axes.add_patch(
+        PathPatch(path, facecolor="none", edgecolor=palette.SOLID, linewidth=broad, joinstyle="miter", zorder=1.0)
+    )
+    for ring in picture.true_floor[1:]:
+        axes.fill(ring[:, 0], ring[:, 1], color=palette.SOLID, zorder=1.05, linewidth=0)
+    axes.add_patch(PathPatch(path, facecolor=palette.FLOOR, edgecolor="none", zorder=1.1))
+    return [Patch(color=palette.SOLID, label="true walls")]
+
+
+def _walls(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    ends, ids = picture.map.ends_world, picture.map.ids
+    handles: list[Patch | Line2D] = []
+    closed = 0
+    for chain in picture.chains:
+        colour = palette.CLOSED[closed % len(palette.CLOSED)] if chain.is_closed else palette.OPEN
+        if chain.is_closed:
+            handles.append(Line2D([], [], color=colour, linewidth=2.4, label=f"closed chain, {len(chain.walls)} walls"))
+        closed += chain.is_closed
+        for row in np.searchsorted(ids, chain.walls):
+            axes.plot(*ends[row].T, color=colour, linewidth=2.0, solid_capstyle="round", zorder=4)
+        corner = chain.corners_world
+        axes.plot(*corner.T, "o", markersize=2.6, color=palette.PAGE, markeredgecolor=colour, mew=0.8, zorder=5)
+    if len(handles) > 4:
+        handles = [Line2D([], [], color=palette.CLOSED[0], linewidth=2.4, label=f"{closed} closed chains")]
+    if any(not chain.is_closed for chain in picture.chains):
+        handles.append(Line2D([], [], color=palette.OPEN, linewidth=2.4, label="chain with open ends"))
+    for row in np.flatnonzero(picture.map.tentative):
+        axes.plot(*ends[row].T, color=palette.TENTATIVE, linewidth=1.4, linestyle=(0, (1, 1)), zorder=3.5)
+    if picture.map.tentative.any():
+        handles.append(Line2D([], [], color=palette.TENTATIVE, linestyle=":", label="tentative wall"))
+    for row in np.flatnonzero(picture.map.crooked):
+        axes.plot(*ends[row].T, color=palette.CROOKED, linewidth=3.4, solid_capstyle="round", zorder=4.2)
+    if picture.map.crooked.any():
+        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="crooked: not to be relied on"))
+    handles.append(_marker("o", palette.PAGE, palette.INK, 4, "corner"))
+    return handles
+
+
+def _paths(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    handles: list[Patch | Line2D] = []
+    true = picture.true_path_world
+    if true is not None:
+        axes.plot(true[:, 0], true[:, 1], color=palette.PATH_TRUE, linewidth=2.2, alpha=0.55, zorder=2.4)
+        handles.append(Line2D([], [], color=palette.PATH_TRUE, linewidth=2.2, alpha=0.55, label="true path"))
+    path = picture.path_world
+    axes.plot(path[:, 0], path[:, 1], color=palette.PATH_ESTIMATED, linewidth=0.9, zorder=2.5)
+    handles.append(Line2D([], [], color=palette.PATH_ESTIMATED, linewidth=0.9, label="estimated path"))
+    axes.plot(*path[0, :2], "o", markersize=9, color=palette.PAGE, markeredgecolor=palette.INK, mew=1.2, zorder=6)
+    axes.plot(*path[0, :2], "+", markersize=8, color=palette.INK, mew=1.2, zorder=6)
+    handles.append(_marker(r"$\oplus$", palette.INK, palette.INK, 9, "start"))
+    return handles
+
+
+def _ends(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    aside = {(end.wall, end.side) for end in picture.set_aside}
+    handles: list[Patch | Line2D] = []
+    ends = [end for chain in picture.chains for end in chain.open_ends]
+    kinds = ((False, palette.ALARM, "open end"), (True, palette.TENTATIVE, "open end, set aside"))
+    for set_aside, colour, label in kinds:
+        places = [end.position_world for end in ends if ((end.wall, end.side) in aside) == set_aside]
+        if places:
+            axes.plot(*np.array(places).T, "o", markersize=11, color="none", markeredgecolor=colour, mew=1.6, zorder=6)
+            handles.append(_marker("o", "none", colour, 9, label))
+    return handles
+
+
+def _corner_ellipses(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    """Draw three standard deviations of the corners, enlarged where most could not be seen; the few large ones pale."""
+    if not len(picture.corners_world):
+        return []
+    radii = 3.0 * np.sqrt(np.maximum(np.trace(picture.corner_covs, axis1=1, axis2=2), 0.0))
+    times = _enlarged(float(np.median(radii)))
+    contours = ellipses(picture.corners_world, picture.corner_covs, times, vertices=33)
+    for chosen, alpha in ((radii > 5.0 * np.median(radii), 0.2), (radii <= 5.0 * np.median(radii), 1.0)):
+        axes.add_collection(
+            PolyCollection(
+                list(contours[chosen]), facecolors="none", edgecolors=palette.INK, linewidths=0.7, alpha=alpha,
+                zorder=4.5,
+            )
+        )  # fmt: skip
+    return [_marker("o", "none", palette.INK, 7, "3σ ellipse of a corner" + _times_words(times))]
+
+
+def _enlarged(radius_m: float) -> float:
+    return 1.0 if radius_m >= 0.1 else ENLARGED
+
+
+def _times_words(times: float) -> str:
+    return "" if times == 1.0 else f", {times:.0f} times enlarged"
+
+
+def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
+    """Draw the body, and the ellipse of three standard deviations, ten times as large where it could not be seen."""
+    x, y, heading = picture.path_world[-1]
+    axes.add_patch(
+        Circle((x, y), ROBOT_M, facecolor="#FFFFFFCC", edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.5)
+    )
+    nose = np.array([[x, y], [x + ROBOT_M * np.cos(heading), y + ROBOT_M * np.sin(heading)]])
+    axes.plot(*nose.T, color=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.6)
+    variances, vectors = np.linalg.eigh(picture.map.belief.pose_cov[:2, :2])
+    radii = 3.0 * np.sqrt(np.maximum(variances, 0.0))
+    times = _enlarged(float(radii.max()))
+    angle = float(np.rad2deg(np.arctan2(vectors[1, 1], vectors[0, 1])))
+    axes.add_patch(
+        Ellipse(
+            (x, y), 2 * times * radii[1], 2 * times * radii[0], angle=angle,
+            facecolor="#D55E0033", edgecolor=palette.ALARM, linewidth=1.0, zorder=6.7,
+        )
+    )  # fmt: skip
+    label = "robot and its 3σ ellipse" + _times_words(times)
+    return [_marker("o", "#D55E0033", palette.ALARM, 7, label)]
+
+
+def _marker(shape: str, face: str, edge: str, size: int, label: str) -> Line2D:
+    return Line2D(
+        [], [], linestyle="none", marker=shape, color=face, markeredgecolor=edge, markersize=size, label=label
+    )

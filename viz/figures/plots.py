@@ -1,0 +1,167 @@
+"""Pictures for papers beside the map: paths, the model space, NEES curves, and how often each stretch was driven."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+from scipy.spatial import cKDTree
+
+from slam.evaluation.consistency import chi2_band
+
+from .. import palette
+from ..shapes import SIGMAS, VAGUE_RAD, ellipses
+from ..text import literal
+
+STRETCH_M = 0.25
+"""A place counts as driven again when the path comes back to within this of it ..."""
+AWAY_M = 1.5
+"""... after at least so many metres elsewhere."""
+ENLARGED = 10.0
+"""How much ellipses of the model space are enlarged."""
+GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
+"""Driven once, twice, ..., five times or more, as in the paper's figures 5 and 6."""
+
+Rings = Sequence[Float[np.ndarray, "_ 2"]]
+
+
+def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str, dof: int = 3) -> Figure:
+    """Return the NEES of each back end against the step, on a logarithmic axis, with its 95 % band."""
+    figure, axes = _figure(title, (7.2, 3.2))
+    axes.margins(x=0.01)
+    low, high = chi2_band(dof)
+    axes.axhspan(low, high, color=palette.SWEPT, zorder=1, label="95 % band")
+    for backend, values in curves.items():
+        axes.plot(values, color=palette.of_backend(backend), linewidth=1.1, label=backend, zorder=2)
+    axes.set_yscale("log")
+    axes.set_xlabel("step")
+    axes.set_ylabel("NEES of the pose")
+    axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure
+
+
+def draw_trajectories(
+    true_world: Float[np.ndarray, "s 3"] | None,
+    estimated_world: Mapping[str, Float[np.ndarray, "_ 3"]],
+    rings: Rings,
+    title: str,
+    wheels_world: Float[np.ndarray, "s 3"] | None = None,
+) -> Figure:
+    """Return the paths that back ends estimate over the true one and over what the wheels alone say."""
+    figure, axes = _plan(rings, title)
+    if true_world is not None:
+        axes.plot(
+            true_world[:, 0], true_world[:, 1], color=palette.PATH_TRUE, linewidth=4.5, alpha=0.6, label="true path"
+        )
+    if wheels_world is not None:
+        axes.plot(
+            wheels_world[:, 0], wheels_world[:, 1], ":", color=palette.TENTATIVE, linewidth=1.2, label="wheels alone"
+        )
+    # Estimates that agree lie on each other: each is drawn narrower than the one below it.
+    widths = np.linspace(2.4, 0.8, len(estimated_world)) if len(estimated_world) > 1 else np.ones(1)
+    for (backend, path), width in zip(estimated_world.items(), widths, strict=False):
+        axes.plot(path[:, 0], path[:, 1], color=palette.of_backend(backend), linewidth=width, label=backend)
+    axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure
+
+
+def draw_model_space(
+    lines_world: Float[np.ndarray, "n 2"],
+    covs: Float[np.ndarray, "n 2 2"],
+    colours: Sequence[str],
+    title: str,
+) -> Figure:
+    """Return the walls as ellipses of three standard deviations in the plane of (alpha rad, r m).
+
+    They are ten times enlarged, unless most would then cross half the picture: so uncertain is a map that begins after
+    a blind drive. Walls of a direction less certain than VAGUE_RAD, and than most, whose ellipses are huge, are pale.
+    """
+    sigma_rad = np.sqrt(covs[:, 0, 0])
+    typical = float(np.median(sigma_rad)) if len(sigma_rad) else 0.0
+    times = 1.0 if SIGMAS * ENLARGED * typical > 0.5 * np.pi else ENLARGED
+    enlarged = "" if times == 1.0 else f", {times:g} times enlarged"
+    figure, axes = _figure(f"{title}\n3σ ellipses of the walls{enlarged}", (5.2, 4.6))
+    vague = sigma_rad > max(VAGUE_RAD, 2.0 * typical)
+    contours = ellipses(lines_world, covs, times, vertices=49)
+    for chosen, alpha, width in ((vague, 0.25, 0.6), (~vague, 1.0, 1.0)):
+        axes.add_collection(
+            PolyCollection(
+                list(contours[chosen]), facecolors="none", edgecolors=np.array(colours)[chosen], linewidths=width,
+                alpha=alpha, zorder=2 + alpha,
+            )
+        )  # fmt: skip
+    axes.grid(color=palette.GRID, linewidth=0.5)
+    axes.scatter(lines_world[:, 0], lines_world[:, 1], s=2.0, c=list(colours), zorder=4)
+    axes.set_xlim(-1.05 * np.pi, 1.05 * np.pi)
+    axes.set_ylim(lines_world[:, 1].min(initial=0.0) - 1.0, lines_world[:, 1].max(initial=0.0) + 1.0)
+    axes.set_xticks(0.5 * np.pi * np.arange(-2, 3), ["-π", "-π/2", "0", "π/2", "π"])
+    axes.set_xlabel("direction α, rad")
+    axes.set_ylabel("distance r, m")
+    return figure
+
+
+def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: str) -> Figure:
+    """Return the path shaded by how often each stretch was driven, the start in a circle (paper, figures 5 and 6)."""
+    figure, axes = _plan(rings, title)
+    places = _dense(path_world[:, :2])
+    times = traversals(places)
+    pieces = np.stack([places[:-1], places[1:]], axis=1)
+    order = np.argsort(times[1:], kind="stable")
+    shades = np.minimum(times[1:][order], len(GREYS)) - 1
+    lines = LineCollection(
+        list(pieces[order]), cmap=ListedColormap(GREYS), linewidths=4.0, capstyle="round", zorder=3,
+    )  # fmt: skip
+    lines.set_array(shades)
+    lines.set_clim(-0.5, len(GREYS) - 0.5)
+    axes.add_collection(lines)
+    bar = figure.colorbar(lines, ax=axes, ticks=range(len(GREYS)), shrink=0.5, pad=0.02)
+    bar.ax.set_yticklabels([*(str(k) for k in range(1, len(GREYS))), f"{len(GREYS)} or more"], fontsize=7)
+    bar.set_label("times driven", fontsize=8)
+    axes.plot(*places[0], "o", markersize=9, color="none", markeredgecolor=palette.ALARM, mew=1.6, zorder=4)
+    return figure
+
+
+def traversals(places: Float[np.ndarray, "p 2"]) -> Int[np.ndarray, " p"]:
+    """Return how often the path comes by each of its places: passes within STRETCH_M, AWAY_M of path apart."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    near = cKDTree(places).query_ball_point(places, STRETCH_M, return_sorted=True)
+    return np.array([1 + int(np.count_nonzero(np.diff(along[rows]) > AWAY_M)) for rows in near])
+
+
+def _dense(places: Float[np.ndarray, "s 2"], pitch_m: float = 0.05) -> Float[np.ndarray, "p 2"]:
+    """Return points along a path, at most `pitch_m` apart."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    at = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / pitch_m)) + 1, 2))
+    return np.stack([np.interp(at, along, places[:, axis]) for axis in (0, 1)], axis=-1)
+
+
+def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
+    """Return axes in metres with the true walls, if any."""
+    size = np.ptp(np.concatenate(rings), axis=0) if len(rings) else np.array([1.0, 1.0])
+    width, height = size * 7.0 / max(size[0], 1.3 * size[1])
+    figure, axes = _figure(title, (float(width) + 0.9, float(height) + 1.0))
+    for ring in rings:
+        axes.plot(*np.concatenate([ring, ring[:1]]).T, color=palette.WALL_LINE, linewidth=1.4, zorder=2)
+    axes.set_aspect("equal")
+    axes.tick_params(length=0)
+    axes.xaxis.set_major_locator(MultipleLocator(2.0))
+    axes.yaxis.set_major_locator(MultipleLocator(2.0))
+    axes.grid(color=palette.GRID, linewidth=0.5)
+    return figure, axes
+
+
+def _figure(title: str, size: tuple[float, float]) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(literal(title), x=0.02, ha="left", size=10, weight="bold")
+    axes = figure.subplots()
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=7)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return figure, axes

@@ -1,0 +1,1 @@
+"""What a timeline draws, one file for each part of the picture."""

@@ -1,0 +1,90 @@
+"""Curves under `/plots`, one for each back end in each plot, and the log of decisions under `/decisions/BACKEND`."""
+
+import numpy as np
+import rerun as rr
+
+from slam.evaluation.consistency import chi2_band
+
+from ... import palette
+from ..block import Block
+from ..colours import packed
+from ..moment import Moment
+from ..recording import Recording
+from .map_layers import goal_words
+
+NEES, LOG_NEES, TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS = (
+    *("nees", "nees_log10", "pose_trace", "path_length_m", "open_ends"),
+    *("lines", "chains", "closed_chains", "step_ms"),
+)
+POSE_BAND = chi2_band(3)
+"""The 95 % band of the pose's NEES."""
+
+
+def curve_style(backend: str, of: str = "", width: float = 1.6) -> rr.SeriesLines:
+    """Return the look of a back end's curves; `of` says more where it has two in one plot."""
+    return rr.SeriesLines(colors=packed(palette.of_backend(backend)), names=backend + of, widths=width)
+
+
+class Curves:
+    """One value at each step."""
+
+    def __init__(self, out: Recording, backend: str) -> None:
+        self._out, self._backend = out, backend
+        for plot in (TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS):
+            more = (", closed", 4.0) if plot == CLOSED else ()
+            out.fixed(f"/plots/{plot}/{backend}", curve_style(backend, *more))
+
+    def send(self, block: Block) -> None:
+        """Send the values of some steps."""
+        rows = block.rows
+        curves = {
+            TRACE: [float(np.trace(row.pose_cov)) for row in rows],
+            PATH: [row.path_length_m for row in rows],
+            ENDS: [sum(len(chain.open_ends) for chain in row.chains) for row in rows],
+            LINES: [len(row.ids) for row in rows],
+            CHAINS: [len(row.chains) for row in rows],
+            CLOSED: [sum(chain.is_closed for chain in row.chains) for row in rows],
+            STEP_MS: [1e3 * row.seconds for row in rows],
+        }
+        for plot, values in curves.items():
+            self._out.values(f"/plots/{plot}/{self._backend}", block.moments, np.array(values, dtype=np.float64))
+
+
+class Decisions:
+    """What was chosen and why, what was given up and why, what the robot is about."""
+
+    def __init__(self, out: Recording, backend: str) -> None:
+        self._out, self._entity = out, f"/decisions/{backend}"
+        self._goal: object = None
+        self._doing = ""
+        self._aside: set[tuple[int, int]] = set()
+
+    def send(self, block: Block) -> None:
+        """Send what is new at some steps."""
+        lines = [(at, *line) for at, row in enumerate(block.rows) for line in self._news(row)]
+        if lines:
+            at, words, levels = zip(*lines, strict=True)
+            numbered = [f"{block.rows[k].index:4d}  {word}" for k, word in zip(at, words, strict=True)]
+            self._out.words(self._entity, block.moments.take(list(at)), numbered, levels)
+
+    def _news(self, row: Moment) -> list[tuple[str, str]]:
+        news = [
+            (f"set aside: open end of wall {end.wall}: {end.reason}", "WARN")
+            for end in row.set_aside
+            if (end.wall, end.side) not in self._aside
+        ]
+        self._aside = {(end.wall, end.side) for end in row.set_aside}
+        goal = None if row.goal is None else (row.goal.kind, row.goal.wall, row.goal.side, row.goal.reason)
+        if row.goal is not None and goal != self._goal:
+            news.append((f"{goal_words(row.goal)}: {row.goal.reason}", "INFO"))
+            if row.follow:
+                news.append((f"follow walls {' '.join(map(str, row.follow))}", "INFO"))
+        self._goal = goal
+        if row.ended is not None:
+            news.append((f"{row.ended}: {row.reason}", "INFO"))
+        elif row.reason and row.reason != self._doing:
+            # The reason of the goal stands in a line of its own.
+            why = "" if row.goal is None else f" ({row.goal.reason})"
+            news.append((row.reason.removesuffix(why), "DEBUG"))
+        self._doing = row.reason
+        return news
