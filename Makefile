@@ -72,6 +72,16 @@ courts: setup
 strategies: setup
 	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.csv
 
+.PHONY: counts settings
+
+# How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
+counts: setup
+	$(BIN)/python -m studies.counts
+
+# The page that names every number that one may tune.
+settings: setup
+	$(BIN)/python -m studies.counts --numbers > docs/settings.md
+
 rules: setup
 	$(BIN)/python -m studies.rules.study --plans $(PLANS) --out studies/rules/rows.jsonl
 	$(BIN)/python -m studies.rules.report

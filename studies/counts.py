@@ -1,0 +1,203 @@
+"""How large the code is where size hurts: numbers that one may tune, entries of a folder, arrows between files.
+
+.venv/bin/python -m studies.counts            # a table
+.venv/bin/python -m studies.counts --numbers  # every number that one may tune, with its value and place
+"""
+
+import ast
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+from pathlib import Path
+
+import grimp
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+ROOMS = ("slam", "explore", "sim", "viz", "experiments", "studies")
+TUNED = ("slam", "explore")
+"""The rooms whose numbers decide what is mapped and where the robot drives."""
+PLAIN = (0, 1, 2, -1)
+"""Numbers in a condition that say "none", "one", "both" or "the last" and are not chosen."""
+PREFACE = """# Numbers that one may tune
+
+<!-- made by `make settings` -->
+
+Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, reachable by `--set`), constants, and
+numbers in conditions. The end of a name is its unit (`_m`, `_rad`, `_s`, `_steps`); others are counts or ratios.
+`make counts` counts them.
+"""
+NO_ENTRIES = {"__pycache__", "__init__.py", "py.typed"}
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that one may tune."""
+
+    file: str
+    line: int
+    name: str
+    """`Class.field` or `CONSTANT`; for a literal the condition that it stands in."""
+    value: str
+    kind: str
+    """`setting`, `constant` or `literal`."""
+    says: str
+    """The docstring below it; empty where there is none."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Count, and print what was counted."""
+
+    root: Path = Path()
+    """The sources: a checkout."""
+    numbers: bool = False
+    """List every number that one may tune instead, as the page docs/settings.md."""
+
+
+def tunable(root: Path, rooms: tuple[str, ...] = TUNED) -> list[Number]:
+    """Return the numbers that one may tune in the files of these rooms, in the order of files and lines."""
+    found: list[Number] = []
+    for room in rooms:
+        for path in sorted((root / room).rglob("*.py")):
+            file, tree = path.relative_to(root).as_posix(), ast.parse(path.read_text())
+            found += _settings(file, tree) + _constants(file, tree) + _literals(file, tree)
+    return found
+
+
+def _settings(file: str, tree: ast.Module) -> list[Number]:
+    return [
+        Number(file, line, f"{each.name}.{name}", value, "setting", says)
+        for each in ast.walk(tree)
+        if isinstance(each, ast.ClassDef) and each.name.endswith("Config")
+        for line, name, value, says in _assigned(each.body)
+    ]
+
+
+def _constants(file: str, tree: ast.Module) -> list[Number]:
+    return [
+        Number(file, line, name, value, "constant", says)
+        for line, name, value, says in _assigned(tree.body)
+        if name.isupper()
+    ]
+
+
+def _assigned(body: list[ast.stmt]) -> Iterator[tuple[int, str, str, str]]:
+    """Yield line, name, value and docstring of each statement that gives a name a number or some."""
+    for statement, following in pairwise([*body, ast.Pass()]):
+        match statement:
+            case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value):
+                pass
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                pass
+            case _:
+                continue
+        if _is_number(value):
+            match following:
+                case ast.Expr(value=ast.Constant(value=str() as says)):
+                    yield statement.lineno, name, ast.unparse(value), " ".join(says.split())
+                case _:
+                    yield statement.lineno, name, ast.unparse(value), ""
+
+
+def _is_number(value: ast.expr) -> bool:
+    """Return whether an expression is a number, some, or one worked out from others; arrays of nothing are none."""
+    leaves = [each.value for each in ast.walk(value) if isinstance(each, ast.Constant)]
+    if not leaves or any(type(each) not in (int, float) for each in leaves):
+        return False
+    chosen = any(each not in PLAIN for each in leaves)
+    return isinstance(value, (ast.Constant, ast.Tuple, ast.UnaryOp)) or (
+        isinstance(value, (ast.BinOp, ast.Call)) and chosen
+    )
+
+
+def _literals(file: str, tree: ast.Module) -> list[Number]:
+    """Return the numbers that stand in comparisons."""
+    return [
+        Number(file, leaf.lineno, ast.unparse(each), str(leaf.value), "literal", "")
+        for each in ast.walk(tree)
+        if isinstance(each, ast.Compare)
+        for leaf in _chosen(each)
+    ]
+
+
+def _chosen(comparison: ast.Compare) -> Iterator[ast.Constant]:
+    """Yield the numbers that are a side of a comparison or a factor of one: not indices, not arguments of calls."""
+    sides = [comparison.left, *comparison.comparators]
+    while sides:
+        side = sides.pop()
+        match side:
+            case ast.Constant(value=int() | float() as value) if type(value) is not bool and value not in PLAIN:
+                yield side
+            case ast.BinOp(left=left, right=right):
+                sides += [left, right]
+            case ast.UnaryOp(operand=operand):
+                sides.append(operand)
+
+
+def entries(root: Path, rooms: tuple[str, ...] = ROOMS) -> dict[str, int]:
+    """Return how many entries each folder of these rooms has, but for what makes it a package."""
+    folders = [path for room in rooms for path in [root / room, *(root / room).rglob("*")] if path.is_dir()]
+    return {
+        path.relative_to(root).as_posix(): sum(each.name not in NO_ENTRIES for each in path.iterdir())
+        for path in sorted(folders)
+        if path.name not in NO_ENTRIES
+    }
+
+
+def arrows(rooms: tuple[str, ...] = ROOMS) -> dict[str, tuple[int, int]]:
+    """Return for each room how many files it has and how many imports lead from them to files of any room."""
+    graph = grimp.build_graph(*rooms, cache_dir=None)
+    modules = [module for module in graph.modules if module.partition(".")[0] in rooms]
+    return {
+        room: (len(inside), sum(len(graph.find_modules_directly_imported_by(module)) for module in inside))
+        for room in rooms
+        if (inside := [module for module in modules if module.partition(".")[0] == room])
+    }
+
+
+def page(numbers: Iterable[Number]) -> str:
+    """Return a page in Markdown: the numbers of each file, with their values and what they are."""
+    lines = [PREFACE]
+    for file, own in groupby(numbers, lambda each: each.file):
+        lines += [f"### `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
+        lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in own]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def main() -> int:
+    """Print the counts, or the numbers."""
+    asked, console = tyro.cli(Asked, prog="studies.counts"), Console()
+    numbers = tunable(asked.root)
+    if asked.numbers:
+        print(page(numbers), end="")
+        return 0
+    kinds = ("setting", "constant", "literal")
+    shown = Table("room", *(f"{kind}s" for kind in kinds), "all", "without words", title="Numbers that one may tune")
+    for room in TUNED:
+        own = [each for each in numbers if each.file.startswith(f"{room}/")]
+        mute = sum(not each.says for each in own if each.kind != "literal")
+        shown.add_row(room, *(str(sum(each.kind == kind for each in own)) for kind in kinds), str(len(own)), str(mute))
+    console.print(shown)
+    folders = entries(asked.root)
+    fullest = sorted(folders.items(), key=lambda item: -item[1])[:8]
+    shown = Table("folder", "entries", title=f"Entries: {len(folders)} folders, the fullest")
+    for folder, count in fullest:
+        shown.add_row(folder, str(count))
+    console.print(shown)
+    shown = Table("room", "files", "imports", title="Arrows")
+    for room, (files, imports) in arrows().items():
+        shown.add_row(room, str(files), str(imports))
+    console.print(shown)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
