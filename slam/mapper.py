@@ -86,7 +86,7 @@ class Mapper:
         self._match = matcher
         self._walls = Walls(config.walls)
         self._faint = FaintLines(config.faint)
-        self._gaps = Gaps(config.gaps)
+        self._gaps = Gaps(config.gaps, config.chains)
         self._kinks = Kinks(config.kinks)
 
     def predict(self, odometry: Odometry) -> None:
@@ -229,8 +229,8 @@ class Mapper:
         if self.config.duplicates is None:
             return walls, ()
         merged: list[tuple[int, int]] = []
-        touched = set(owners[owners >= 0].tolist())
-        while twice := duplicate_of(walls, touched, self.config.duplicates, self._kinks.cut):
+        touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
+        while twice := duplicate_of(walls, touched, one_wall, self.config.duplicates, self._kinks.cut):
             keep, drop = twice
             self._walls.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)

@@ -26,7 +26,6 @@ from sim.worlds import World
 from slam.association.matching import match
 from slam.backends import BACKENDS
 from slam.extraction.extract import extract
-from slam.map.extents import WallsConfig
 from slam.mapper import Extractor, Mapper, MapperConfig, Matcher
 from slam.robot import MotionCommand, Odometry, Scan
 
@@ -183,8 +182,5 @@ def replay(
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
     """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
-    walls = WallsConfig(
-        trusted_sightings=config.walls.trusted_sightings, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0,
-        claims=_NEVER,
-    )  # fmt: skip
+    walls = replace(config.walls, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0, claims=_NEVER)
     return replace(config, walls=walls, duplicates=None)

@@ -15,7 +15,6 @@ from ..estimation.models import Innovations, halfway, innovations
 from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..geometry.poses import to_world
-from ..map.merging import DuplicatesConfig
 from .hypotheses import agree, nearest_alone
 from .joint_compatibility import compatible, squared_distances, taken_together
 
@@ -44,8 +43,10 @@ class MatchingConfig:
     density: float = 0.1
     """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
     sight is matched beyond the gate too where a new one would be less likely."""
-    one_wall: float = DuplicatesConfig().gate
-    """Probability level within which two entries of the map may be one wall, so that either will do."""
+    one_wall: float = 0.9999
+    """Probability level within which two entries of the map may be one wall, so that either will do; where they lie
+    along each other they are made one. One true pair in 10,000 is refused, and stays, since each observation goes to
+    the entry that it fits better, which keeps them apart."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
 

@@ -20,9 +20,6 @@ from .stochastic_map import StochasticMap
 class DuplicatesConfig:
     """When two entries of a map may be one wall."""
 
-    gate: float = 0.9999
-    """Probability level of the chi-square gate on the difference of the two lines: one true pair in so many is refused,
-    and stays, since each sighting goes to the entry that it fits better, which keeps them apart."""
     turn_rad: float = float(np.deg2rad(5.0))
     """Largest difference in direction; the other face of a wall differs by pi."""
     across_m: float = 0.05
@@ -47,12 +44,14 @@ class DuplicatesConfig:
 def duplicate_of(
     walls: StochasticMap,
     touched: Collection[int],
+    one_wall: float,
     config: DuplicatesConfig = DuplicatesConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> tuple[int, int] | None:
     """Return the ids (older, younger) of two entries of one wall, one of them among `touched`, or None.
 
-    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`kinks`).
+    `one_wall` is the probability level of the chi-square gate on the difference of the two lines; `cut` are pairs of
+    ids, the lower first, of which it is known that they are two walls (`kinks`).
 
     The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
     uncertainty between the two, is what the bounds of geometry are for.
@@ -67,7 +66,7 @@ def duplicate_of(
             continue
         two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
-        if turn <= config.turn_sigma_rad**2 and (is_hidden or same_line(two, config.gate)):
+        if turn <= config.turn_sigma_rad**2 and (is_hidden or same_line(two, one_wall)):
             return pair[0], pair[1]
     return None
 

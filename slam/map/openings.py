@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from ..geometry.lines import intersect
 from ..geometry.poses import J
 from ..robot import Scan
+from .chains import ChainConfig
 from .stochastic_map import StochasticMap
 
 
@@ -19,27 +20,23 @@ class GapsConfig:
     """When a gap counts as passed."""
 
     least_m: float = 0.15
-    """Narrower gaps are not watched: ends are known no better."""
-    widest_m: float = 0.35
-    """Nor are gaps too wide to be joined at all."""
+    """Narrower gaps are not watched: ends are known no better. Nor are those that no chain would join."""
     beyond_m: float = 0.15
     """A beam passes a gap if it goes on this far beyond it, ..."""
     margin_m: float = 0.04
     """... this far from the two ends."""
     beams: int = 2
     """So many beams of one scan are needed."""
-    corner_m: float = 0.3
-    """Lines that cross this near to both ends make a corner (`ChainConfig.corner_reach_m`); beams cut it off that cross
-    what is supposed of either wall, away from its ends as above, ..."""
     across_m: float = 0.05
-    """... and reach so far behind it, across the wall: five sigmas of a beam."""
+    """Beams cut a corner off that cross what is supposed of either wall, away from its ends as above, and reach so far
+    behind it, across the wall: five sigmas of a beam."""
 
 
 class Gaps:
     """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through."""
 
-    def __init__(self, config: GapsConfig = GapsConfig()) -> None:
-        self._config = config
+    def __init__(self, config: GapsConfig, chains: ChainConfig) -> None:
+        self._config, self._chains = config, chains
         self.passed: set[tuple[int, int]] = set()
         self.cut_off: set[tuple[int, int]] = set()
         """Pairs that make no corner where their lines cross: beams went through one of the two supposed pieces."""
@@ -47,10 +44,11 @@ class Gaps:
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Hold one scan, taken at the map's pose, against gaps and corners of all firm walls within its range."""
         config, pose = self._config, walls.belief.pose_world
-        rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + config.widest_m))
+        widest_m = self._chains.set_aside_reach_m
+        rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + widest_m))
         tails, heads = walls.ends_world[rows].transpose(1, 0, 2)
         width = np.hypot(*np.moveaxis(heads[:, None] - tails, -1, 0))
-        is_near = (width <= config.widest_m) & ~np.eye(len(rows), dtype=bool)
+        is_near = (width <= widest_m) & ~np.eye(len(rows), dtype=bool)
         is_near &= np.hypot(*(heads - pose[:2]).T)[:, None] < scan.range_max_m
         pairs = np.argwhere(is_near)
         gaps = pairs[width[tuple(pairs.T)] > config.least_m]
@@ -61,7 +59,7 @@ class Gaps:
         corners, parallel = intersect(lines[pairs[:, 0]], lines[pairs[:, 1]])
         pieces = np.stack([corners - heads[pairs[:, 0]], tails[pairs[:, 1]] - corners])
         lengths = np.hypot(pieces[..., 0], pieces[..., 1])
-        supposed = ~parallel & np.all(lengths <= config.corner_m, axis=0)
+        supposed = ~parallel & np.all(lengths <= self._chains.corner_reach_m, axis=0)
         supposed &= np.any(lengths > 2.0 * config.margin_m, axis=0)
         # Ends that have come to meet where the lines cross suppose nothing any more.
         self.cut_off.difference_update((int(h), int(t)) for h, t in walls.ids[rows][pairs[~supposed]].tolist())

@@ -1,15 +1,19 @@
 """One wall that stands in the map twice is found; two walls that are near each other never are one."""
 
+from functools import partial
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slam.association.matching import MatchingConfig
 from slam.estimation.backend import Belief, Joint
 from slam.geometry.lines import directions, normals
 from slam.map.merging import DuplicatesConfig, duplicate_of, lying_along
 from slam.map.stochastic_map import StochasticMap
 
 CONFIG = DuplicatesConfig()
+twice = partial(duplicate_of, one_wall=MatchingConfig().one_wall)
 angles, places = st.floats(-3.1, 3.1), st.floats(-20.0, 20.0)
 
 
@@ -50,11 +54,11 @@ def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, on
     draw = rng.standard_normal((2, 2)) * [0.002, 0.003]
     draw = np.clip(draw, [-0.003, -0.005], [0.003, 0.005])
     lines = [(alpha + draw[0, 0], (x, y), one), (alpha + draw[1, 0], beside(alpha, (x, y), along, draw[1, 1]), two)]
-    assert duplicate_of(walls(lines), {10}) == (3, 10)
-    assert duplicate_of(walls(lines), {3}) == (3, 10)
-    assert duplicate_of(walls(lines), set()) is None
-    assert duplicate_of(walls(lines), {10}, cut={(3, 10)}) is None, "known to be two"
-    assert duplicate_of(walls(lines), {10}, cut={(3, 11)}) == (3, 10)
+    assert twice(walls(lines), {10}) == (3, 10)
+    assert twice(walls(lines), {3}) == (3, 10)
+    assert twice(walls(lines), set()) is None
+    assert twice(walls(lines), {10}, cut={(3, 10)}) is None, "known to be two"
+    assert twice(walls(lines), {10}, cut={(3, 11)}) == (3, 10)
 
 
 @settings(max_examples=60, deadline=None)
@@ -64,38 +68,38 @@ def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, on
 )  # fmt: skip
 def test_walls_a_tenth_of_a_metre_apart_are_two_however_little_is_known(alpha, x, y, one, two, share, across, sigma):
     lines = [(alpha, (x, y), one), (alpha, beside(alpha, (x, y), share * 0.5 * (one + two), across), two)]
-    assert duplicate_of(walls(lines, sigma=(0.2 * sigma, sigma)), {3, 10}) is None
+    assert twice(walls(lines, sigma=(0.2 * sigma, sigma)), {3, 10}) is None
 
 
 @settings(max_examples=40, deadline=None)
 @given(angles, places, places, st.floats(-1.0, 1.0), st.floats(0.0, 0.1))
 def test_the_two_faces_of_a_thin_wall_are_two(alpha, x, y, along, thick):
     lines = [(alpha, (x, y), 2.0), (alpha + np.pi, beside(alpha, (x, y), along, thick), 2.0)]
-    assert duplicate_of(walls(lines, sigma=(0.1, 0.1)), {3, 10}) is None
+    assert twice(walls(lines, sigma=(0.1, 0.1)), {3, 10}) is None
 
 
 def test_the_walls_on_both_sides_of_a_door_or_of_a_wall_between_are_two():
     for gap in (-0.04, 0.0, 0.03, 0.1, 0.6):
         lines = [(0.3, (1.0, 2.0), 2.0), (0.3, beside(0.3, (1.0, 2.0), 2.0 + gap), 2.0)]
-        assert duplicate_of(walls(lines), {3, 10}) is None
+        assert twice(walls(lines), {3, 10}) is None
     overlapping = [(0.3, (1.0, 2.0), 2.0), (0.3, beside(0.3, (1.0, 2.0), 1.94), 2.0)]
-    assert duplicate_of(walls(overlapping), {3, 10}) == (3, 10)
+    assert twice(walls(overlapping), {3, 10}) == (3, 10)
 
 
 def test_a_pair_that_only_one_in_a_hundred_would_be_is_merged_all_the_same():
     """Refused once, it would stay for good; two walls on one side never stand 3 cm behind each other."""
     lines = [(0.3, (1.0, 2.0), 1.0), (0.3, beside(0.3, (1.0, 2.0), 0.0, 0.03), 1.0)]
-    assert duplicate_of(walls(lines, sigma=(0.004, 0.0067)), {3}) == (3, 10)
-    assert duplicate_of(walls(lines, sigma=(0.004, 0.003)), {3}) is None
+    assert twice(walls(lines, sigma=(0.004, 0.0067)), {3}) == (3, 10)
+    assert twice(walls(lines, sigma=(0.004, 0.003)), {3}) is None
 
 
 def test_the_joint_covariance_decides_where_geometry_does_not():
     """4 cm apart: two walls to a map that knows both to a few millimetres, one to a map that knows neither so well."""
     lines = [(0.3, (1.0, 2.0), 2.0), (0.3, beside(0.3, (1.0, 2.0), 0.0, 0.04), 2.0)]
-    assert duplicate_of(walls(lines), {3}) is None
-    assert duplicate_of(walls(lines, sigma=(0.01, 0.03)), {3}) == (3, 10)
+    assert twice(walls(lines), {3}) is None
+    assert twice(walls(lines, sigma=(0.01, 0.03)), {3}) == (3, 10)
     # What both have in common says nothing about the distance between them.
-    assert duplicate_of(walls(lines, common=0.5), {3}) is None
+    assert twice(walls(lines, common=0.5), {3}) is None
 
 
 def test_a_face_that_hides_another_is_the_same_wall_however_sure_the_filter_is_of_the_millimetres():
@@ -107,25 +111,25 @@ def test_a_face_that_hides_another_is_the_same_wall_however_sure_the_filter_is_o
         return walls([(0.3, (1.0, 2.0), 4.0), (0.3 + turn, beside(0.3, (1.0, 2.0), along, across), length)], sigma=sure)
 
     for along, across in [(0.0, 0.005), (1.9, -0.005), (0.5, 0.008)]:
-        assert duplicate_of(pair(along, across), {3}) == (3, 10)
-    assert duplicate_of(pair(0.0, 0.015), {3}) is None
-    assert duplicate_of(pair(2.2, 0.005), {3}) is None, "they share less than half of their length"
-    assert duplicate_of(pair(0.0, 0.005, length=0.9), {3}) is None, "too short to tell"
+        assert twice(pair(along, across), {3}) == (3, 10)
+    assert twice(pair(0.0, 0.015), {3}) is None
+    assert twice(pair(2.2, 0.005), {3}) is None, "they share less than half of their length"
+    assert twice(pair(0.0, 0.005, length=0.9), {3}) is None, "too short to tell"
 
 
 def test_two_walls_are_not_made_straight_before_their_turn_is_known():
     """Half a metre seen twice, beside a long wall: it may turn by 2 degrees, and one cannot take a merge back."""
     lines = [(0.3, (1.0, 2.0), 3.0), (0.3 + np.deg2rad(2.2), beside(0.3, (1.0, 2.0), 1.6), 0.5)]
-    assert duplicate_of(walls(lines, sigma=(0.015, 0.005)), {3}) is None
+    assert twice(walls(lines, sigma=(0.015, 0.005)), {3}) is None
     straight = [lines[0], (0.3, beside(0.3, (1.0, 2.0), 1.6), 0.5)]
-    assert duplicate_of(walls(straight, sigma=(0.015, 0.005)), {3}) is None
-    assert duplicate_of(walls(straight, sigma=(0.01, 0.005)), {3}) == (3, 10)
-    assert duplicate_of(walls(lines, sigma=(0.008, 0.005)), {3}) is None
+    assert twice(walls(straight, sigma=(0.015, 0.005)), {3}) is None
+    assert twice(walls(straight, sigma=(0.01, 0.005)), {3}) == (3, 10)
+    assert twice(walls(lines, sigma=(0.008, 0.005)), {3}) is None
 
 
 def test_tentative_walls_are_left_alone():
     lines = [(0.3, (1.0, 2.0), 2.0), (0.3, (1.0, 2.0), 2.0)]
-    assert duplicate_of(walls(lines, tentative=[False, True]), {3, 10}) is None
+    assert twice(walls(lines, tentative=[False, True]), {3, 10}) is None
 
 
 def test_candidates_are_those_of_a_plain_loop():
