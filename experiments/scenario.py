@@ -14,7 +14,7 @@ from explore.strategies import Strategy, make_strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
-from slam.backends import BACKENDS
+from slam.backends import BACKENDS, BackendOptions
 from slam.estimation.backend import Backend
 from slam.robot import Robot
 
@@ -58,6 +58,8 @@ class TrialConfig:
     """On the robot's own clock."""
     robot: RobotConfig = field(default_factory=RobotConfig)
     mission: MissionConfig = field(default_factory=MissionConfig)
+    backend_options: BackendOptions = field(default_factory=BackendOptions)
+    """Of every back end, so that one file of settings fits a comparison; `backend` takes its own."""
 
     @property
     def limits(self) -> Limits:
@@ -148,7 +150,7 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
         config,
         world,
         SimulatedRobot(world, config.seed, config.errorless, config.robot),
-        BACKENDS[config.backend].make(start.copy(), cov.copy()),
+        BACKENDS[config.backend].make(start.copy(), cov.copy(), config.backend_options),
         strategy,
         start,
         cov,

@@ -153,7 +153,7 @@ def replay(
     recording = run.recording
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))
-    backend_made = BACKENDS[backend].make(run.start_pose.copy(), run.start_cov.copy())
+    backend_made = BACKENDS[backend].make(run.start_pose.copy(), run.start_cov.copy(), config.backend_options)
     robot = ReplayedRobot(run, recording)
     scenario = Scenario(config, world, robot, backend_made, None, run.start_pose, run.start_cov)
     witness = Witness(truth_of(world, config.robot), run.true_poses_world, run.true_face_of_beam)

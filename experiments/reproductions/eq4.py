@@ -10,6 +10,7 @@ from slam.backends.block_ekf import BlockEkf
 from slam.backends.fej_ekf import FejEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.invariant_ekf import InvariantEkf
+from slam.backends.kalman.config import EkfConfig
 from slam.estimation.backend import Belief
 from slam.estimation.models import innovations
 from viz import palette
@@ -71,7 +72,7 @@ def sigmas(kind: type[Any], at_wall: bool, away_m: float) -> Float[np.ndarray, "
     """
     position_m, heading_rad = P0_SIGMAS["small"]
     pose = np.array([away_m, 0.0, 0.0])
-    backend = kind(pose, np.diag([position_m, position_m, heading_rad]) ** 2, at_wall=at_wall)
+    backend = kind(pose, np.diag([position_m, position_m, heading_rad]) ** 2, EkfConfig(at_wall=at_wall))
     ids = backend.grow(SEEN, SEEN_COV, np.array([[0.0, 2.0]]))
     belief: Belief = backend.belief
     joint = belief.joint(ids)

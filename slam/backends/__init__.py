@@ -1,42 +1,84 @@
 """The estimators: one file each, and one line in the registry."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from ..estimation.backend import Backend
-from .block_ekf import BlockEkf
-from .fej_ekf import FejEkf
-from .full_ekf import FullEkf
-from .invariant_ekf import InvariantEkf
-from .joint_block_ekf import JointBlockEkf
-from .relocation_ekf import RelocationEkf
+from .graph.config import GraphConfig
+from .kalman.config import EkfConfig
+
+
+@dataclass(frozen=True)
+class BackendOptions:
+    """What can be set of the back ends; each takes what is of its type."""
+
+    ekf: EkfConfig = field(default_factory=EkfConfig)
+    """Of every Kalman filter."""
+    graph: GraphConfig = field(default_factory=GraphConfig)
+    """Of both factor graphs."""
 
 
 @dataclass(frozen=True)
 class BackendEntry:
-    """How to make a back end from the first pose and its covariance, and what it is."""
+    """How to make a back end, what it is, and what can be set of it."""
 
-    make: Callable[[np.ndarray, np.ndarray], Backend]
+    kind: Callable[..., Backend]
+    """Makes one from the first pose, its covariance and, if it has some, its options."""
     description: str
+    options: type | None = None
+    """Type of its options, one of those in `BackendOptions`."""
+
+    def make(
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        pose_cov: Float[np.ndarray, "3 3"],
+        options: BackendOptions = BackendOptions(),
+    ) -> Backend:
+        """Return a back end at a pose with its covariance and an empty map."""
+        own = [each for each in vars(options).values() if type(each) is self.options]
+        return self.kind(pose_world, pose_cov, *own)
 
 
-def _lazily(module: str, name: str) -> Callable[[np.ndarray, np.ndarray], Backend]:
+def _lazily(module: str, name: str) -> Callable[..., Backend]:
     """Return a maker that imports its module (and the library behind it) when first used."""
-    return lambda pose_world, pose_cov: getattr(import_module(f".{module}", __package__), name)(pose_world, pose_cov)
+
+    def make(*args: Any) -> Backend:
+        backend: Backend = getattr(import_module(f".{module}", __package__), name)(*args)
+        return backend
+
+    return make
+
+
+def _filter(module: str, name: str, description: str) -> BackendEntry:
+    return BackendEntry(_lazily(module, name), description, EkfConfig)
 
 
 BACKENDS: dict[str, BackendEntry] = {
-    "block-ekf": BackendEntry(BlockEkf, "the paper's filter: relocation, then fusion, all cross-covariances neglected"),
-    "joint-block-ekf": BackendEntry(JointBlockEkf, "one joint update a scan, then the cross-covariances dropped"),
-    "relocation-ekf": BackendEntry(RelocationEkf, "relocation, then fusion, with every cross-covariance kept"),
-    "full-ekf": BackendEntry(FullEkf, "EKF with every cross-covariance, one joint update a scan (baseline)"),
-    "fej-ekf": BackendEntry(FejEkf, "full EKF with its Jacobians at first estimates: gains nothing unobservable"),
-    "invariant-ekf": BackendEntry(InvariantEkf, "full EKF with the right-invariant error: gains nothing unobservable"),
-    "graph": BackendEntry(
-        _lazily("graph.graph", "Graph"), "factor graph (GTSAM iSAM2): every pose kept and relinearised"
+    "block-ekf": _filter(
+        "block_ekf", "BlockEkf", "the paper's filter: relocation, then fusion, all cross-covariances neglected"
     ),
-    "graph-batch": BackendEntry(_lazily("graph.batch", "GraphBatch"), "as graph, and everything optimised at the end"),
+    "joint-block-ekf": _filter(
+        "joint_block_ekf", "JointBlockEkf", "one joint update a scan, then the cross-covariances dropped"
+    ),
+    "relocation-ekf": _filter(
+        "relocation_ekf", "RelocationEkf", "relocation, then fusion, with every cross-covariance kept"
+    ),
+    "full-ekf": _filter("full_ekf", "FullEkf", "EKF with every cross-covariance, one joint update a scan (baseline)"),
+    "fej-ekf": _filter(
+        "fej_ekf", "FejEkf", "full EKF with its Jacobians at first estimates: gains nothing unobservable"
+    ),
+    "invariant-ekf": _filter(
+        "invariant_ekf", "InvariantEkf", "full EKF with the right-invariant error: gains nothing unobservable"
+    ),
+    "graph": BackendEntry(
+        _lazily("graph.graph", "Graph"), "factor graph (GTSAM iSAM2): every pose kept and relinearised", GraphConfig
+    ),
+    "graph-batch": BackendEntry(
+        _lazily("graph.batch", "GraphBatch"), "as graph, and everything optimised at the end", GraphConfig
+    ),
 }

@@ -12,11 +12,7 @@ from .kalman.ekf import Ekf
 class BlockEkf(Ekf[BlockMap]):
     """Moves the robot by the first matches, then fuses each line with its second match alone."""
 
-    def __init__(
-        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
-    ) -> None:
-        """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(BlockMap(pose_world, pose_cov), at_wall)
+    new_map = BlockMap
 
     def update(self, first: Observations, second: Observations) -> None:
         """Relocate by `first`, then fuse `second`; a line seen several times in the scan is fused several times."""

@@ -16,16 +16,10 @@ from .kalman.linear import carry
 class FejEkf(Ekf[DenseMap]):
     """The full filter with every Jacobian at first estimates: p as it was predicted, alpha as it was first seen."""
 
-    def __init__(
-        self,
-        pose_world: Float[np.ndarray, "3"],
-        pose_cov: Float[np.ndarray, "3 3"],
-        *,
-        at_wall: bool = True,
-        relinearise: bool = True,
-    ) -> None:
-        """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(DenseMap(pose_world, pose_cov), at_wall, relinearise)
+    new_map = DenseMap
+
+    def _begin(self) -> None:
+        super()._begin()
         self._position = self._map.pose_world[:2]
         self._alpha = np.zeros(0)
         """Direction of each line when it was first seen, in the order of the map's ids."""
@@ -40,10 +34,6 @@ class FejEkf(Ekf[DenseMap]):
         row = self.belief.rows([keep, drop])[1]
         super().merge(keep, drop)
         self._alpha = np.delete(self._alpha, row)
-
-    def _begin_frame(self) -> None:
-        super()._begin_frame()
-        self._position = np.zeros(2)
 
     def _motion(self, odometry: Odometry) -> Motion:
         motion = move(self._map.pose_world, odometry.motion, self._position)
@@ -62,7 +52,7 @@ class FejEkf(Ekf[DenseMap]):
         return innovations(pose_world, anchors, means, seen.lines, seen.cov, self._position, first)
 
     def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
-        new = grow(self._map.pose_world, lines, centres, self._at_wall, self._position)
+        new = grow(self._map.pose_world, lines, centres, self._config.at_wall, self._position)
         self._alpha = np.concatenate([self._alpha, new.means[:, 0]])
         return new
 

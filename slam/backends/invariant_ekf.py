@@ -13,16 +13,10 @@ from .kalman.linear import carry
 class InvariantEkf(Ekf[DenseMap]):
     """The full filter, with P carried along after each correction: P <- D P D'."""
 
-    def __init__(
-        self,
-        pose_world: Float[np.ndarray, "3"],
-        pose_cov: Float[np.ndarray, "3 3"],
-        *,
-        at_wall: bool = True,
-        relinearise: bool = True,
-    ) -> None:
-        """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(DenseMap(pose_world, pose_cov), at_wall, relinearise)
+    new_map = DenseMap
+
+    def _begin(self) -> None:
+        super()._begin()
         self._carried_to: tuple[np.ndarray, np.ndarray] | None = None
         """Position (2,) and directions (n,) at which P holds its errors while an update is on its way."""
 
@@ -32,7 +26,7 @@ class InvariantEkf(Ekf[DenseMap]):
         There H finds the unobservable directions of P, wherever it is; the innovation is that of the estimate as it is.
         """
         here = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
-        if not self._relinearise:
+        if not self._config.relinearise:
             return here
         joint = self._map.joint(here.rows)
         PHt = joint.cov @ here.H.T

@@ -10,36 +10,6 @@ from .kalman.dense_map import DenseMap, cholesky
 from .kalman.ekf import Ekf
 
 
-class RelocationEkf(Ekf["RelocationMap"]):
-    """Moves the robot alone by the first matches, then the map alone by the second, seen from where the robot is now.
-
-    The noise of an observation that moved the robot is in the robot's error when the map is fused: both gains act on
-    the errors there were before, so that no observation counts twice (docs/estimation.md).
-    """
-
-    def __init__(
-        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], *, at_wall: bool = True
-    ) -> None:
-        """Start at a pose with its covariance and an empty map; see `Ekf`."""
-        super().__init__(RelocationMap(pose_world, pose_cov), at_wall)
-
-    def update(self, first: Observations, second: Observations) -> None:
-        """Relocate by `first`, then fuse `second`."""
-        moving, fused = self.belief.rows(first.ids), self.belief.rows(second.ids)
-        if not len(moving) + len(fused):
-            return
-        self._move_on()
-        relocation = stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
-        pose, moved = self._map.pose_world, self._map.relocated(relocation)
-        again = innovations(moved, self._map.anchors[fused], self._map.means[fused], second.lines, second.cov)
-        step = moved - pose
-        step[2] = wrap(step[2])
-        fusion = stack(fused, again)
-        # What the innovation is from the pose before, with the Jacobian of the pose now.
-        fusion = Linear(fusion.rows, fusion.H, fusion.e + fusion.H[:, :POSE] @ step, fusion.R)
-        self._map.fuse(relocation, fusion, moved, _shared_noise(first, second, relocation, fusion))
-
-
 class RelocationMap(DenseMap):
     """A map whose pose and lines are corrected by different gains."""
 
@@ -70,6 +40,32 @@ class RelocationMap(DenseMap):
         self._x[:POSE] = moved
         self._P[:, :POSE] = across.T
         self._P[:POSE, :POSE] = 0.5 * (pose_cov + pose_cov.T)
+
+
+class RelocationEkf(Ekf[RelocationMap]):
+    """Moves the robot alone by the first matches, then the map alone by the second, seen from where the robot is now.
+
+    The noise of an observation that moved the robot is in the robot's error when the map is fused: both gains act on
+    the errors there were before, so that no observation counts twice (docs/estimation.md).
+    """
+
+    new_map = RelocationMap
+
+    def update(self, first: Observations, second: Observations) -> None:
+        """Relocate by `first`, then fuse `second`."""
+        moving, fused = self.belief.rows(first.ids), self.belief.rows(second.ids)
+        if not len(moving) + len(fused):
+            return
+        self._move_on()
+        relocation = stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
+        pose, moved = self._map.pose_world, self._map.relocated(relocation)
+        again = innovations(moved, self._map.anchors[fused], self._map.means[fused], second.lines, second.cov)
+        step = moved - pose
+        step[2] = wrap(step[2])
+        fusion = stack(fused, again)
+        # What the innovation is from the pose before, with the Jacobian of the pose now.
+        fusion = Linear(fusion.rows, fusion.H, fusion.e + fusion.H[:, :POSE] @ step, fusion.R)
+        self._map.fuse(relocation, fusion, moved, _shared_noise(first, second, relocation, fusion))
 
 
 def _shared_noise(

@@ -146,7 +146,7 @@ def rows_of(study: Study, task: tuple[str, int]) -> Rows:
 
 def ridden_scores(run: RecordedRun, name: str, drive: Sightings) -> Sequence[Any]:
     """Return the scores of a back end that is handed what was seen, wall by wall."""
-    ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy()), drive)
+    ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     to_true = alignment(run.start_pose, run.true_poses_world[0])
     lines, true = ridden.joint.mean[3:].reshape(-1, 2), ridden.true_lines_world
     feet = to_world(ridden.joint.anchors + lines[:, 1:] * normals(lines[:, 0]), to_true)

@@ -101,7 +101,7 @@ def _replayed(run: RecordedRun, name: str, study: Study) -> Sequence[Any]:
 
 
 def _ridden(run: RecordedRun, name: str, drive: Sightings) -> Sequence[Any]:
-    ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy()), drive)
+    ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     off = ridden.estimated_world[:, :2] - ridden.true_poses_world[:, :2]
     rmse, lines = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), len(ridden.true_lines_world)
     try:

@@ -16,6 +16,7 @@ from slam.backends.block_ekf import BlockEkf
 from slam.backends.fej_ekf import FejEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.invariant_ekf import InvariantEkf
+from slam.backends.kalman.config import EkfConfig
 from slam.backends.relocation_ekf import RelocationEkf
 from slam.estimation.backend import Backend
 from slam.geometry.lines import normals
@@ -66,7 +67,7 @@ class Study:
 
         def make(by: Float[np.ndarray, "2"]) -> Backend:
             pose, cov = start(seed, seen.true_poses_world[0], self.p0)
-            backend: Backend = kind(pose + np.append(by, 0.0), cov, at_wall=at_wall)
+            backend: Backend = kind(pose + np.append(by, 0.0), cov, EkfConfig(at_wall=at_wall))
             return backend
 
         try:

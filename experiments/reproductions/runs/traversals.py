@@ -43,7 +43,9 @@ def traversal_numbers(config: TrialConfig) -> dict[str, dict[str, Value]]:
     seen = sightings_of(run, perfect_extraction=False)
     ours = {}
     for name in RIDERS:
-        covs = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy()), seen).estimated_cov
+        covs = ride(
+            BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), seen
+        ).estimated_cov
         sigmas = np.sqrt(covs[:, 0, 0] + covs[:, 1, 1])
         ours[name] = path | {
             "largest sigma of the position, cm": 100.0 * float(sigmas.max()),

@@ -17,7 +17,7 @@ from ...estimation.models import grow
 from ...geometry.poses import to_robot, to_world
 from ...robot import Odometry
 from .belief import believe
-from .isam import GraphConfig
+from .config import GraphConfig
 from .loose import wrapped
 from .optimum import solve_anew
 from .record import LineRecord, Record

@@ -7,30 +7,8 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
+from .config import GraphConfig
 from .factors import LINE_ROWS, POSE_ROWS, line_key, line_of, plane, pose3, pose_key, pose_of
-
-
-@dataclass(frozen=True)
-class GraphConfig:
-    """How closely iSAM2 follows the least-squares solution."""
-
-    relinearise_angle_rad: float = 0.005
-    """A pose or a line is linearised anew when it has turned by more than this: 50 m away it bends by 0.6 mm."""
-    relinearise_place_m: float = 0.2
-    """And when it has moved by more than this."""
-    closure: float = 4.0
-    """Lines that have moved by more are linearised anew with the next step, by so many times more at once."""
-    passes: int = 5
-    """At most so many rounds of linearising anew at once."""
-    wildfire: float = 1e-4
-    """Changes smaller than this, m and rad, are not passed on from one part of the map to the next."""
-    near: int = 60
-    """Lines that one question for a joint covariance may have, to be prepared for in the next steps."""
-    careful: bool = False
-    """Eliminate by QR in place of Cholesky: it also solves what is known along some directions 10,000 times better than
-    along others, as after a long way without walls, and takes a fifth longer."""
-    loose: float = 0.1
-    """A sighting is linearised anew when its line has turned so far that the distance is wrong by this many sigma."""
 
 
 class Isam:

@@ -31,8 +31,8 @@ class Loose:
     enough nothing can turn it so far, and its sightings need looking after once, when they are new.
     """
 
-    def __init__(self, tolerance: float) -> None:
-        self._tolerance = tolerance
+    def __init__(self, tolerance: float, sigmas: float) -> None:
+        self._tolerance, self._sigmas = tolerance, sigmas
         self._lines: dict[int, _Line] = {}
         self._touched: dict[int, list[int]] = {}
 
@@ -47,7 +47,7 @@ class Loose:
         at = self._lines.setdefault(line, _Line(0.0, alpha, turn))
         at.information += 0.0 if again else 1.0 / seen[2]
         self._touched.setdefault(line, []).append(number)
-        if 9.0 / at.information > turn * turn:
+        if self._sigmas**2 / at.information > turn * turn:
             at.turn = min(at.turn, turn) if at.numbers else turn
             at.numbers.append(number)
 

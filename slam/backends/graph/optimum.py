@@ -4,23 +4,24 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
-from .isam import Estimates, GraphConfig
+from .config import GraphConfig
+from .isam import Estimates
 from .record import Record
 from .solver import Solver
 
 
 def optimise(
-    record: Record, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"], rounds: int = 10
+    config: GraphConfig, record: Record, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]
 ) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
     """Return all poses and lines at the least-squares optimum (Levenberg-Marquardt), from a first guess.
 
-    Sightings are linearised anew at each optimum, at most `rounds` times; after the second it hardly moves.
+    Observations are linearised anew at each optimum, at most `rounds` times.
     """
     params = gtsam.LevenbergMarquardtParams()
     params.setRelativeErrorTol(1e-14)
     params.setAbsoluteErrorTol(1e-14)
-    for _ in range(rounds):
-        isam = Solver(GraphConfig(), record, poses, lines).isam
+    for _ in range(config.rounds):
+        isam = Solver(config, record, poses, lines).isam
         optimum = Estimates(gtsam.LevenbergMarquardtOptimizer(isam.factors, isam.values, params).optimize())
         before = poses, lines
         poses, lines = optimum.poses(len(poses)), optimum.lines(list(record.lines))
@@ -36,6 +37,6 @@ def solve_anew(
 
     Raises what `Solver.settle` raises.
     """
-    solver = Solver(config, record, *optimise(record, poses, lines))
+    solver = Solver(config, record, *optimise(config, record, poses, lines))
     solver.settle()
     return solver

@@ -11,17 +11,12 @@ from scipy.special import chdtri
 
 from ...geometry.poses import compose, wrap
 from .ahead import Ahead
+from .config import GraphConfig
 from .factors import line_factor, line_key, odometry_factor, origin_factor
 from .guess import guess
-from .isam import GraphConfig, Isam
+from .isam import Isam
 from .loose import Loose, wrapped
 from .record import Record
-
-MOST_TURN = 1.2
-"""Sightings are linearised no farther than this from the prediction, rad: beyond pi/2 a line is seen from behind."""
-
-BEYOND = float(chdtri(3, 1e-9))
-"""A pose may depart by this much, in chi-square, from where it was expected: further off once in 1e9 scans."""
 
 
 class DivergedError(RuntimeError):
@@ -45,8 +40,10 @@ class Solver:
         """
         self._config, self._record = config, record
         self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
+        self._beyond = float(chdtri(3, config.diverged_chance))
+        """A pose may depart by this much, in chi-square, from where it was expected."""
         self.isam = Isam(config)
-        self._loose = Loose(config.loose)
+        self._loose = Loose(config.loose, config.loose_sigmas)
         self._is_settled = False
         self._pose_cov = np.zeros((0, 0))
         self._keys: list[int] = []
@@ -127,7 +124,8 @@ class Solver:
         With `again` it replaces an earlier factor of the same sighting.
         """
         seen = self._record.seen[number]
-        epsilon = self._record.epsilons[number] = min(max(epsilon, -MOST_TURN), MOST_TURN)
+        most = self._config.most_turn_rad
+        epsilon = self._record.epsilons[number] = min(max(epsilon, -most), most)
         self.isam.enter(line_factor(self._record.seen_from[number], line, seen, epsilon), number)
         self._loose.note(line, number, seen, alpha, again)
         self._is_settled = False
@@ -189,8 +187,11 @@ class Solver:
             return
         self._linearised_at[astray] = self.isam.lines([self._keys[row] for row in astray.tolist()])
         moved = self.isam.moved(self._keys)
-        if not np.abs(moved[:, 0]).max() <= MOST_TURN or not np.all(np.isfinite(moved[:, 1])):
-            raise DivergedError("expected lines that turn by less than 1.2 rad at once, found one that turns further")
+        most = self._config.most_turn_rad
+        if not np.abs(moved[:, 0]).max() <= most or not np.all(np.isfinite(moved[:, 1])):
+            raise DivergedError(
+                f"expected lines that turn by less than {most:g} rad at once, found one that turns further"
+            )
         self.lines = self._linearised_at + moved
         self.lines[:, 0] = wrap(self.lines[:, 0])
         self._astray = np.max(np.abs(moved) / self._thresholds, axis=1)
@@ -204,13 +205,15 @@ class Solver:
         off[2] = wrap(off[2])
         linear = self._thresholds[[1, 1, 0]]
         beyond = float(np.sum(np.square(off / linear)))
-        if BEYOND < beyond < np.inf:
+        if self._beyond < beyond < np.inf:
             if not len(self._expected_cov):  # The first solution of a graph made anew: nothing was expected.
                 return
             cov = np.diag(linear**2) + self._ahead.pose_cov(self._expected_cov)
             beyond = float(off @ np.linalg.solve(cov, off))
-        if not beyond <= BEYOND:
-            raise DivergedError(f"expected a pose within chi-square {BEYOND:.0f} of its prediction, found {beyond:.3g}")
+        if not beyond <= self._beyond:
+            raise DivergedError(
+                f"expected a pose within chi-square {self._beyond:.0f} of its prediction, found {beyond:.3g}"
+            )
 
     def _tighten(self) -> int:
         """Collect anew the sightings that their line's present direction puts wrong; return how many."""

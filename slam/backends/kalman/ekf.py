@@ -4,7 +4,7 @@ A filter is this class with a map that keeps all covariances or only blocks, and
 where it takes its Jacobians, which observations move what, what it does to P afterwards.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
@@ -15,8 +15,10 @@ from ...estimation.backend import POSE, Belief, Joint, Observations, StaleBelief
 from ...estimation.models import Growth, Innovations, Linear, Motion, grow, innovations, move, stack
 from ...robot import Odometry
 from ..frame import Frame
+from .config import EkfConfig
 from .linear import equality
 
+DEFAULTS = EkfConfig()
 ONE_WALL = 1e-12 * np.eye(2)
 """Two lines known to be one leave S singular: a thousandth of a millimetre keeps it invertible."""
 
@@ -74,20 +76,22 @@ class Ekf(Generic[M]):
     works in that frame, and only `belief` is in the world's.
     """
 
-    def __init__(self, gaussian: M, at_wall: bool, relinearise: bool = True) -> None:
-        """Start from a map without lines.
+    new_map: Callable[[np.ndarray, np.ndarray], M]
+    """Makes the map that this filter works on, from a pose and its covariance."""
+    _slip: Float[np.ndarray, "3 3"]
+    """Covariance of what the wheels have slipped since the last update."""
 
-        With `at_wall` lines are anchored where they were seen; without, at the world's origin (the paper's form).
-        With `relinearise` a joint update takes its Jacobian where the wheels slipped to.
-        """
-        self._map = gaussian
-        self._at_wall, self._relinearise = at_wall, relinearise
-        self._slip = np.zeros((POSE, POSE))
-        """Covariance of what the wheels have slipped since the last update."""
+    def __init__(
+        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], config: EkfConfig = DEFAULTS
+    ) -> None:
+        """Start at a pose with its covariance and an empty map."""
+        self._map = self.new_map(pose_world, pose_cov)
+        self._config = config
         self._frame: Frame | None = None
         self._has_driven = False
         self._version = 0
         self._belief: Belief | None = None
+        self._begin()
 
     @property
     def belief(self) -> Belief:
@@ -117,7 +121,7 @@ class Ekf(Generic[M]):
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> Int[np.ndarray, " m"]:
         """Add lines seen in the robot frame and return their ids."""
-        if self._at_wall and self._has_driven and not len(self._map.ids):
+        if self._config.at_wall and self._has_driven and not len(self._map.ids):
             self._begin_frame()
         self._move_on()
         new = self._growth(lines, centres)
@@ -140,11 +144,15 @@ class Ekf(Generic[M]):
         self._move_on()
         self._map.drop(rows)
 
+    def _begin(self) -> None:
+        """Begin what the filter remembers beside its map, which has no lines."""
+        self._slip = np.zeros((POSE, POSE))
+
     def _begin_frame(self) -> None:
         """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
         self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
         self._map.move(np.zeros(POSE), np.zeros((POSE, POSE)), np.zeros((POSE, POSE)))
-        self._slip = np.zeros((POSE, POSE))
+        self._begin()
 
     def _motion(self, odometry: Odometry) -> Motion:
         return move(self._map.pose_world, odometry.motion)
@@ -160,7 +168,7 @@ class Ekf(Generic[M]):
         return innovations(pose_world, self._map.anchors[rows], means, seen.lines, seen.cov)
 
     def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
-        return grow(self._map.pose_world, lines, centres, self._at_wall)
+        return grow(self._map.pose_world, lines, centres, self._config.at_wall)
 
     def _condition(self, model: Linear) -> None:
         self._map.condition(model)
@@ -178,7 +186,7 @@ class Ekf(Generic[M]):
         """
         pose, means = self._map.pose_world, self._map.means[rows]
         here = stack(rows, self._innovations(rows, seen, pose, means))
-        if not self._relinearise:
+        if not self._config.relinearise:
             return here
         H = here.H[:, :POSE]
         step = self._slip @ H.T @ np.linalg.solve(H @ self._slip @ H.T + here.R, here.e)

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS
+from slam.backends import BACKENDS, BackendOptions
 from slam.backends.block_ekf import weighted_mean
 from slam.backends.full_ekf import FullEkf
+from slam.backends.kalman.config import EkfConfig
 from slam.backends.kalman.dense_map import DenseMap
 from slam.estimation.backend import Observations
 from slam.estimation.models import Linear
@@ -131,8 +132,8 @@ def test_the_full_filter_stays_sound_over_ten_thousand_steps(make_walls):
 def known_apart(name, walls, count, rng):
     """Return a back end whose pose and lines are uncorrelated: a sure robot enters lines, then loses itself."""
     # The paper's filter takes its Jacobians at the prediction: so must the others, to be compared with it.
-    at_prediction = {} if name == "block-ekf" else {"relinearise": False}
-    backend = BACKENDS[name].make(START, 1e-20 * np.eye(3), **at_prediction)
+    at_prediction = BackendOptions(EkfConfig(relinearise=False))
+    backend = BACKENDS[name].make(START, 1e-20 * np.eye(3), at_prediction)
     ids = backend.grow(*walls.look(START, np.arange(count), rng))
     backend.predict(Odometry(np.zeros(3), P0))
     lines, cov, _ = walls.look(START + np.array([0.02, -0.01, 0.006]), np.arange(count), rng)
@@ -231,7 +232,7 @@ def test_only_lines_about_the_worlds_origin_feel_where_the_world_lies(name, make
 
     def run(at_wall, shift):
         rng, walls = np.random.default_rng(55), make_walls()
-        backend = BACKENDS[name].make(START + np.append(shift, 0.0), P0, at_wall=at_wall)
+        backend = BACKENDS[name].make(START + np.append(shift, 0.0), P0, BackendOptions(EkfConfig(at_wall=at_wall)))
         for _ in walls.tour(backend, START, rng, 60):
             pass
         return backend.belief.pose_world - np.append(shift, 0.0)
@@ -248,7 +249,7 @@ def test_only_lines_about_the_worlds_origin_feel_where_the_world_lies(name, make
 @pytest.mark.parametrize("name", EKFS)
 def test_both_forms_of_a_line_are_sound_through_removals_and_mergers(name, at_wall, make_walls):
     rng, walls = np.random.default_rng(56), make_walls()
-    backend, true = BACKENDS[name].make(START, P0, at_wall=at_wall), START
+    backend, true = BACKENDS[name].make(START, P0, BackendOptions(EkfConfig(at_wall=at_wall))), START
     for round_ in range(12):
         *_, true = walls.tour(backend, true, rng, 3)  # each tour enters all its walls anew
         ids, lines = backend.belief.ids, backend.belief.lines_world

@@ -3,6 +3,7 @@
 import numpy as np
 
 from slam.backends.full_ekf import FullEkf
+from slam.backends.kalman.config import EkfConfig
 from slam.geometry.poses import compose, wrap
 from slam.robot import Odometry
 from tests.slam.backends.conftest import Walls
@@ -17,7 +18,7 @@ SEEDS = 20
 
 def heading_nees(walls, relinearise, seed):
     """Return the NEES of the heading against the first wall, after a blind metre and 60 looks at new walls."""
-    rng, backend = np.random.default_rng(seed), FullEkf(START, P0, relinearise=relinearise)
+    rng, backend = np.random.default_rng(seed), FullEkf(START, P0, EkfConfig(relinearise=relinearise))
     known = backend.grow(*walls.look(START, np.arange(3), rng))
     backend.predict(Odometry(np.zeros(3), LOST))
     lost = compose(START, np.sqrt(np.diag(LOST)) * rng.standard_normal(3))

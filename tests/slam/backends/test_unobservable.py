@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS
+from slam.backends import BACKENDS, BackendOptions
+from slam.backends.kalman.config import EkfConfig
 from slam.backends.kalman.dense_map import DenseMap
 from slam.backends.kalman.linear import carry, equality
 from slam.estimation.backend import Observations
@@ -149,7 +150,7 @@ class Recorder(DenseMap):
 def test_the_observability_matrix_keeps_three_directions_unseen_only_where_jacobians_agree(name, at_wall, make_walls):
     rng, walls = np.random.default_rng(41), make_walls(16, sigmas=(0.01, 0.01))
     make = BACKENDS[name].make
-    backend = make(START, P0, at_wall=at_wall)
+    backend = make(START, P0, BackendOptions(EkfConfig(at_wall=at_wall)))
     recorder = Recorder(START, P0)
     backend._map = recorder
     true = START + np.sqrt(np.diag(P0)) * rng.standard_normal(3)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from slam.backends.graph.batch import GraphBatch
+from slam.backends.graph.config import GraphConfig
 from slam.backends.graph.graph import Graph
-from slam.backends.graph.isam import GraphConfig
 from slam.geometry.lines import normals
 from slam.geometry.poses import compose, rotation, to_world, wrap
 from slam.robot import Odometry
