@@ -7,7 +7,6 @@ import shapely
 
 from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
 from explore.step import Step
-from sim.logs.recorded_robot import FORMAT
 from slam.estimation.backend import Joint
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
@@ -15,6 +14,7 @@ from slam.map.stochastic_map import StochasticMap
 from ..scoring.certificate import contour_record, open_end_record, unexplained_record, unseen_record
 from ..scoring.corners import Corner, corners
 from ..scoring.records import Log
+from .formats import FORMAT
 
 FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
 LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'

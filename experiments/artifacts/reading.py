@@ -16,9 +16,9 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from sim.logs.archive import ArchiveError, read_archive, regular
-from sim.logs.recorded_robot import FORMAT
 
 from ..scenario import UsageError
+from .formats import FORMAT
 
 LIMIT_BYTES = 2**26
 """A JSON file of more than this is not read."""
@@ -83,27 +83,61 @@ def told(path: Path, todo: str) -> Iterator[None]:
         raise UsageError(f"{expected}, found {error}: {todo}") from error
 
 
-def read_json(path: Path, shape: Mapping[str, Shape], todo: str) -> dict[str, Any]:
-    """Return the object in a file of this format, of a shape; raises UsageError, with what to do about it."""
+def read_json(
+    path: Path, shape: Mapping[str, Shape], todo: str, formats: tuple[int, ...] = (FORMAT,)
+) -> dict[str, Any]:
+    """Return the object in a file of one of these formats, of a shape; raises UsageError, with what to do about it."""
     with told(path, todo):
-        if regular(path).stat().st_size > LIMIT_BYTES:
-            raise UnfitError(f"more than {LIMIT_BYTES >> 20} MiB")
-        return parse_json(path.read_bytes(), shape)
+        return _formed(read_plain(path), shape, formats)
 
 
-def parse_json(content: bytes, shape: Mapping[str, Shape]) -> dict[str, Any]:
-    """Return the object in some JSON of this format, of a shape; raises UnfitError."""
+def parse_json(content: bytes, shape: Mapping[str, Shape], formats: tuple[int, ...] = (FORMAT,)) -> dict[str, Any]:
+    """Return the object in some JSON of one of these formats, of a shape; raises UnfitError."""
+    return _formed(plain_json(content), shape, formats)
+
+
+def read_plain(path: Path) -> dict[str, Any]:
+    """Return the object in a file of JSON, whatever its keys; raises UnfitError, OSError."""
+    if regular(path).stat().st_size > LIMIT_BYTES:
+        raise UnfitError(f"more than {LIMIT_BYTES >> 20} MiB")
+    said = plain_json(path.read_bytes())
+    if not isinstance(said, dict):
+        raise UnfitError(f"{_shown(said)} where the file should be an object")
+    return said
+
+
+def plain_json(content: bytes) -> Any:
+    """Return what some JSON holds, of bounded depth and length, without a number that is none; raises UnfitError."""
     try:
-        said = json.loads(content.decode(), parse_int=_whole, parse_float=_real, parse_constant=_real)
+        said = json.loads(
+            content.decode(),
+            parse_int=_whole,
+            parse_float=_real,
+            parse_constant=_real,
+            object_pairs_hook=_once,
+        )
     except UnfitError:
         raise
     except (ValueError, RecursionError) as error:
         raise UnfitError("no JSON, or some that was cut short") from error
     _plain(said)
+    return said
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of which every key stands there once."""
+    said = dict(pairs)
+    if len(said) < len(pairs):
+        raise UnfitError("a key that stands there twice")
+    return said
+
+
+def _formed(said: Any, shape: Mapping[str, Shape], formats: tuple[int, ...]) -> dict[str, Any]:
     if not isinstance(said, dict) or "format" not in said:
         raise UnfitError("no format number")
-    if type(said["format"]) is not int or said["format"] != FORMAT:
-        raise UnfitError(f"format {_shown(said['format'])}, where this version reads {FORMAT}")
+    if type(said["format"]) is not int or said["format"] not in formats:
+        known = " and ".join(map(str, formats))
+        raise UnfitError(f"format {_shown(said['format'])}, where this version reads {known}")
     fit(shape, said)
     return said
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sim.logs.recorded_robot import FORMAT
+from sim.logs.recorded_robot import FORMAT as LOG_FORMAT
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
 from viz.figures.floor_plan import floor_plan
@@ -21,6 +21,7 @@ from ..scoring.records import Log
 from ..scoring.summary import odometry_path, pose_nees
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
+from .formats import CONFIG_FORMAT, FORMAT
 from .geojson import map_geojson
 from .occupancy import occupancy_files
 from .picture import picture_of
@@ -108,7 +109,7 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"format": FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
+    return {"format": CONFIG_FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
 
 
 def _commit() -> str | None:
@@ -129,7 +130,7 @@ def _commit() -> str | None:
 def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
     """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
     return {
-        "format": FORMAT,
+        "format": LOG_FORMAT,
         "time_s": log.time_s,
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,

@@ -12,6 +12,7 @@ from typing import Any
 from ..scenario import UsageError
 from .files import PART, json_bytes, write
 from .results import CONFIG, REPLAY, RUN_FILES
+from .settings import of_this_format
 
 LOCK = ".lock"
 
@@ -145,6 +146,7 @@ def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
         there = json.loads((folder / CONFIG).read_text())
         if "campaign" in there or "merged" in there:
             return _CAMPAIGN
+        there = of_this_format(there)
         now = json.loads(json_bytes(config))
         if there.get(REPLAY) != now.get(REPLAY):
             return "a replay of other options" if REPLAY in there and REPLAY in now else "another kind of run"

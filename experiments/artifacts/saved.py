@@ -22,6 +22,7 @@ from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
 from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
 from .results import LOG, RUNNING
 from .running_log import Kept, read_running
+from .settings import READABLE, of_this_format
 
 REMEDY = "keep a run's files together, or make it anew"
 NUMBERS = (
@@ -132,24 +133,26 @@ class SavedConfig:
     commit: str | None
 
 
-CONFIG = {"trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "replay?": Any}
+CONFIG = {"format": int, "trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "replay?": Any}
 
 
 def read_config(path: Path) -> SavedConfig:
     """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
-    return _config_of(read_json(path, CONFIG, REMEDY), path)
+    return _config_of(read_json(path, {}, REMEDY, READABLE), path)
 
 
 def _trial_of(kept: Kept, path: Path) -> TrialConfig:
     with told(path, REMEDY):
-        said = parse_json(kept.config, CONFIG)
+        said = parse_json(kept.config, {}, READABLE)
     return _config_of(said, path).trial
 
 
 def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
     with told(path, REMEDY):
-        for key in said.keys() - {"format", *(key.removesuffix("?") for key in CONFIG)}:
+        for key in said.keys() - {key.removesuffix("?") for key in CONFIG}:
             raise UnfitError(f"an unknown {key[:40]!r}")
+        said = of_this_format(said)
+        fit(CONFIG, said)
         trial: TrialConfig = fit(TrialConfig, said["trial"], "trial")
     return SavedConfig(trial, said.get("replay"), said.get("versions", {}), said.get("commit"))
 

@@ -6,9 +6,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from sim.logs.recorded_robot import FORMAT
-
 from ..artifacts.files import csv_bytes, json_bytes, write
+from ..artifacts.formats import FORMAT
 from ..artifacts.reading import read_json
 from ..scenario import UsageError
 from .comparison import shapes

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from sim.logs.recorded_robot import FORMAT
+from experiments.artifacts.formats import CONFIG_FORMAT
 
 from ..artifacts.files import json_bytes, write
+from ..artifacts.settings import plain
 from ..scenario import UsageError
 from ..scoring.summary import TIMED
 from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
 from .scores.score import Record
-from .store import CONFIG, MERGED, Store, opened_anew, plain, read_campaigns, read_config
+from .store import CONFIG, MERGED, Store, opened_anew, read_campaigns, read_config
 
 SHARED = ("driver", "p0", "max_steps")
 """What campaigns must have in common to be one."""
@@ -49,7 +50,7 @@ def merge(folders: Sequence[Path], out: Path) -> None:
             copy = merged.path(trial)
             copy.parent.mkdir(parents=True, exist_ok=True)
             write(copy, store.path(trial).read_bytes())
-        config = {"format": FORMAT, MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
+        config = {"format": CONFIG_FORMAT, MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
         write(out / CONFIG, json_bytes(config | {"from": [read_config(folder).said for folder in folders]}))
         write_tables(out, levels, in_order(found, levels), merged.record)
 

@@ -10,6 +10,7 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.backends import BACKENDS
 
+from ..artifacts.settings import nested, trial_of
 from ..replays.replay import Association
 from ..scenario import P0, TrialConfig, UsageError, check, choose
 
@@ -40,6 +41,8 @@ class Campaign:
     max_steps: int = MAX_STEPS
     """A trial is stopped, and counts as a failure, after this many scans."""
     first_seed: int = 1
+    settings: tuple[tuple[str, Any], ...] = ()
+    """Of every trial, over the defaults: dotted keys of `config.json` and their values."""
 
     @property
     def seeds(self) -> range:
@@ -76,6 +79,9 @@ class Trial:
         folder = Path(world_key(self.world)) / self.strategy
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
+
+DECIDED = ("world", "backend", "strategy", "seed", "p0", "max_steps", "errorless", "start")
+"""Settings of a trial that the campaign itself decides, or that would make its statistics none."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "smoke": {
@@ -118,10 +124,15 @@ def recordings(campaign: Campaign) -> list[Trial]:
 
 def config_of(campaign: Campaign, trial: Trial) -> TrialConfig:
     """Return the settings of one trial; those of a recording are its driver's."""
-    backend = trial.backend or campaign.driver
-    return TrialConfig(
-        trial.world, backend, trial.strategy, trial.seed, campaign.p0, False, max_steps=campaign.max_steps
-    )
+    decided = {
+        "world": trial.world,
+        "backend": trial.backend or campaign.driver,
+        "strategy": trial.strategy,
+        "seed": trial.seed,
+        "p0": campaign.p0,
+        "max_steps": campaign.max_steps,
+    }
+    return trial_of(nested(campaign.settings), decided)
 
 
 def world_key(world: str) -> str:

@@ -1,6 +1,5 @@
 """A campaign's folder: a file for each trial, written whole or not at all, so that whatever stops it can go on."""
 
-import json
 import os
 import sys
 from collections.abc import Iterator
@@ -10,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from sim.logs.archive import regular
-from sim.logs.recorded_robot import FORMAT
 
 from ..artifacts.files import json_bytes, write
+from ..artifacts.formats import CONFIG_FORMAT
 from ..artifacts.reading import Each, UnfitError, fit, read_json, told
 from ..artifacts.results import config_record
 from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
+from ..artifacts.settings import READABLE, of_this_format, plain
 from ..scenario import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .scores.score import Record
@@ -56,7 +56,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             # So that the recording is one that `chainslam replay` takes, too.
             config = config_of(self.campaign, done.trial.recording)
-            write(path.with_name(CONFIG), json_bytes({"format": FORMAT, "trial": asdict(config)}))
+            write(path.with_name(CONFIG), json_bytes({"format": CONFIG_FORMAT, "trial": asdict(config)}))
             write(path, done.log)
         if done.trial.arm != "recording":
             path = self.path(done.trial)
@@ -114,8 +114,9 @@ def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
 
 def read_config(folder: Path) -> Settled:
     """Return the config of a campaign's folder; raises UsageError where it has none."""
-    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY)
+    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY, READABLE)
     with told(folder / CONFIG, REMEDY):
+        said = of_this_format(said)
         if MERGED in said:
             fit({MERGED: [dict], "from": [dict]}, said)
         campaigns = tuple(fit(Campaign, each, "campaign") for each in said.get(MERGED, [said.get("campaign")]))
@@ -140,7 +141,7 @@ def _settle(folder: Path, campaign: Campaign) -> None:
         digests = world_digests(campaign)
     except OSError as error:
         raise UsageError(f"expected readable worlds, found {error.filename} ({error.strerror})") from error
-    now = plain({"format": FORMAT, "campaign": asdict(campaign), "worlds_sha256": digests})
+    now = plain({"format": CONFIG_FORMAT, "campaign": asdict(campaign), "worlds_sha256": digests})
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
     if before is None:
@@ -160,8 +161,3 @@ def _settle(folder: Path, campaign: Campaign) -> None:
             file=sys.stderr,
         )
         write(path, json_bytes(before | {"resumed_with": [*before.get("resumed_with", []), made_with]}))
-
-
-def plain(value: Any) -> Any:
-    """Return a value as it comes back from a JSON file."""
-    return json.loads(json_bytes(value))

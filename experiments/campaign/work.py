@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.logs.archive import read_archive
-from sim.logs.recorded_robot import FORMAT, read_log
+from sim.logs.recorded_robot import read_log
 from sim.worlds import World
 from slam.extraction.extract import NO_BENDS, extract
 from slam.extraction.segments import Segments
@@ -18,6 +18,7 @@ from slam.mapper import Extractor
 from slam.robot import Scan
 
 from ..artifacts.files import json_bytes, npz_bytes
+from ..artifacts.formats import FORMAT
 from ..artifacts.reading import Each, Maybe, UnfitError, parse_json
 from ..artifacts.results import log_arrays
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of

@@ -4,6 +4,7 @@ import io
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import tyro
@@ -103,17 +104,24 @@ def _parse(arguments: Sequence[str] | None) -> Command:
     said = io.StringIO()
     try:
         with redirect_stderr(said):
-            command: Command = tyro.extras.subcommand_cli_from_dict(
+            command: Any = tyro.extras.subcommand_cli_from_dict(
                 COMMANDS,
                 prog="chainslam",
                 description="Explore a building by wall following and map it as chains of line segments.",
                 args=words,
             )
-        return command
+        asked: Command = replace(command, given=given(words)) if isinstance(command, Explore) else command
+        return asked
     except SystemExit as leaving:
         if leaving.code in (0, None):
             raise
         raise UsageError(_one_line(said.getvalue())) from leaving
+
+
+def given(words: Sequence[str]) -> frozenset[str]:
+    """Return the options that stand in a command, by the names of their fields: `--no-sweep` and `--sweep` are one."""
+    options = [word.partition("=")[0].removeprefix("--").replace("-", "_") for word in words if word[:2] == "--"]
+    return frozenset(options) | {option.removeprefix("no_") for option in options}
 
 
 def _one_line(boxed: str) -> str:

@@ -4,8 +4,11 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import tyro
+
+from ..artifacts.settings import defaults, leaves, over, parse_setting, read_settings
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.tables import write_tables
 from ..campaign.comparison.words import left_out
@@ -13,7 +16,7 @@ from ..campaign.contrast import contrast, read_contrast
 from ..campaign.merge import merge
 from ..campaign.pages.contrast_page import verdict
 from ..campaign.pages.film import record_campaign
-from ..campaign.plan import ARMS, CLOSED, MAX_STEPS, PRESETS, Campaign, check_campaign, trials
+from ..campaign.plan import ARMS, CLOSED, DECIDED, MAX_STEPS, PRESETS, Campaign, check_campaign, trials
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened
 from ..replays.replay import Association
@@ -58,6 +61,11 @@ class Compare:
     """Covariance of the start."""
     max_steps: int | None = None
     """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
+    config: Path | None = None
+    """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
+    itself (worlds, back ends, seeds, limits) is not taken from there."""
+    set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
+    """One setting of every trial by its key in `config.json`, over those of --config; may be given again."""
     jobs: int | None = None
     """Number of processes; all cores by default. The results are the same."""
     dask: str | None = None
@@ -85,8 +93,20 @@ class Compare:
             "driver": self.driver,
             "p0": self.p0,
             "first_seed": self.first_seed,
+            "settings": self._settings(),
         }
         return Campaign(**chosen, arms=tuple(arms), **settings)
+
+    def _settings(self) -> tuple[tuple[str, Any], ...]:
+        """Return what --config and --set change of every trial, by dotted keys in alphabetical order."""
+        named = [parse_setting(words) for words in self.set]
+        for key, _ in leaves(over({}, *named)):
+            if key in DECIDED:
+                raise UsageError(f"expected --set of what a campaign leaves open, found {key!r}: it has its own option")
+        base = {} if self.config is None else read_settings(self.config)
+        before = dict(leaves(defaults()))
+        asked = over({key: value for key, value in base.items() if key not in DECIDED}, *named)
+        return tuple(sorted((key, value) for key, value in leaves(asked) if before.get(key, value) != value))
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

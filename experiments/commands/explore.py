@@ -6,8 +6,6 @@ from typing import Annotated, Any
 
 import tyro
 
-from explore.goals.explorer import ExplorerConfig
-from explore.mission import MissionConfig
 from explore.step import Step
 from sim.worlds import World
 
@@ -15,6 +13,7 @@ from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
+from ..artifacts.settings import nested, parse_setting, read_settings, trial_of
 from ..scenario import P0, TrialConfig, UsageError, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -24,7 +23,16 @@ from ..views.timelines import Recording
 from .echo import echo_world
 
 MAX_STEPS = TrialConfig.max_steps
-SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale")
+KEYS = {
+    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
+    "scale": "scale",
+    "max_path": "max_path_m",
+    "time_limit": "time_limit_s",
+    "sweep": "mission.explorer.sweep",
+    "return_to_start": "mission.return_to_start",
+}
+"""Options that decide a run, and their keys in `config.json`."""
+SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale", "config", "set")
 """What a saved run has settled; only its limits may be others when it goes on."""
 
 
@@ -64,6 +72,11 @@ class Explore:
     is refused."""
     force: bool = False
     """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
+    config: Path | None = None
+    """Settings from this file: a run's `config.json`, or an object of some of its keys. An option that is given goes
+    before it, and so does --set."""
+    set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
+    """One setting by its key in `config.json`, as `mission.mapper.matching.gate=0.95`; may be given again."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """In place of WORLD: go on with the run in this folder, stopped or killed, up to its own limits or to those given
     now. It is driven again from its start, which takes as long as it took, and leaves what a run that was never
@@ -72,26 +85,25 @@ class Explore:
     """Record the run for Rerun's viewer into this file (`chainslam view FILE` opens it)."""
     view: bool = False
     """Open Rerun's viewer and show the run as it goes on, instead of recording it."""
+    given: tyro.conf.Suppress[frozenset[str]] = frozenset()
+    """The options that stand in the command, with whatever value."""
 
     @property
     def trial(self) -> TrialConfig:
-        """What decides the run, without where its results go; raises UsageError where no world is named."""
-        if self.world is None:
+        """What decides the run, without where its results go; raises UsageError where no world is named.
+
+        An option wins over --set, that over --config, that over the defaults.
+        """
+        given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
+        options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
+        base = {} if self.config is None else read_settings(self.config)
+        trial = trial_of(base, *map(parse_setting, self.set), options)
+        if not trial.world:
             raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
-        return TrialConfig(
-            world=self.world,
-            backend=self.backend,
-            strategy=self.strategy,
-            seed=self.seed,
-            p0=self.p0,
-            errorless=self.errorless,
-            max_steps=MAX_STEPS if self.max_steps is None else self.max_steps,
-            start=self.start,
-            scale=self.scale,
-            max_path_m=self.max_path,
-            time_limit_s=self.time_limit,
-            mission=MissionConfig(explorer=ExplorerConfig(sweep=self.sweep), return_to_start=self.return_to_start),
-        )
+        return trial
+
+    def _is_given(self, name: str) -> bool:
+        return name in self.given or getattr(self, name) != getattr(Explore, name)
 
     def continued(self, saved: TrialConfig) -> TrialConfig:
         """Return a saved run with the limits given now; raises UsageError where anything else is given, too."""

@@ -12,11 +12,11 @@ import pyarrow.parquet as pq
 from jaxtyping import Float
 
 from sim.logs.archive import regular
-from sim.logs.recorded_robot import FORMAT
 from slam.association.matching import MatchingConfig
 from slam.evaluation.consistency import chi2_band, pooled_band
 
 from ...artifacts.files import csv_bytes, json_bytes, write
+from ...artifacts.formats import FORMAT
 from ...artifacts.reading import UnfitError, told
 from ...scoring.measurements import Z_95
 from ..plan import Campaign, Trial

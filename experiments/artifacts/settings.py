@@ -1,0 +1,165 @@
+"""Settings of a trial by name: from a file (`--config`) and one by one (`--set KEY=VALUE`), over the defaults.
+
+Keys are those of `config.json`, with a dot between an object and what it holds: `mission.mapper.matching.gate`.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, is_dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from ..scenario import TrialConfig, UsageError
+from .files import json_bytes
+from .formats import CONFIG_FORMAT
+from .reading import UnfitError, fit, plain_json, read_json, read_plain, told
+
+REMEDY = "name a run's config.json, or a JSON object with some of its keys"
+SEE = "config.json of any run names all"
+Record = dict[str, Any]
+
+
+def read_settings(path: Path) -> Record:
+    """Return the settings in a file, as a nested record: a run's whole `config.json`, or an object of some keys of one.
+
+    Raises UsageError, in one line, for any other file, and for a key that no trial has.
+    """
+    with told(path, REMEDY):
+        said = read_plain(path)
+        if "trial" not in said:
+            for key, value in leaves(said):
+                _place(key, value)
+            return said
+        said = of_this_format(read_json(path, {"trial": dict}, REMEDY, READABLE))["trial"]
+        fit(TrialConfig, said, "trial")
+    return said
+
+
+RENAMED: dict[str, str | None] = {}
+"""Settings of a trial that had other names in format 1 of `config.json`; None where there is none any more."""
+READABLE = (1, CONFIG_FORMAT)
+"""Formats of `config.json` that can be read."""
+
+
+def of_this_format(said: Record) -> Record:
+    """Return what a `config.json` of a readable format says, with the keys that it has today.
+
+    A setting that an older format lacks is the default: that is what ruled the run. Raises UnfitError for a trial that
+    lacks a setting, or has one too many.
+    """
+    if said["format"] == CONFIG_FORMAT:
+        return said
+    said = dict(said)
+    if isinstance(said.get("trial"), dict):
+        settings = [(RENAMED.get(key, key), value) for key, value in leaves(said["trial"])]
+        said["trial"] = over(defaults(), nested((key, value) for key, value in settings if key is not None))
+    if isinstance(said.get("campaign"), dict):
+        said["campaign"] = {"settings": []} | said["campaign"]
+    if isinstance(said.get("merged"), list):
+        said["merged"] = [{"settings": []} | each if isinstance(each, dict) else each for each in said["merged"]]
+    return said | {"format": CONFIG_FORMAT}
+
+
+def parse_setting(text: str) -> Record:
+    """Return one `KEY=VALUE` as a nested record; raises UsageError for a key that no trial has and for other text.
+
+    A value is JSON; what is no JSON is text.
+    """
+    key, equals, words = text.partition("=")
+    if not equals or not key:
+        raise UsageError(f"expected --set KEY=VALUE, found {text[:60]!r}: write it so")
+    try:
+        value = _value(words)
+        _place(key, value)
+    except UnfitError as error:
+        raise UsageError(f"expected a setting, found {error}: {SEE}") from error
+    for part in reversed(key.split(".")):
+        value = {part: value}
+    return dict(value)
+
+
+def over(base: Record, *changes: Mapping[str, Any]) -> Record:
+    """Return a nested record with the changes laid over it, the last one on top."""
+    result = dict(base)
+    for change in changes:
+        for key, value in change.items():
+            both = isinstance(value, Mapping) and isinstance(result.get(key), dict)
+            result[key] = over(result[key], value) if both else value
+    return result
+
+
+def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
+    """Return the settings of a trial: the defaults with some nested records over them, the last one on top.
+
+    Raises UsageError for a value of another type than its key's.
+    """
+    record = over(defaults(), *changes)
+    try:
+        trial: TrialConfig = fit(TrialConfig, record)
+    except UnfitError as error:
+        raise UsageError(f"expected settings of a trial, found {error}: {SEE}") from error
+    return trial
+
+
+def defaults() -> Record:
+    """Return the settings of a trial as they are where nothing else is said, as they come back from a file."""
+    record: Record = plain(asdict(TrialConfig("")))
+    return record
+
+
+def plain(value: Any) -> Any:
+    """Return a value as it comes back from a JSON file."""
+    return json.loads(json_bytes(value))
+
+
+def leaves(record: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the dotted key and the value of everything in a nested record that holds nothing itself."""
+    for key, value in record.items():
+        if isinstance(value, Mapping) and value:
+            yield from leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def nested(settings: Iterable[tuple[str, Any]]) -> Record:
+    """Return the nested record of dotted keys and their values."""
+    result: Record = {}
+    for key, value in settings:
+        for part in reversed(key.split(".")):
+            value = {part: value}
+        result = over(result, value)
+    return result
+
+
+def _place(key: str, value: Any) -> None:
+    """Raise UnfitError where a trial has no such setting, or where the value is of another type."""
+    kind: Any = TrialConfig
+    parts = key.split(".")
+    for depth, part in enumerate(parts):
+        kind = _inner(kind)
+        if kind is None:
+            raise UnfitError(f"{key[:80]!r} below {'.'.join(parts[:depth])!r}, which is one value")
+        hints = get_type_hints(kind)
+        if part not in hints or part not in kind.__dataclass_fields__:
+            near = get_close_matches(key, [name for name, _ in leaves(defaults())], 3, 0.5)
+            raise UnfitError(f"the unknown key {key[:80]!r}" + (f" (is it {' or '.join(near)}?)" if near else ""))
+        kind = hints[part]
+    if _inner(kind) is not None and value is not None:
+        raise UnfitError(f"{key!r}, which holds several settings: name one of them")
+    fit(kind, value, key)
+
+
+def _inner(kind: Any) -> Any:
+    """Return the dataclass that a type is, or may be beside None; None where it is none."""
+    options = [kind, *getattr(kind, "__args__", ())]
+    return next((option for option in options if isinstance(option, type) and is_dataclass(option)), None)
+
+
+def _value(words: str) -> Any:
+    try:
+        return plain_json(words.encode(errors="surrogateescape"))
+    except UnfitError as error:
+        if words[:1].isalpha() and words.isprintable() and words not in ("NaN", "Infinity"):
+            return words
+        raise UnfitError(f"the value {words[:40]!r} ({error})") from error
