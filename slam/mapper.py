@@ -11,6 +11,7 @@ from .association.ambiguity import TornConfig, observed_either_way
 from .association.joint_compatibility import relocate
 from .association.matching import KnownWalls, Matches, MatchingConfig, match
 from .estimation.backend import Backend, Observations
+from .extraction.config import ExtractionConfig
 from .extraction.extract import NO_BENDS, extract
 from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
@@ -30,6 +31,7 @@ from .robot import Odometry, Scan
 class MapperConfig:
     """The rules of the seven steps."""
 
+    extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     bends: BendsConfig = field(default_factory=BendsConfig)
     chains: ChainConfig = field(default_factory=ChainConfig)
@@ -65,7 +67,9 @@ NONE = np.zeros(0, dtype=np.int64)
 class Extractor(Protocol):
     """Finds the straight segments of a scan."""
 
-    def __call__(self, scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+    def __call__(
+        self, scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS
+    ) -> Segments:
         """Return the segments; at the bearings `bends_rad` the map knows a bend, which an oracle may know better."""
         ...
 
@@ -133,7 +137,8 @@ class Mapper:
         return self._pieces(scan, bends) if len(bends) else segments
 
     def _pieces(self, scan: Scan, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
-        return sure_pieces(self._extract(scan, bends_rad=bends_rad), scan, self.config.walls.pieces)
+        config = self.config.extraction
+        return sure_pieces(self._extract(scan, config, bends_rad=bends_rad), scan, config)
 
     def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
         return bends_within(segments, walls, self.config.bends, self._kinks.cut)

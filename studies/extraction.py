@@ -23,8 +23,9 @@ from experiments.terminal.console import plain_console
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.worlds import WORLDS, World, WorldError, load
 from slam.evaluation.consistency import nees
+from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import extract
-from slam.extraction.segments import MIN_BEAMS, Segments
+from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import to_robot, wrap
 from slam.map.reliability import FirmnessConfig
@@ -33,6 +34,7 @@ from slam.robot import Scan
 PLANS = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans"
 FLAT_RAD, FLAT_M = 1e-3, 2e-3
 MIXED_SHARE = 0.8
+EXTRACTION = ExtractionConfig()
 
 
 @dataclass(frozen=True)
@@ -177,10 +179,10 @@ def sample(config: StudyConfig) -> tuple[Lines, Walls]:
             ranges = noisy(exact, noise, rng.standard_normal(config.beams), lidar.range_max_m)
             scan = Scan(finder.bearings_rad, ranges, config.sigma_m, lidar.range_max_m, 0.0)
             face_of_beam = np.where(np.isfinite(ranges), face_of_beam, -1)
-            seen, walls_met = join(extract(scan), face_of_beam, walls, world.faces, pose)
+            seen, walls_met = join(extract(scan, EXTRACTION), face_of_beam, walls, world.faces, pose)
             lines.append(seen)
             met.append(walls_met)
-            total += int(np.sum((seen.beams >= MIN_BEAMS) & (seen.share >= MIXED_SHARE)))
+            total += int(np.sum((seen.beams >= EXTRACTION.sure_beams) & (seen.share >= MIXED_SHARE)))
         if total >= config.lines:
             break
     return stack(Lines, lines), stack(Walls, met)
@@ -200,7 +202,7 @@ def both_nees(lines: Lines) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, 
 
 def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
     """Return the rows of the table: what each is called and which lines are in it."""
-    clean, long = lines.share >= MIXED_SHARE, lines.beams >= MIN_BEAMS
+    clean, long = lines.share >= MIXED_SHARE, lines.beams >= EXTRACTION.sure_beams
     is_sharp = long & (np.sqrt(lines.cov[:, 0, 0]) < np.deg2rad(1.5))
     good = clean & is_sharp
     low, high = lines.along[:, 0], lines.along[:, 1]
@@ -237,7 +239,8 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
         rows = (walls.beams >= low) & (walls.beams <= high)
         counts.add_row(f"{low} to {high}", str(int(rows.sum())), f"{walls.is_found[rows].mean():.4f}")
     console.print(counts)
-    for name, rows in {"5 beams or more": lines.beams >= MIN_BEAMS, "3 or 4 beams": lines.beams < MIN_BEAMS}.items():
+    few = lines.beams < EXTRACTION.sure_beams
+    for name, rows in {"5 beams or more": ~few, "3 or 4 beams": few}.items():
         mixed, double = rows & (lines.share < MIXED_SHARE), rows & lines.is_double
         console.print(
             f"{rows.sum()} lines of {name}: mixed {mixed.sum()} ({mixed.sum() / max(rows.sum(), 1):.2%}),"

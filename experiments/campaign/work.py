@@ -12,6 +12,7 @@ from jaxtyping import Float
 from sim.logs.archive import read_archive
 from sim.logs.recorded_robot import read_log
 from sim.worlds import World
+from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_BENDS, extract
 from slam.extraction.segments import Segments
 from slam.mapper import Extractor
@@ -179,17 +180,18 @@ def remembered(log: bytes) -> Extractor:
 
     Cut where a map knows a bend, a scan is that map's own and worked out anew.
     """
-    known: dict[float, Segments] = {}
+    known: dict[tuple[float, ExtractionConfig], Segments] = {}
 
-    def extracted(scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+    def extracted(scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
         if len(bends_rad):
-            return extract(scan, bends_rad=bends_rad)
-        if scan.time_s not in known:
-            known[scan.time_s] = extract(scan)
-            for values in vars(known[scan.time_s]).values():
+            return extract(scan, config, bends_rad=bends_rad)
+        key = scan.time_s, config
+        if key not in known:
+            known[key] = extract(scan, config)
+            for values in vars(known[key]).values():
                 if isinstance(values, np.ndarray):
                     values.setflags(write=False)
-        return known[scan.time_s]
+        return known[key]
 
     return extracted
 

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from sim.chance import Channel, standard_normals
 from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
 from slam.estimation.backend import Joint
+from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_BENDS, extract
 from slam.extraction.segments import Segments
 from slam.geometry.poses import compose, inverse
@@ -109,9 +110,11 @@ class PerfectExtraction:
     def __init__(self, witness: Witness, seed: int) -> None:
         self._witness, self._seed = witness, seed
 
-    def __call__(self, scan: Scan, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+    def __call__(
+        self, scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS
+    ) -> Segments:
         """Extract the segments of one scan; those of several walls are left out, so that the map need not say where."""
-        segments = extract(scan)
+        segments = extract(scan, config)
         faces = self._witness.faces(segments)
         segments, faces = segments.take(faces >= 0), faces[faces >= 0]
         if not len(segments):

@@ -100,7 +100,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
     world = load_world(trial.world, trial.start, trial.scale)
     witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
-    rules = trial.mission.mapper.walls
+    rules, extraction = trial.mission.mapper.walls, trial.mission.mapper.extraction
     firmness = Firmness(rules.firmness)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
@@ -109,7 +109,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
             recording.bearings_rad, ranges, recording.sigma_m, recording.range_max_m, float(recording.time_s[k])
         )
         witness.at = k
-        segments = sure_pieces(extractor(scan), scan, rules.pieces)
+        segments = sure_pieces(extractor(scan, extraction), scan, extraction)
         faces = witness.faces(segments)
         walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
         known = np.isin(walls, list(true_lines))

@@ -3,19 +3,16 @@
 The paper takes its extraction from elsewhere (section 2.1); here a line is linear in inverse range (`line_fit`).
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..robot import Scan
+from .config import ExtractionConfig
 from .line_fit import Beams, Fit, crossing, fit_runs, polar, prediction, prefix_sums, refit
 from .segments import EndKind, Segments
 from .splitting import (
-    MIN_FIT,
     Pieces,
     Returns,
-    SplitConfig,
     cut_at,
     position_of,
     returns_of,
@@ -24,27 +21,6 @@ from .splitting import (
     split,
     split_gains,
 )
-
-
-@dataclass(frozen=True)
-class ExtractionConfig:
-    """How the straight pieces of a scan become segments."""
-
-    split: SplitConfig = field(default_factory=SplitConfig)
-    """What counts as one straight piece."""
-    joint_beams: float = 1.0
-    """A boundary moves to where its two lines cross, when that is at most this many beams outside the gap."""
-    corner_beams: float = 1.0
-    """The lines of a corner cross at most this many beams outside the gap between them."""
-    gate_sigmas: float = 4.0
-    """Residual beyond which a beam leaves the fit."""
-    open_gate_sigmas: float = 3.0
-    """The same for the last beam at an end where another surface begins and no lines cross."""
-    doubt_sigmas: float = 2.5
-    """The last beam before a joint is left out where the other line predicts it within this."""
-    trim_from_beams: int = 5
-    """Segments of this many beams or more lose the last beam at an end in doubt or without a joint."""
-
 
 DEFAULT = ExtractionConfig()
 NO_BENDS = np.zeros(0)
@@ -57,21 +33,21 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT, bends_rad: Float[np.
     known to bend.
     """
     with np.errstate(all="ignore"):
-        returns = returns_of(scan, config.split)
+        returns = returns_of(scan, config)
         if returns is None:
             return _none()
         sums = prefix_sums(returns.beams, returns.sigma_m)
-        gains = split_gains(returns, sums, config.split)
+        gains = split_gains(returns, sums, config)
         if returns.is_ring:  # the seam must lie at a corner, else it cuts a wall in two; the surest cut is one
             returns = rolled(returns, int(gains.max(axis=0).argmax()))
             sums = prefix_sums(returns.beams, returns.sigma_m)
-            gains = split_gains(returns, sums, config.split)
-        pieces = split(gains, sums, returns.breaks, config.split)
+            gains = split_gains(returns, sums, config)
+        pieces = split(gains, sums, returns.breaks, config)
         if len(pieces.start) == 0:
             return _none()
         if len(bends_rad):
-            pieces = cut_at(pieces, position_of(bends_rad, scan, returns))
-        pieces = settled(pieces, sums, returns.breaks)
+            pieces = cut_at(pieces, position_of(bends_rad, scan, returns), config)
+        pieces = settled(pieces, sums, returns.breaks, config)
         fit, pieces, is_corner, in_doubt = _sharpen(pieces, sums, returns, config)
         return _fitted(fit, pieces, is_corner, in_doubt, returns, config)
 
@@ -85,6 +61,7 @@ def _none() -> Segments:
         np.zeros(0, int),
         np.zeros((0, 2), int),
         np.zeros(0),
+        np.zeros(0, bool),
     )
 
 
@@ -99,7 +76,7 @@ def _sharpen(
     start, stop = pieces.start.copy(), pieces.stop.copy()
     n, m = len(start), len(returns.beam)
     # The beams next to a boundary may be the neighbour's: the lines are taken without them where enough remain.
-    inset = (stop - start > 5).astype(int)
+    inset = (stop - start - 2 > config.least_beams).astype(int)
     fit, _ = fit_runs(sums, start + inset, stop - inset)
     run = returns.breaks.searchsorted(start, side="right")
     k = (run[1:] == run[:-1]).nonzero()[0]
@@ -115,7 +92,8 @@ def _sharpen(
     cut = around.searchsorted(0.5 * (left + right) + past)
     wrapped *= m
     begins, ends = start[after] + wrapped, stop[after] + wrapped
-    meets = (np.abs(past) <= config.joint_beams + half) & (cut - start[k] >= MIN_FIT) & (ends - cut >= MIN_FIT)
+    meets = np.minimum(cut - start[k], ends - cut) >= config.least_beams
+    meets &= np.abs(past) <= config.corner_beams + half
     k, after, cut, wrapped, begins = k[meets], after[meets], cut[meets], wrapped[meets], begins[meets]
     # Beams that were left loose between the two pieces lie off both lines and stay loose.
     outside = (cut < stop[k]) | (cut > begins)
@@ -149,13 +127,13 @@ def _fitted(
 ) -> Segments:
     """Return the pieces trimmed at free ends, fitted, rid of outliers and fitted again."""
     size = pieces.stop - pieces.start
-    if size.min() < MIN_FIT:
-        enough = size >= MIN_FIT
+    if size.min() < config.least_beams:
+        enough = size >= config.least_beams
         fit, pieces = _take(fit, enough), Pieces(pieces.start[enough], pieces.stop[enough])
         is_corner, in_doubt, size = is_corner[enough], in_doubt[enough], size[enough]
     if len(size) == 0:
         return _none()
-    trim = (in_doubt | ~is_corner) & (size >= config.trim_from_beams)[:, None]
+    trim = (in_doubt | ~is_corner) & (size - 2 >= config.least_beams)[:, None]
     start = pieces.start + trim[:, 0]
     size = pieces.stop - trim[:, 1] - start
     offsets = size.cumsum() - size
@@ -165,7 +143,7 @@ def _fitted(
     beams = Beams(returns.beams.cos[at], returns.beams.sin[at], returns.beams.rho[at])
     sigma2 = returns.sigma_m**2
     fit = refit(fit, beams, line, offsets, np.full(len(line), 1.0 / sigma2))
-    gate = np.full(len(line), config.gate_sigmas**2)
+    gate = np.full(len(line), config.noise_sigmas**2)
     free = np.concatenate((offsets[~is_corner[:, 0]], (offsets + size - 1)[~is_corner[:, 1]]))
     gate[free] = config.open_gate_sigmas**2
     predicted, variance = prediction(_take(fit, line), beams.cos, beams.sin)
@@ -177,7 +155,7 @@ def _fitted(
     chi2 = np.add.reduceat(np.where(is_in, np.square(off), 0.0), offsets) / sigma2
     first = np.minimum.reduceat(np.where(is_in, place, place[-1] + 1), offsets)
     last = np.maximum.reduceat(np.where(is_in, place, place[0] - 1), offsets)
-    good = (counts >= MIN_FIT) & np.isfinite(fit.a + fit.b)
+    good = (counts >= config.least_beams) & np.isfinite(fit.a + fit.b)
     if not good.all():
         fit, first, last, counts, chi2 = _take(fit, good), first[good], last[good], counts[good], chi2[good]
     return _described(fit, np.array((first, last)).T, counts, chi2, returns, config)
@@ -203,18 +181,18 @@ def _described(
     rho = 1.0 / (fit.a[:, None] * c + fit.b[:, None] * s)
     ends = np.empty((len(counts), 2, 2))
     ends[..., 0], ends[..., 1] = rho * c, rho * s
-    kinds = _free_kinds(fit, place, turn, returns, config.split)
+    kinds = _free_kinds(fit, place, turn, returns, config)
     k, after, points = _corners(fit, place, turn, returns, config)
     ends[k, 1] = ends[after, 0] = points
     kinds[k, 1] = kinds[after, 0] = EndKind.CORNER
     lines, cov = polar(fit)
-    segments = Segments(lines, cov, ends, returns.beam[at], counts, kinds, chi2)
+    segments = Segments(lines, cov, ends, returns.beam[at], counts, kinds, chi2, counts < config.sure_beams)
     good = (rho > 0.0).all(axis=1) & np.isfinite(cov.sum(axis=(1, 2)) + ends.sum(axis=(1, 2)))
     return segments if good.all() else segments.take(good)
 
 
 def _free_kinds(
-    fit: Fit, place: Int[np.ndarray, "n 2"], turn: Int[np.ndarray, "n 2"], returns: Returns, config: SplitConfig
+    fit: Fit, place: Int[np.ndarray, "n 2"], turn: Int[np.ndarray, "n 2"], returns: Returns, config: ExtractionConfig
 ) -> Int[np.ndarray, "n 2"]:
     """Return for each end whether one of the next beams met something nearer than the line would be."""
     m = len(returns.beam)
@@ -223,7 +201,7 @@ def _free_kinds(
     at = beyond % m
     steps = np.abs(returns.turn[at] + returns.period * (beyond // m) - turn[..., None])
     inverse = fit.a[:, None, None] * returns.beams.cos[at] + fit.b[:, None, None] * returns.beams.sin[at]
-    hides = inverse * (returns.beams.rho[at] + config.jump_sigmas * returns.sigma_m) < 1.0
+    hides = inverse * (returns.beams.rho[at] + config.noise_sigmas * returns.sigma_m) < 1.0
     hides &= steps <= config.gap_beams
     return np.where(hides.any(axis=-1), int(EndKind.OCCLUDED), int(EndKind.OPEN))
 
@@ -239,7 +217,7 @@ def _corners(
     half = 0.5 * (turn[after, 0] + returns.period * (after < k) - turn[k, 1])
     cm, sm = _turned(returns.beams, place[k, 1] % m, half * returns.step_rad)
     past = crossing(fit.a[k] - fit.a[after], fit.b[k] - fit.b[after], cm, sm)
-    meet = (np.abs(past) <= (half + config.corner_beams) * returns.step_rad) & (2 * half <= config.split.gap_beams + 1)
+    meet = (np.abs(past) <= (half + config.corner_beams) * returns.step_rad) & (2 * half <= config.gap_beams + 1)
     meet &= run[k, 1] == run[after, 0]
     k, after, past, cm, sm = k[meet], after[meet], past[meet], cm[meet], sm[meet]
     turn_cos, turn_sin = np.cos(past), np.sin(past)

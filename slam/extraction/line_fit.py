@@ -57,7 +57,7 @@ def fit_runs(
     a = (ss * xc - cs * xs) / det
     b = (cc * xs - cs * xc) / det
     chi2 = qq - a * xc - b * xs
-    chi2[stop - start < 3] = 0.0
+    chi2[stop - start <= 2] = 0.0
     return Fit(a, b, cc, cs, ss), chi2
 
 

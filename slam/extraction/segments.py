@@ -4,10 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float, Int
-
-MIN_BEAMS = 5
-"""A segment of fewer beams is tentative: its first-order covariance is not to be trusted."""
+from jaxtyping import Bool, Float, Int
 
 
 class EndKind(IntEnum):
@@ -39,14 +36,11 @@ class Segments:
     """An `EndKind` for each end."""
     chi2: Float[np.ndarray, " n"]
     """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom."""
+    is_tentative: Bool[np.ndarray, " n"]
+    """Which have so few beams that their first-order covariance is not to be trusted."""
 
     def __len__(self) -> int:
         return len(self.lines)
-
-    @property
-    def is_tentative(self) -> np.ndarray:
-        """Which segments have fewer than `MIN_BEAMS` beams, shape (n,)."""
-        return self.beam_counts < MIN_BEAMS
 
     @property
     def lengths_m(self) -> Float[np.ndarray, " n"]:
@@ -63,4 +57,5 @@ class Segments:
             self.beam_counts[index],
             self.end_kinds[index],
             self.chi2[index],
+            self.is_tentative[index],
         )

@@ -1,6 +1,5 @@
 """Where a scan falls into straight pieces: breaks, candidate cuts, and the choice among them."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -8,33 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..robot import Scan
+from .config import ExtractionConfig
 from .line_fit import Beams, fit_runs
 
-MIN_FIT = 3
-"""Fewer beams than this make no segment."""
 _FAR_M = 1e4
-
-
-@dataclass(frozen=True)
-class SplitConfig:
-    """What counts as one straight piece of a scan."""
-
-    gap_beams: int = 3
-    """A wall does not go on across more beam steps than this without a return."""
-    grazing_rad: float = float(np.deg2rad(6.0))
-    """A range jump that a wall at this incidence could not make breaks the scan."""
-    jump_sigmas: float = 4.0
-    """Range noise allowed on top of that jump, and before a neighbour counts as nearer."""
-    scales: tuple[int, ...] = (3, 8, 20)
-    """Beams on either side of a candidate cut over which two lines are compared with one."""
-    candidate_gain: float = 7.0
-    """Chi-square that two lines must save to make a candidate."""
-    sure_gain: float = 30.0
-    """Saving from which the neighbours of a candidate are candidates too: a beam there may belong to neither line."""
-    segment_cost: float = 20.0
-    """Chi-square that one more segment must save."""
-    loose_cost: float = 9.0
-    """Chi-square of a beam that belongs to no segment."""
+"""Farther returns are not used: in inverse range they are noise."""
 
 
 class Returns(NamedTuple):
@@ -66,20 +43,20 @@ class Pieces(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _growth(step_rad: float, config: SplitConfig) -> Float[np.ndarray, " g"]:
+def _growth(step_rad: float, config: ExtractionConfig) -> Float[np.ndarray, " g"]:
     """Return the largest ratio of two ranges on one wall by beams between them; 0, that is a break, beyond the gap."""
     ratios = np.sin(config.grazing_rad + step_rad * np.arange(config.gap_beams + 2)) / np.sin(config.grazing_rad)
     ratios[-1] = 0.0
     return np.asarray(ratios)
 
 
-def returns_of(scan: Scan, config: SplitConfig) -> Returns | None:
+def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
     """Return the returns and their breaks, rolled to begin after a break, or at the farthest in a closed room."""
     sigma = max(float(scan.sigma_m), 1e-6)
     ranges, bearings = scan.ranges_m, scan.bearings_rad
-    beam = ((ranges > 4.0 * sigma) & (ranges <= min(scan.range_max_m, _FAR_M))).nonzero()[0]
+    beam = ((ranges > config.noise_sigmas * sigma) & (ranges <= min(scan.range_max_m, _FAR_M))).nonzero()[0]
     m = len(beam)
-    if m < MIN_FIT:
+    if m < config.least_beams:
         return None
     step = float(bearings[-1] - bearings[0]) / (len(bearings) - 1)
     period = len(ranges) if scan.is_full_turn else 0
@@ -91,7 +68,7 @@ def returns_of(scan: Scan, config: SplitConfig) -> Returns | None:
     gap[0] = beam[0] + period - beam[-1] if period else config.gap_beams + 1
     near, far = np.minimum(rho, before), np.maximum(rho, before)
     growth = _growth(step, config)[np.minimum(gap, config.gap_beams + 1)]
-    found = (far - near * growth > config.jump_sigmas * sigma).nonzero()[0]
+    found = (far - near * growth > config.noise_sigmas * sigma).nonzero()[0]
     first = int(found[0]) if len(found) else int(rho.argmax())
     breaks = np.empty(max(len(found), 1) + 1, int)
     breaks[0], breaks[-1] = 0, m
@@ -106,7 +83,9 @@ def returns_of(scan: Scan, config: SplitConfig) -> Returns | None:
     return Returns(Beams(np.cos(theta), np.sin(theta), rho), beam, turn, breaks, len(found) == 0, period, step, sigma)
 
 
-def split_gains(returns: Returns, sums: Float[np.ndarray, "6 m1"], config: SplitConfig) -> Float[np.ndarray, "s m1"]:
+def split_gains(
+    returns: Returns, sums: Float[np.ndarray, "6 m1"], config: ExtractionConfig
+) -> Float[np.ndarray, "s m1"]:
     """Return the chi-square that two lines save over one at each position and scale; 0 at breaks."""
     m, breaks = len(returns.beam), returns.breaks
     sizes = breaks[1:] - breaks[:-1]
@@ -125,7 +104,7 @@ def split_gains(returns: Returns, sums: Float[np.ndarray, "6 m1"], config: Split
 
 
 def candidates(
-    gains: Float[np.ndarray, "s m1"], breaks: Int[np.ndarray, " b"], config: SplitConfig
+    gains: Float[np.ndarray, "s m1"], breaks: Int[np.ndarray, " b"], config: ExtractionConfig
 ) -> Int[np.ndarray, " c"]:
     """Return sorted positions where a segment may begin or end: the breaks, and the peaks of the gain at any scale."""
     inner = gains[:, 1:-1]
@@ -139,20 +118,20 @@ def candidates(
     return is_cut.nonzero()[0]
 
 
-def bends(stretches: Pieces, sums: Float[np.ndarray, "6 m1"], config: SplitConfig) -> Int[np.ndarray, " c"]:
+def bends(stretches: Pieces, sums: Float[np.ndarray, "6 m1"], config: ExtractionConfig) -> Int[np.ndarray, " c"]:
     """Return where two lines save more chi-square than a segment costs, the best place of each stretch.
 
     A long wall that bends by a degree or two is straight at every scale of the candidates, and hundreds in chi-square
     from straight as a whole.
     """
     start, stop = stretches
-    places = np.maximum(stop - start - 2 * MIN_FIT + 1, 0)
+    places = np.maximum(stop - start - 2 * config.least_beams + 1, 0)
     k = places.nonzero()[0]
     if not len(k):
         return k
     offsets = places[k].cumsum() - places[k]
     stretch = k.repeat(places[k])
-    cut = np.arange(len(stretch)) + (start[k] + MIN_FIT - offsets).repeat(places[k])
+    cut = np.arange(len(stretch)) + (start[k] + config.least_beams - offsets).repeat(places[k])
     gains = fit_runs(sums, start[k], stop[k])[1].repeat(places[k])
     gains = gains - fit_runs(sums, start[stretch], cut)[1] - fit_runs(sums, cut, stop[stretch])[1]
     worth = np.fmax.reduceat(gains, offsets) > config.segment_cost
@@ -168,7 +147,10 @@ def rolled(returns: Returns, first: int) -> Returns:
 
 
 def choose(
-    sums: Float[np.ndarray, "6 m1"], cuts: Int[np.ndarray, " c"], breaks: Int[np.ndarray, " b"], config: SplitConfig
+    sums: Float[np.ndarray, "6 m1"],
+    cuts: Int[np.ndarray, " c"],
+    breaks: Int[np.ndarray, " b"],
+    config: ExtractionConfig,
 ) -> Pieces:
     """Return the segments between candidate cuts that make chi-square plus costs least, by dynamic programming."""
     number = np.arange(len(cuts))
@@ -180,7 +162,7 @@ def choose(
     i = np.arange(len(j)) - (choices.cumsum() - choices - run_start).repeat(choices)
     start, stop = cuts[i], cuts[j]
     costs = fit_runs(sums, start, stop)[1] + config.segment_cost
-    costs[stop - start < MIN_FIT] = np.inf
+    costs[stop - start < config.least_beams] = np.inf
     return _least(costs.tolist(), run_start.tolist(), cuts, config.loose_cost)
 
 
@@ -188,7 +170,7 @@ def split(
     gains: Float[np.ndarray, "s m1"],
     sums: Float[np.ndarray, "6 m1"],
     breaks: Int[np.ndarray, " b"],
-    config: SplitConfig,
+    config: ExtractionConfig,
 ) -> Pieces:
     """Return the best segments between candidate cuts; where a segment, or what became none, bends is one, too."""
     cuts = candidates(gains, breaks, config)
@@ -239,16 +221,18 @@ def position_of(bearings_rad: Float[np.ndarray, " b"], scan: Scan, returns: Retu
     return returns.turn.searchsorted(beam)
 
 
-def cut_at(pieces: Pieces, at: Int[np.ndarray, " b"]) -> Pieces:
-    """Cut the pieces before the returns `at`; a part of fewer than `MIN_FIT` returns is left loose."""
+def cut_at(pieces: Pieces, at: Int[np.ndarray, " b"], config: ExtractionConfig) -> Pieces:
+    """Cut the pieces before the returns `at`; a part of fewer than `least_beams` returns is left loose."""
     ends = np.unique(np.concatenate((pieces.start, pieces.stop, at)))
     start, stop = ends[:-1], ends[1:]
     inside = pieces.start.searchsorted(start, side="right") - 1
-    kept = (inside >= 0) & (stop <= pieces.stop[inside]) & (stop - start >= MIN_FIT)
+    kept = (inside >= 0) & (stop <= pieces.stop[inside]) & (stop - start >= config.least_beams)
     return Pieces(start[kept], stop[kept])
 
 
-def settled(pieces: Pieces, sums: Float[np.ndarray, "6 m1"], breaks: Int[np.ndarray, " b"], rounds: int = 4) -> Pieces:
+def settled(
+    pieces: Pieces, sums: Float[np.ndarray, "6 m1"], breaks: Int[np.ndarray, " b"], config: ExtractionConfig
+) -> Pieces:
     """Move each cut between two pieces that touch to where their two lines fit best, all cuts at once.
 
     Where a wall bends by a degree or two the gain at any scale is flat, and its peak lies many beams off the bend: a
@@ -261,8 +245,8 @@ def settled(pieces: Pieces, sums: Float[np.ndarray, "6 m1"], breaks: Int[np.ndar
     k = np.flatnonzero((stop[:-1] == start[1:]) & ~is_break[stop[:-1]])
     if not len(k):
         return pieces
-    for _ in range(rounds):
-        spare = (stop - start - MIN_FIT) // 2
+    for _ in range(config.settling_rounds):
+        spare = (stop - start - config.least_beams) // 2
         before, count = spare[k], spare[k] + spare[k + 1] + 1
         offsets = count.cumsum() - count
         pair = np.arange(len(k)).repeat(count)

@@ -1,23 +1,14 @@
 """How far the ends of what one scan shows can be believed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..geometry.lines import directions, normals
 from ..robot import Scan
+from .config import ExtractionConfig
 from .segments import EndKind, Segments
-
-
-@dataclass(frozen=True)
-class PiecesConfig:
-    """Where a seen piece of wall surely ends."""
-
-    sure_gap_m: float = 0.35
-    """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    corner_leap_m: float = 0.07
-    """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
 
 
 def beams_of(runs: Int[np.ndarray, "n 2"], beams: int) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
@@ -35,7 +26,7 @@ def owners_of_beams(segments: Segments, owners: Int[np.ndarray, " s"], beams: in
     return owner
 
 
-def sure_pieces(segments: Segments, scan: Scan, config: PiecesConfig) -> Segments:
+def sure_pieces(segments: Segments, scan: Scan, config: ExtractionConfig) -> Segments:
     """Shorten each segment to where its beams stand close enough together that no door hides between them.
 
     Beams dtheta apart meet a line at distance r, s beyond the foot of the perpendicular, (r^2 + s^2) dtheta / r
@@ -55,7 +46,7 @@ def sure_pieces(segments: Segments, scan: Scan, config: PiecesConfig) -> Segment
     return replace(segments, ends=ends, end_kinds=np.where(cut, int(EndKind.OPEN), segments.end_kinds))
 
 
-def _without_leaps(segments: Segments, scan: Scan, config: PiecesConfig) -> Segments:
+def _without_leaps(segments: Segments, scan: Scan, config: ExtractionConfig) -> Segments:
     """Put ends that lie far beyond the last beam back to where that beam meets the line."""
     off_normal = scan.bearings_rad[segments.beams] - segments.lines[:, :1]
     distance = segments.lines[:, 1:] / np.maximum(np.cos(off_normal), 0.02)

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import EndKind, Segments
-from ..extraction.visible_extent import PiecesConfig, beam_spacing, owners_of_beams
+from ..extraction.visible_extent import beam_spacing, owners_of_beams
 from ..geometry.lines import directions
 from ..geometry.poses import to_world
 from ..robot import Scan
@@ -24,8 +24,6 @@ class WallsConfig:
     """A wall is tentative until it was seen this often with enough beams."""
     patience_steps: int = 15
     """A tentative wall is forgotten after this many scans without a sighting."""
-    pieces: PiecesConfig = field(default_factory=PiecesConfig)
-    """How far the ends of what a scan shows can be believed."""
     firmness: FirmnessConfig = field(default_factory=FirmnessConfig)
     """Which sightings may move the estimate."""
     pass_margin_m: float = 0.1

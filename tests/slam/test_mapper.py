@@ -120,9 +120,9 @@ def test_an_extractor_given_in_its_place_is_believed_also_at_bends():
     room = faces_of(shapely.Polygon([(0, 0), (3, 0), (6, -drop), (6, 3), (0, 3)]))
     places = [[x, 0.5, 0.0] for x in (1.0, 1.2, 1.4, 4.6, 4.8, 5.0)] + [[x, 2.7, 0.0] for x in (4.5, 4.0, 3.5)]
 
-    def not_behind(scan, **bends):
+    def not_behind(scan, config, **bends):
         asked.append(bends)
-        segments = extract(scan, **bends)
+        segments = extract(scan, config, **bends)
         return segments.take(np.flatnonzero(np.cos(segments.lines[:, 0]) > -0.5))
 
     for update in walk(room, places, extractor=not_behind):
@@ -132,10 +132,10 @@ def test_an_extractor_given_in_its_place_is_believed_also_at_bends():
 
 
 def test_a_segment_of_few_beams_stretches_no_wall_though_it_lies_on_one():
-    def few_first(scan, **bends):
-        segments = extract(scan, **bends)
-        counts = np.where(np.arange(len(segments)) == 0, 4, segments.beam_counts)
-        return replace(segments, beam_counts=counts) if scan.time_s > 0.15 else segments
+    def few_first(scan, config, **bends):
+        segments = extract(scan, config, **bends)
+        few = segments.is_tentative | (np.arange(len(segments)) == 0)
+        return replace(segments, is_tentative=few) if scan.time_s > 0.15 else segments
 
     *_, last = walk(SQUARE, PLACES[:3], extractor=few_first)
     assert 0 in last.matches.pairs[:, 0]

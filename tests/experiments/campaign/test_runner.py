@@ -170,10 +170,10 @@ def test_replays_of_one_recording_extract_each_scan_once_and_see_what_extraction
     run = work._recording(log, config)
     scans = [Scan(run.recording.bearings_rad, ranges, run.recording.sigma_m, run.recording.range_max_m, float(time_s))
              for ranges, time_s in zip(run.recording.ranges_m, run.recording.time_s, strict=True)]  # fmt: skip
-    extracted = work.remembered(log)
+    extracted, rules = work.remembered(log), config.mission.mapper.extraction
     assert len({scan.time_s for scan in scans}) == len(scans)
     for scan in scans:
-        assert extracted(scan) is extracted(scan)
-        np.testing.assert_array_equal(extracted(scan).lines, extract(scan).lines)
+        assert extracted(scan, rules) is extracted(scan, rules)
+        np.testing.assert_array_equal(extracted(scan, rules).lines, extract(scan, rules).lines)
         with pytest.raises(ValueError, match="read-only"):
-            extracted(scan).lines[0] = 0.0
+            extracted(scan, rules).lines[0] = 0.0

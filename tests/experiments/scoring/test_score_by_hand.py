@@ -32,6 +32,7 @@ def one_segment(first, last):
         np.array([5]),
         np.zeros((1, 2), int),
         np.zeros(1),
+        np.zeros(1, bool),
     )
 
 

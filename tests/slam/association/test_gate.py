@@ -12,6 +12,8 @@ from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
 from slam.extraction.segments import Segments
 
+SURE = np.zeros(1, bool)
+"""Of a segment of many beams."""
 LEVEL = -2.0 * np.log(0.01)
 """What chi-square with two degrees of freedom exceeds once in a hundred times: 9.21; with three it would be 11.34."""
 WALL = KnownWalls(np.array([5]), np.array([[-2.0, 2.0]]))
@@ -23,7 +25,7 @@ def seen(turn_rad=0.0, nearer_m=0.0, sigma_rad=0.01, sigma_m=0.01):
     n, t = np.array([np.cos(turn_rad), np.sin(turn_rad)]), np.array([-np.sin(turn_rad), np.cos(turn_rad)])
     ends = (2.0 - nearer_m) * n + np.array([[-0.5], [0.5]]) * t
     cov = np.diag([sigma_rad, sigma_m])[None] ** 2
-    return Segments(line, cov, ends[None], np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1))
+    return Segments(line, cov, ends[None], np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1), SURE)
 
 
 def known(pose_sigmas, line_sigmas, shared=0.0):
@@ -67,7 +69,9 @@ def short(turn_rad, across_m, along_m, length_m):
     ends = centre + np.array([[-0.5], [0.5]]) * length_m * t
     cov = np.array([[1.0, t @ centre], [t @ centre, (t @ centre) ** 2]]) * 0.02**2 + np.diag([0.0, 0.005**2])
     line = np.array([[turn_rad, n @ centre]])
-    return Segments(line, cov[None], ends[None], np.array([[0, 5]]), np.array([6]), np.zeros((1, 2), int), np.zeros(1))
+    return Segments(
+        line, cov[None], ends[None], np.array([[0, 5]]), np.array([6]), np.zeros((1, 2), int), np.zeros(1), SURE
+    )
 
 
 @pytest.mark.parametrize(
@@ -95,7 +99,14 @@ def test_a_segment_and_its_wall_overlap_by_more_than_a_touch(overlap_m, is_match
     cov = np.array([[1.0, 2.0], [2.0, 4.0]]) * 0.01**2 + np.diag([0.0, 0.01**2])
     ends = np.array([[[2.0, 2.0 - overlap_m], [2.0, 3.0]]])
     segment = Segments(
-        np.array([[0.0, 2.0]]), cov[None], ends, np.array([[0, 9]]), np.array([10]), np.zeros((1, 2), int), np.zeros(1)
+        np.array([[0.0, 2.0]]),
+        cov[None],
+        ends,
+        np.array([[0, 9]]),
+        np.array([10]),
+        np.zeros((1, 2), int),
+        np.zeros(1),
+        SURE,
     )
     for clear_only in (True, False):
         found = match(segment, WALL, known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5]), clear_only=clear_only)
@@ -109,7 +120,7 @@ def test_a_line_that_faces_another_way_is_no_candidate_however_vague_its_directi
 
 @pytest.mark.parametrize("beams", [4, 5])
 def test_few_beams_alone_do_not_say_where_the_robot_is_but_belong_to_their_wall(beams):
-    segment, joint = replace(seen(), beam_counts=np.array([beams])), known([0.01, 0.01, 0.01], [0.01, 0.01])
+    segment, joint = replace(seen(), is_tentative=np.array([beams < 5])), known([0.01, 0.01, 0.01], [0.01, 0.01])
     assert len(match(segment, WALL, joint, clear_only=True).pairs) == (beams >= 5)
     assert len(match(segment, WALL, joint).pairs) == 1
 

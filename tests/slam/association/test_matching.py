@@ -16,6 +16,8 @@ from slam.geometry.poses import compose, inverse, wrap
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 
+SURE = np.zeros(1, bool)
+"""Of a segment of many beams."""
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 
 
@@ -71,7 +73,7 @@ def segment_of(truth, anchor, rng):
     c, s = np.cos(line[0]), np.sin(line[0])
     ends = line[1] * np.array([c, s]) + np.array([[t0 - 0.5], [t0 + 0.5]]) * np.array([-s, c])
     one, two = np.array([9]), np.array([[0, 8]])
-    return Segments(line[None], cov[None], ends[None], two, one, np.zeros((1, 2), dtype=np.int64), np.zeros(1))
+    return Segments(line[None], cov[None], ends[None], two, one, np.zeros((1, 2), dtype=np.int64), np.zeros(1), SURE)
 
 
 def test_one_true_match_in_a_hundred_is_refused_by_the_gate():
@@ -102,7 +104,9 @@ def test_how_far_off_a_wall_is_after_a_slip_is_what_the_slip_itself_costs(slip_r
     cov = turn @ np.diag([1e-3, 1e-3]) ** 2 @ turn.T
     ends = line[1] * np.array([np.cos(line[0]), np.sin(line[0])]) + np.array([[t0 - 0.5], [t0 + 0.5]]) * along
     one = np.array([60])
-    segment = Segments(line[None], cov[None], ends[None], np.array([[0, 59]]), one, np.zeros((1, 2), int), np.zeros(1))
+    segment = Segments(
+        line[None], cov[None], ends[None], np.array([[0, 59]]), one, np.zeros((1, 2), int), np.zeros(1), SURE
+    )
     found = match(segment, KnownWalls(np.array([5]), np.array([[-3.0, 3.0]])), joint, clear_only=True)
     assert found.distances == pytest.approx([(slip_rad / sigma) ** 2], rel=0.05)
 
@@ -182,7 +186,7 @@ def straight_pieces(ends):
     turn = np.array([[[1.0, 0.0], [t, 1.0]] for t in np.sum(ends.mean(axis=1) * along, axis=-1)])
     cov = turn @ np.diag([0.004, 0.003]) ** 2 @ turn.swapaxes(1, 2)
     beams = np.array([[10 * k, 10 * k + 8] for k in range(m)])
-    return Segments(lines, cov, ends, beams, np.full(m, 9), np.full((m, 2), 2), np.zeros(m))
+    return Segments(lines, cov, ends, beams, np.full(m, 9), np.full((m, 2), 2), np.zeros(m), np.zeros(m, bool))
 
 
 @pytest.mark.parametrize("slip_rad", [-0.05, -0.04, 0.0, 0.05])

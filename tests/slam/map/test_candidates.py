@@ -23,7 +23,9 @@ def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generato
     # The line's distance from the robot's origin changes with its direction by the lever to its middle.
     cov = np.array([[[var_alpha, along * var_alpha], [along * var_alpha, var_across + along**2 * var_alpha]]])
     kinds = np.full((1, 2), int(EndKind.OPEN))
-    return Segments(line, cov, noisy[None], np.array([[0, beams - 1]]), np.array([beams]), kinds, np.zeros(1))
+    return Segments(
+        line, cov, noisy[None], np.array([[0, beams - 1]]), np.array([beams]), kinds, np.zeros(1), np.array([beams < 5])
+    )
 
 
 @settings(max_examples=30, deadline=None)

@@ -5,9 +5,10 @@ import pytest
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
+from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind, Segments
-from slam.extraction.visible_extent import PiecesConfig, owners_of_beams, sure_pieces
+from slam.extraction.visible_extent import owners_of_beams, sure_pieces
 from slam.geometry.lines import normals, through
 from slam.map.ray_evidence import sightlines
 from slam.robot import Scan
@@ -74,7 +75,7 @@ def test_sure_pieces_never_lengthen_a_segment(seed):
     room, pose = random_place(rng)
     scan = scan_from(faces_of(room), pose, rng)
     segments = extract(scan)
-    sure = sure_pieces(segments, scan, PiecesConfig())
+    sure = sure_pieces(segments, scan, ExtractionConfig())
     np.testing.assert_array_equal(sure.lines, segments.lines)
     np.testing.assert_array_equal(sure.beams, segments.beams)
     t = np.stack([-np.sin(segments.lines[:, 0]), np.cos(segments.lines[:, 0])], axis=-1)
@@ -89,7 +90,7 @@ def test_sure_pieces_never_lengthen_a_segment(seed):
 def test_a_wall_seen_at_a_grazing_angle_is_sure_only_where_its_beams_stand_close():
     wall = np.array([[[0.3, -0.5], [4.0, -0.5]]])
     scan = scan_from(wall, [0.0, 0.0, 0.0])
-    config = PiecesConfig()
+    config = ExtractionConfig()
     (end,) = sure_pieces(extract(scan), scan, config).ends[:, 1]
     step = scan.bearings_rad[1] - scan.bearings_rad[0]
     bearing = np.arctan2(end[1], end[0])
@@ -105,7 +106,7 @@ def test_a_corner_far_beyond_the_last_beam_was_not_seen(leap_m, is_believed):
     last = np.tan(scan.bearings_rad[segments.beams[0, 1]])
     segments.ends[0, 1] = [1.0, last + leap_m]
     segments.end_kinds[0, 1] = EndKind.CORNER
-    sure = sure_pieces(segments, scan, PiecesConfig())
+    sure = sure_pieces(segments, scan, ExtractionConfig())
     np.testing.assert_allclose(sure.ends[0, 1], [1.0, last + leap_m * is_believed], atol=1e-6)
     assert sure.end_kinds[0, 1] == (EndKind.CORNER if is_believed else EndKind.OPEN)
 
@@ -122,6 +123,7 @@ def segments_with(beams):
         np.full(count, 5),
         none,
         np.zeros(count),
+        np.zeros(count, bool),
     )
 
 

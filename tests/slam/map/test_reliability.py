@@ -43,7 +43,9 @@ def sighting(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
     cov = np.diag([sigma_rad**2, 1e-5])[None]
     ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
     chi2 = beams - 2.0 if chi2 is None else chi2
-    return Segments(np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none, np.array([chi2]))
+    return Segments(
+        np.array([[alpha, 1.0]]), cov, ends, none, np.array([beams]), none, np.array([chi2]), np.array([beams < 5])
+    )
 
 
 OWNER = np.array([0])

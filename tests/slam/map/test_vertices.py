@@ -33,7 +33,9 @@ def map_of(ends, sigma=1e-3):
 def segment_of(first, last):
     ends = to_robot(np.array([[first, last]], dtype=float), POSE)
     nothing = np.zeros((1, 2), dtype=np.int64)
-    return Segments(through(ends), np.eye(2)[None], ends, nothing, np.array([9]), nothing, np.zeros(1))
+    return Segments(
+        through(ends), np.eye(2)[None], ends, nothing, np.array([9]), nothing, np.zeros(1), np.zeros(1, bool)
+    )
 
 
 def bent(gap=0.0, slope=0.03, aside=0.0):
@@ -162,7 +164,7 @@ def scan_of(*ends, sigma_rad=0.002, beams=9):
     ends, n = to_robot(np.reshape(ends, (-1, 2, 2)).astype(float), POSE), len(ends)
     nothing = np.zeros((n, 2), dtype=np.int64)
     cov = np.tile(np.diag([sigma_rad**2, 1e-6]), (n, 1, 1))
-    return Segments(through(ends), cov, ends, nothing, np.full(n, beams), nothing, np.zeros(n))
+    return Segments(through(ends), cov, ends, nothing, np.full(n, beams), nothing, np.zeros(n), np.full(n, beams < 5))
 
 
 BENT = ([1.0, 0.0], [2.0, 0.0]), ([2.1, -0.005], [3.0, -0.055])

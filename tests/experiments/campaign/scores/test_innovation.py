@@ -27,7 +27,16 @@ def seen(lines, sigma_rad=0.01):
     count = len(lines)
     cov = np.tile(np.diag([sigma_rad**2, 4e-4]), (count, 1, 1))
     none = np.zeros((count, 2), int)
-    return Segments(np.array(lines), cov, np.zeros((count, 2, 2)), none, np.full(count, 20), none, np.zeros(count))
+    return Segments(
+        np.array(lines),
+        cov,
+        np.zeros((count, 2, 2)),
+        none,
+        np.full(count, 20),
+        none,
+        np.zeros(count),
+        np.zeros(count, bool),
+    )
 
 
 def hear(ear, scans):

@@ -1,0 +1,52 @@
+"""The settings of the extraction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ExtractionConfig:
+    """How a scan becomes segments, and how far their ends are believed.
+
+    Costs, gains and sigmas were chosen on half of the plans, by recall, mixed lines and NEES
+    (docs/results.md, "Extraction"); "beams" are steps of the scan, one per 2 degrees.
+    """
+
+    noise_sigmas: float = 4.0
+    """What a range is off by more is no noise: the surface breaks off, or the beam is not the line's; one of 16,000
+    beams is that far off by chance. Ranges below it are none."""
+    gap_beams: int = 3
+    """A wall does not go on across more beam steps than this without a return: at 4 m they are 0.4 m, a narrow door."""
+    grazing_rad: float = float(np.deg2rad(6.0))
+    """A range jump that a wall at this incidence could not make breaks the scan: at a lower one neighbouring beams meet
+    a wall a third farther off each."""
+    scales: tuple[int, ...] = (3, 8, 20)
+    """Beams on either side of a candidate cut over which two lines are compared with one: from the least that make
+    a line to those of a long wall."""
+    candidate_gain: float = 7.0
+    """Chi-square that two lines must save to make a candidate: low, since a candidate costs time alone."""
+    sure_gain: float = 30.0
+    """Saving from which the neighbours of a candidate are candidates too: a beam there may belong to neither line."""
+    segment_cost: float = 20.0
+    """Chi-square that one more segment must save: with less, noise cuts straight walls."""
+    loose_cost: float = 9.0
+    """Chi-square of a beam that belongs to no segment: three sigmas off a line it is better left loose."""
+    least_beams: int = 3
+    """Fewer beams make no segment: any two lie on a line. An end loses its last beam only where so many remain."""
+    sure_beams: int = 5
+    """A segment of fewer beams is tentative: the 95th percentile of NEES is four times what it should be with 3 beams,
+    1.4 times with 4."""
+    settling_rounds: int = 4
+    """Cuts move to where their two lines fit best at most so often; most stay at once."""
+    corner_beams: float = 1.0
+    """Two lines meet in a corner where they cross at most this many beams outside the gap between them: farther off,
+    beams would have met one of them."""
+    open_gate_sigmas: float = 3.0
+    """Residual beyond which the last beam leaves the fit where no lines cross: another surface begins there."""
+    doubt_sigmas: float = 2.5
+    """The last beam before a joint is left out where the other line predicts it within this: it may be either's."""
+    sure_gap_m: float = 0.35
+    """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
+    corner_leap_m: float = 0.07
+    """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""
