@@ -36,7 +36,13 @@ def read_settings(path: Path) -> Record:
     return said
 
 
-RENAMED: dict[str, str | None] = {}
+RENAMED: dict[str, str | None] = {
+    "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.extraction.sure_gap_m",
+    "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
+    "mission.mapper.gaps.widest_m": None,
+    "mission.mapper.gaps.corner_m": None,
+    "mission.mapper.duplicates.gate": None,
+}
 """Settings of a trial that had other names in format 1 of `config.json`; None where there is none any more."""
 READABLE = (1, CONFIG_FORMAT)
 """Formats of `config.json` that can be read."""
