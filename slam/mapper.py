@@ -94,7 +94,7 @@ class Mapper:
         self._kinks = Kinks(config.kinks)
 
     def predict(self, odometry: Odometry) -> None:
-        """Move the robot's estimate by what the wheels report."""
+        """Move the robot's estimate by the odometry."""
         self.backend.predict(odometry)
 
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:

@@ -30,7 +30,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Odometry:
-    """Motion since the last step as the wheels report it, in the robot frame before the motion."""
+    """Motion since the last step as the robot measured it, in the robot frame before the motion."""
 
     motion: Float[np.ndarray, "3"]
     """x m, y m, heading rad."""
@@ -57,5 +57,5 @@ class Robot(Protocol):
         ...
 
     def drive(self, command: MotionCommand) -> Odometry:
-        """Carry out one command and return what the wheels report."""
+        """Carry out one command and return the odometry."""
         ...

@@ -34,7 +34,7 @@ class BlockEkf(Ekf[BlockMap]):
     def _fuse(self, rows: Int[np.ndarray, " m"], seen: Observations) -> None:
         """Take the weighted mean of each line and what was seen of it, in model space: equations (2) and (3).
 
-        x_2 = x_1 + H_line^-1 e is the sighting in the map's frame, and its covariance C_2 has the robot's in it.
+        x_2 = x_1 + H_line^-1 e is the observation in the map's frame, and its covariance C_2 has the robot's in it.
         """
         model = self._innovations(rows, seen, self._map.pose_world, self._map.means[rows])
         to_line = np.linalg.inv(model.H_line)

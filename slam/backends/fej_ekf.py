@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.backend import Observations
-from ..estimation.models import Growth, Innovations, Motion, grow, innovations, move
+from ..estimation.models import Initialisation, Innovations, Motion, initialise, innovations, move
 from ..robot import Odometry
 from .kalman.dense_map import DenseMap
 from .kalman.ekf import Ekf
@@ -47,12 +47,12 @@ class FejEkf(Ekf[DenseMap]):
         pose_world: Float[np.ndarray, "3"],
         means: Float[np.ndarray, "m 2"],
     ) -> Innovations:
-        """Compare sightings with what a pose and lines predict, the Jacobian staying at the first estimates."""
+        """Compare observations with what a pose and lines predict, the Jacobian staying at the first estimates."""
         anchors, first = self._map.anchors[rows], self._alpha[rows]
         return innovations(pose_world, anchors, means, seen.lines, seen.cov, self._position, first)
 
-    def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
-        new = grow(self._map.pose_world, lines, centres, self._config.at_wall, self._position)
+    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
+        new = initialise(self._map.pose_world, lines, centres, self._config.at_wall, self._position)
         self._alpha = np.concatenate([self._alpha, new.means[:, 0]])
         return new
 

@@ -105,7 +105,7 @@ class Backend(Protocol):
         ...
 
     def predict(self, odometry: Odometry) -> None:
-        """Move the pose by what the wheels report."""
+        """Move the pose by the odometry."""
         ...
 
     def update(self, first: Observations, second: Observations) -> None:
@@ -119,7 +119,7 @@ class Backend(Protocol):
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> Int[np.ndarray, " m"]:
-        """Add lines seen in the robot frame (with the middle of each seen piece) and return their new ids."""
+        """Initialise lines seen in the robot frame (with the middle of each seen piece) and return their new ids."""
         ...
 
     def merge(self, keep: int, drop: int) -> None:

@@ -119,8 +119,8 @@ def halfway(
 ) -> Innovations:
     """Return the innovations of seen lines with H taken halfway to where the heading makes up for `turn` of epsilon.
 
-    How far off a line lies is bent in the heading: after a slip by 5 degrees a wall 2 m away lies 7 mm off the tangent
-    at the estimate, and 0.1 mm off this one.
+    How far off a line lies is bent in the heading: after an odometry error of 5 degrees a wall 2 m away lies 7 mm
+    off the tangent at the estimate, and 0.1 mm off this one.
     """
     less = _along(lines, cov, model.e[:, 0] - 0.5 * turn) - model.H_pose[:, 1, 2]
     H_pose, H_line = model.H_pose.copy(), model.H_line.copy()
@@ -149,7 +149,7 @@ class Linear:
 
 
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
-    """Join the innovations of m sightings (several may be of one line) into one measurement."""
+    """Join the innovations of m observations (several may be of one line) into one measurement."""
     m = len(rows)
     each = np.arange(m)
     lines, place = (rows, each) if len(set(rows.tolist())) == m else np.unique(rows, return_inverse=True)
@@ -161,7 +161,7 @@ def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
 
 
 @dataclass(frozen=True)
-class Growth:
+class Initialisation:
     """New map lines and how they depend on the pose and on the measurement."""
 
     anchors: Float[np.ndarray, "m 2"]
@@ -170,13 +170,13 @@ class Growth:
     G_line: Float[np.ndarray, "m 2 2"]
 
 
-def grow(
+def initialise(
     pose_world: Float[np.ndarray, "3"],
     lines: Float[np.ndarray, "m 2"],
     centres: Float[np.ndarray, "m 2"],
     at_wall: bool = True,
     position: Float[np.ndarray, "2"] | None = None,
-) -> Growth:
+) -> Initialisation:
     """Turn seen lines (alpha, r), robot frame, into map lines, anchored at their seen centres or at the world's origin.
 
     Centres are points of the lines in the robot frame, m; the anchors that come of them are constants. The Jacobians
@@ -196,7 +196,7 @@ def grow(
     G_line[:, 0, 0] = 1.0
     G_line[:, 1, 0] = lever
     G_line[:, 1, 1] = 1.0
-    return Growth(anchors, means, G_pose, G_line)
+    return Initialisation(anchors, means, G_pose, G_line)
 
 
 def reanchor(

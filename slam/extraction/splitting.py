@@ -43,7 +43,7 @@ class Pieces(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _growth(step_rad: float, config: ExtractionConfig) -> Float[np.ndarray, " g"]:
+def _steepest(step_rad: float, config: ExtractionConfig) -> Float[np.ndarray, " g"]:
     """Return the largest ratio of two ranges on one wall by beams between them; 0, that is a break, beyond the gap."""
     ratios = np.sin(config.grazing_rad + step_rad * np.arange(config.gap_beams + 2)) / np.sin(config.grazing_rad)
     ratios[-1] = 0.0
@@ -67,8 +67,8 @@ def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
     gap[1:] = beam[1:] - beam[:-1]
     gap[0] = beam[0] + period - beam[-1] if period else config.gap_beams + 1
     near, far = np.minimum(rho, before), np.maximum(rho, before)
-    growth = _growth(step, config)[np.minimum(gap, config.gap_beams + 1)]
-    found = (far - near * growth > config.noise_sigmas * sigma).nonzero()[0]
+    steepest = _steepest(step, config)[np.minimum(gap, config.gap_beams + 1)]
+    found = (far - near * steepest > config.noise_sigmas * sigma).nonzero()[0]
     first = int(found[0]) if len(found) else int(rho.argmax())
     breaks = np.empty(max(len(found), 1) + 1, int)
     breaks[0], breaks[-1] = 0, m

@@ -1,4 +1,4 @@
-"""A pose carried ahead by the wheels: what a factor graph expects before the next scan is in it."""
+"""A pose carried ahead by the odometry: what a factor graph expects before the next scan is in it."""
 
 import numpy as np
 from jaxtyping import Float

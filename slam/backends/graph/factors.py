@@ -18,9 +18,9 @@ POSE_ROWS = (4, 5, 0)
 LINE_ROWS = (0, 2)
 """Where -alpha and -r stand in the chart of a line, which has 3 rows."""
 HELD = 1e-6
-"""Standard deviation, m and rad, of what is held: the first pose, and wheels that say they never slip."""
+"""Standard deviation, m and rad, of what is held: the first pose, and odometry that states no error."""
 OFF_PLANE = 1e-2
-"""Standard deviation, m and rad, of what leaves the motion plane: of a motion's part and of a tilt in a sighting.
+"""Standard deviation, m and rad, of what leaves the motion plane: of a motion's part and of a tilt in an observation.
 
 Any number gives the same answer, but it is to be one: poses that tilt more freely than walls tell drift off the plane,
 until it is known so unevenly that Cholesky refuses it and QR goes astray.

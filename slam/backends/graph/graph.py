@@ -1,7 +1,7 @@
 """The stochastic map as a factor graph: every pose kept and relinearised, solved step by step (iSAM2).
 
 Inside, the pose from which the first wall was seen is the origin: no scan tells where that pose lies in the world, and
-what prior and wheels told of it is kept beside the graph (`Frame`). The calls of one step are collected and handed to
+what prior and odometry told of it is kept beside the graph (`Frame`). The calls of one step are collected and handed to
 iSAM2 together when a belief is next asked for; a prediction alone is propagated without it.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...estimation.backend import Belief, Observations
-from ...estimation.models import grow
+from ...estimation.models import initialise
 from ...geometry.poses import to_robot, to_world
 from ...robot import Odometry
 from .belief import believe
@@ -34,7 +34,7 @@ class UnsolvableError(RuntimeError):
 
 
 class Graph:
-    """Incremental smoothing of all poses and lines; a joint back end, so each sighting counts once."""
+    """Incremental smoothing of all poses and lines; a joint back end, so each observation counts once."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Graph:
         self._belief: Belief | None = None
         self._record = Record(np.array(pose_world, dtype=np.float64), np.array(pose_cov, dtype=np.float64))
         self._holds = 0, 0
-        """Sightings and ids of which a solution was found."""
+        """Observations and ids of which a solution was found."""
         self._start_from(np.zeros((1, 3)), np.zeros((0, 2)))
 
     # -- the Backend protocol ---------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ class Graph:
         return self._belief
 
     def predict(self, odometry: Odometry) -> None:
-        """Move the pose by what the wheels report; it becomes a pose of the graph with the next scan."""
+        """Move the pose by the odometry; it becomes a pose of the graph with the next scan."""
         self._move_on()
         self._record.move(odometry)
 
@@ -86,7 +86,7 @@ class Graph:
         """Add lines seen in the robot frame and return their ids; they are anchored where they were seen."""
         self._move_on()
         self._solver.enter_poses()
-        new = grow(self._solver.pose, lines, centres, at_wall=False)
+        new = initialise(self._solver.pose, lines, centres, at_wall=False)
         anchors = self._record.frame.anchors_world(to_world(centres, self._solver.pose))
         ids = np.arange(self._record.next_id, self._record.next_id + len(lines))
         self._record.next_id += len(lines)
@@ -96,67 +96,67 @@ class Graph:
         return ids
 
     def merge(self, keep: int, drop: int) -> None:
-        """Make two lines one: the sightings of `drop` become sightings of `keep`."""
+        """Make two lines one: the observations of `drop` become observations of `keep`."""
         keep_row, drop_row = self._rows([keep, drop])
         if keep == drop:
             raise ValueError(f"expected two lines to merge, found line {keep} twice")
         solver = self._settled()
         alpha = float(solver.lines[keep_row, 0])
-        moved = self._record.lines[drop].sightings
+        moved = self._record.lines[drop].observations
         headings = {index: float(solver.isam.pose(index)[2]) for index in {self._record.seen_from[n] for n in moved}}
-        solver.leave_sightings(drop, moved)
+        solver.leave_observations(drop, moved)
         for number in moved:
             epsilon = wrapped(self._record.seen[number][0] - alpha + headings[self._record.seen_from[number]])
-            solver.enter_sighting(keep, number, epsilon, alpha)
-        self._record.lines[keep].sightings.extend(moved)
+            solver.enter_observation(keep, number, epsilon, alpha)
+        self._record.lines[keep].observations.extend(moved)
         self._drop(drop)
         self._hide(np.array([drop_row]))
 
     def remove(self, ids: Sequence[int]) -> None:
         """Forget lines; raises KeyError where an id is not in the map.
 
-        What their sightings said of the rest stays, as when a filter forgets a line: lines seen more than once are no
-        longer shown, but remain in the graph. To undo what a wrong line did, `retract` it.
+        What their observations said of the rest stays, as when a filter forgets a line: lines seen more than once are
+        no longer shown, but remain in the graph. To undo what a wrong line did, `retract` it.
         """
         rows = self._rows(ids)
         solver = self._settled()
         for line in self._solver.ids[rows].tolist():
-            sightings = self._record.lines[line].sightings
-            if len(sightings) > 1:
+            observations = self._record.lines[line].observations
+            if len(observations) > 1:
                 self._record.lines[line].shown = False
-            else:  # The one sighting of a line says nothing of the rest.
-                solver.leave_sightings(line, sightings)
+            else:  # The one observation of a line says nothing of the rest.
+                solver.leave_observations(line, observations)
                 self._drop(line)
         self._hide(rows)
 
     # -- what only a graph can do -----------------------------------------------------------------------------------
 
     def retract(self, ids: Sequence[int]) -> None:
-        """Take lines out with all that was ever seen of them, as if those sightings had not been used at all."""
+        """Take lines out with all that was ever seen of them, as if those observations had not been used at all."""
         rows = self._rows(ids)
         solver = self._settled()
         for line in self._solver.ids[rows].tolist():
-            solver.leave_sightings(line, self._record.lines[line].sightings)
+            solver.leave_observations(line, self._record.lines[line].observations)
             self._drop(line)
         self._hide(rows)
 
-    def retract_sightings(self, line: int, numbers: Sequence[int]) -> None:
-        """Undo wrong matches with a line, by the numbers that `sightings_of` gives; without any left it is removed."""
+    def retract_observations(self, line: int, numbers: Sequence[int]) -> None:
+        """Undo wrong matches with a line, by the numbers of `observations_of`; without any left it is removed."""
         (row,) = self._rows([line])
-        sightings = self._record.lines[line].sightings
-        if unknown := set(numbers).difference(sightings):
-            raise KeyError(f"expected numbers of sightings of line {line}, found {sorted(unknown)}")
+        observations = self._record.lines[line].observations
+        if unknown := set(numbers).difference(observations):
+            raise KeyError(f"expected numbers of observations of line {line}, found {sorted(unknown)}")
         solver = self._settled()
-        solver.leave_sightings(line, sorted(set(numbers)))
-        sightings[:] = [number for number in sightings if number not in set(numbers)]
-        if not sightings:
+        solver.leave_observations(line, sorted(set(numbers)))
+        observations[:] = [number for number in observations if number not in set(numbers)]
+        if not observations:
             self._drop(line)
             self._hide(np.array([row]))
 
-    def sightings_of(self, line: int) -> Int[np.ndarray, "m 2"]:
-        """Return rows (number of the sighting, predictions made before it) of a line, oldest first."""
+    def observations_of(self, line: int) -> Int[np.ndarray, "m 2"]:
+        """Return rows (number of the observation, predictions made before it) of a line, oldest first."""
         self._rows([line])
-        numbers = np.array(sorted(self._record.lines[line].sightings), dtype=np.int64)
+        numbers = np.array(sorted(self._record.lines[line].observations), dtype=np.int64)
         return np.stack([numbers, self._record.steps_of(numbers)], axis=-1)
 
     def trajectory(self) -> Float[np.ndarray, "n 3"]:
@@ -169,7 +169,7 @@ class Graph:
         self._start_from(solver.poses(), solver.all_lines())
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return prior, odometry, sightings and the points of linearisation as plain arrays, for `numpy.savez`."""
+        """Return prior, odometry, observations and the points of linearisation as plain arrays, for `numpy.savez`."""
         solver = self._all_entered()
         return {**self._record.arrays(), "poses": solver.poses(True), "lines": solver.all_lines(True)}
 
@@ -194,7 +194,7 @@ class Graph:
     def _settle(self) -> None:
         """Solve for all that was entered; where iSAM2 fails or goes astray, solve all of the record anew.
 
-        Raises UnsolvableError where that fails too: the sightings since the last solution are then taken out, and
+        Raises UnsolvableError where that fails too: the observations since the last solution are then taken out, and
         the graph is as it was before them.
         """
         try:
@@ -219,7 +219,7 @@ class Graph:
             ) from error
 
     def _take_back(self, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"]) -> None:
-        """Take out the sightings since the last solution; raises UnsolvableError where not even the rest is solved."""
+        """Take out the observations since the last solution; raises UnsolvableError where even the rest has none."""
         known = np.array([line < self._holds[1] for line in self._record.lines], dtype=bool)
         self._record.forget(*self._holds)
         try:

@@ -17,8 +17,8 @@ def guess(
 ) -> Float[np.ndarray, "3"]:
     """Return the likeliest pose after `motion`, which led to `predicted`, if the lines (alpha, r) stood where they do.
 
-    The wheels' slip of one step bends the prediction of a line three metres away by a millimetre, as much as the
-    line is known to. Sightings linearised at the predicted pose keep that bend in the map, all to one side; this one
+    The odometry's error of one step bends the prediction of a line three metres away by a millimetre, as much as the
+    line is known to. Observations linearised at the predicted pose keep that bend in the map, all to one side; this one
     is a Gauss-Newton step of the pose alone.
     """
     turn = np.eye(3)

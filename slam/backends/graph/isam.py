@@ -43,7 +43,7 @@ class Isam:
         self.values.insert(line_key(line), gtsam.OrientedPlane3(plane(alpha, r)))
 
     def enter(self, factor: gtsam.NonlinearFactor, number: int = -1) -> None:
-        """Enter a factor; one with a number (of its sighting) may leave again."""
+        """Enter a factor; one with a number (of its observation) may leave again."""
         self.factors.push_back(factor)
         self._entering.append(number)
 

@@ -1,4 +1,4 @@
-"""Which sightings of a factor graph must be linearised anew, because their line turned after they were entered."""
+"""Which observations of a factor graph must be linearised anew, because their line turned after they were entered."""
 
 from dataclasses import dataclass, field
 from math import atan2, cos, sin, sqrt
@@ -16,19 +16,19 @@ class _Line:
     information: float
     """Of the line's direction, 1/rad^2."""
     alpha: float
-    """Direction of the line when its loose sightings were last looked after."""
+    """Direction of the line when its loose observations were last looked after."""
     turn: float
     """How far the line may turn before they are looked after again, rad."""
     numbers: list[int] = field(default_factory=list)
-    """The loose sightings."""
+    """The loose observations."""
 
 
 class Loose:
-    """The sightings that a turn of their line would put wrong by more than `tolerance` of their sigma.
+    """The observations that a turn of their line would put wrong by more than `tolerance` of their sigma.
 
     The distance of a seen piece from its line changes with the square of the angle between the two, times its
     distance from the robot; the factor knows the change to first order alone. Once a line's direction is known well
-    enough nothing can turn it so far, and its sightings need looking after once, when they are new.
+    enough nothing can turn it so far, and its observations need looking after once, when they are new.
     """
 
     def __init__(self, tolerance: float, sigmas: float) -> None:
@@ -37,12 +37,12 @@ class Loose:
         self._touched: dict[int, list[int]] = {}
 
     def turn(self, seen: Seen) -> float:
-        """Return by how much the angle between a sighting and its line may change, rad."""
+        """Return by how much the angle between an observation and its line may change, rad."""
         _, r, along, cross, across = seen
         return sqrt(2.0 * self._tolerance * sqrt(across - cross * cross / along) / max(abs(r), 1e-3))
 
     def note(self, line: int, number: int, seen: Seen, alpha: float, again: bool) -> None:
-        """Note a sighting of a line whose direction is `alpha` now; `again` if it was noted before."""
+        """Note an observation of a line whose direction is `alpha` now; `again` if it was noted before."""
         turn = self.turn(seen)
         at = self._lines.setdefault(line, _Line(0.0, alpha, turn))
         at.information += 0.0 if again else 1.0 / seen[2]
@@ -52,7 +52,7 @@ class Loose:
             at.numbers.append(number)
 
     def leave(self, line: int, number: int) -> None:
-        """Forget a sighting."""
+        """Forget an observation."""
         if line in self._lines and number in self._lines[line].numbers:
             self._lines[line].numbers.remove(number)
 
@@ -62,7 +62,7 @@ class Loose:
         self._touched.pop(line, None)
 
     def touched(self) -> dict[int, list[int]]:
-        """Return the lines seen since `calm`, with the sightings that are new since it was last asked."""
+        """Return the lines seen since `calm`, with the observations that are new since it was last asked."""
         touched = {line: self._touched[line] for line in sorted(self._touched)}
         self._touched = {line: [] for line in touched}
         return touched
@@ -72,7 +72,7 @@ class Loose:
         self._touched.clear()
 
     def suspects(self, line: int, new: list[int], alpha: float) -> list[int]:
-        """Return the sightings to look after now that the line has the direction `alpha`: the new, or all the loose."""
+        """Return the observations to look after now that the line has direction `alpha`: the new, or all the loose."""
         at = self._lines[line]
         if not at.numbers or abs(wrapped(alpha - at.alpha)) <= at.turn:
             return new

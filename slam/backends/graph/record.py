@@ -11,25 +11,25 @@ from ...robot import Odometry
 from ..frame import Frame
 
 Seen = tuple[float, float, float, float, float]
-"""One sighting of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
+"""One observation of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
 FORMAT = 2
 
 
 @dataclass
 class LineRecord:
-    """One line and its sightings."""
+    """One line and its observations."""
 
     anchor: Float[np.ndarray, "2"]
     """World frame, m."""
-    sightings: list[int] = field(default_factory=list)
-    """Numbers of the sightings that hold for it."""
+    observations: list[int] = field(default_factory=list)
+    """Numbers of the observations that hold for it."""
     shown: bool = True
-    """A line that was forgotten after several sightings is no longer shown, but what it said of the rest stays."""
+    """A line that was forgotten after several observations is no longer shown, but what it said of the rest stays."""
 
 
 @dataclass
 class Record:
-    """Prior, odometry and sightings in the order in which they came."""
+    """Prior, odometry and observations in the order in which they came."""
 
     pose_world: Float[np.ndarray, "3"]
     pose_cov: Float[np.ndarray, "3 3"]
@@ -41,15 +41,15 @@ class Record:
     steps: list[int] = field(default_factory=lambda: [0])
     """Motions made after each prediction (a rest without any error makes none), none at the start."""
     seen_from: list[int] = field(default_factory=list)
-    """Index of the pose of each sighting."""
+    """Index of the pose of each observation."""
     seen: list[Seen] = field(default_factory=list)
     epsilons: list[float] = field(default_factory=list)
-    """By how much each sighting departed from its line where it was linearised, rad."""
+    """By how much each observation departed from its line where it was linearised, rad."""
     lines: dict[int, LineRecord] = field(default_factory=dict)
     """By id, ascending."""
     next_id: int = 0
     frame: Frame = field(init=False)
-    """Where pose 0 lies in the world, as far as prior and wheels tell: everything in the map is relative to it."""
+    """Where pose 0 lies in the world, as far as prior and odometry tell: everything in the map is relative to it."""
 
     def __post_init__(self) -> None:
         self.frame = Frame(self.pose_world, self.pose_cov)
@@ -77,31 +77,31 @@ class Record:
         return np.array([path[k] for k in self.steps])
 
     def steps_of(self, numbers: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return how many predictions were made before sightings."""
+        """Return how many predictions were made before observations."""
         motions = len(self.lead) + np.array(self.seen_from, dtype=np.int64)[numbers]
         return np.searchsorted(self.steps, motions)
 
     def see(self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> int:
-        """Note a sighting and return its number."""
+        """Note an observation and return its number."""
         self.seen_from.append(pose)
         (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
         self.seen.append((alpha, r, along, cross, across))
         self.epsilons.append(0.0)
-        self.lines[line].sightings.append(len(self.seen) - 1)
+        self.lines[line].observations.append(len(self.seen) - 1)
         return len(self.seen) - 1
 
-    def forget(self, sightings: int, ids: int) -> None:
-        """Forget all sightings but the first so many, and the lines with larger ids."""
-        del self.seen[sightings:], self.seen_from[sightings:], self.epsilons[sightings:]
+    def forget(self, observations: int, ids: int) -> None:
+        """Forget all observations but the first so many, and the lines with larger ids."""
+        del self.seen[observations:], self.seen_from[observations:], self.epsilons[observations:]
         self.lines = {line: known for line, known in self.lines.items() if line < ids}
         for known in self.lines.values():
-            known.sightings = [number for number in known.sightings if number < sightings]
+            known.observations = [number for number in known.observations if number < observations]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return everything as plain arrays, fit for `numpy.savez`."""
         owner = np.full(len(self.seen), -1, dtype=np.int64)
         for line, record in self.lines.items():
-            owner[record.sightings] = line
+            owner[record.observations] = line
         return {
             "format": np.array(FORMAT),
             "prior_pose_world": self.pose_world,
@@ -133,7 +133,7 @@ class Record:
         }
         for number, line in enumerate(arrays["seen_line"].tolist()):
             if line >= 0:
-                lines[line].sightings.append(number)
+                lines[line].observations.append(number)
         first = int(arrays["first_pose"])
         motions, covs = list(np.array(arrays["odometry"])), list(np.array(arrays["odometry_cov"]))
         return cls(

@@ -36,7 +36,7 @@ class Solver:
     ) -> None:
         """Make the graph of a record, linearised at `poses` and, in the order of the record, at `lines`.
 
-        With `anew` the sightings are linearised there too, else as the record has it.
+        With `anew` the observations are linearised there too, else as the record has it.
         """
         self._config, self._record = config, record
         self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
@@ -61,7 +61,7 @@ class Solver:
         self._settled_at = -1
         """Index of the last pose that is settled."""
         self._ahead = Ahead(self.pose)
-        """Where the wheels alone lead from there."""
+        """Where the odometry alone leads from there."""
         self._expected_cov = np.zeros((0, 0))
         """Covariance of the last settled pose before the present solution, body frame; empty before the first."""
 
@@ -71,9 +71,9 @@ class Solver:
             self.enter_pose(pose)
         for (line, known), (alpha, r) in zip(record.lines.items(), lines.tolist(), strict=True):
             self.isam.enter_line(line, alpha, r)
-            for number in known.sightings:
+            for number in known.observations:
                 epsilon = wrapped(record.seen[number][0] - alpha + float(poses[record.seen_from[number], 2]))
-                self.enter_sighting(line, number, epsilon if anew else record.epsilons[number], alpha)
+                self.enter_observation(line, number, epsilon if anew else record.epsilons[number], alpha)
         self._show(list(record.lines), lines)
         self.hide(np.flatnonzero([not known.shown for known in record.lines.values()]))
 
@@ -96,7 +96,7 @@ class Solver:
     def enter_scan(
         self, rows: Int[np.ndarray, " m"], seen: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]
     ) -> None:
-        """Enter sightings of lines shown, from the last pose; a new pose is linearised where they put it."""
+        """Enter observations of lines shown, from the last pose; a new pose is linearised where they put it."""
         if self.last and self.isam.is_new(self.last):
             motion, motion_cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
             self.pose = guess(self.pose, motion, motion_cov, self.lines[rows], seen, cov)
@@ -106,22 +106,22 @@ class Solver:
         for k in np.lexsort((seen[:, 1], seen[:, 0], rows)).tolist():
             line = int(self.ids[rows[k]])
             number = self._record.see(self.last, line, seen[k], cov[k])
-            self.enter_sighting(line, number, epsilon[k], float(alpha[k]))
+            self.enter_observation(line, number, epsilon[k], float(alpha[k]))
 
     def enter_lines(
         self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"], seen: Float[np.ndarray, "m 2"],
         cov: Float[np.ndarray, "m 2 2"],
     ) -> None:  # fmt: skip
-        """Enter new lines of the record, each with its first sighting, from the last pose."""
+        """Enter new lines of the record, each with its first observation, from the last pose."""
         for k, (line, (alpha, r)) in enumerate(zip(ids, lines.tolist(), strict=True)):
             self.isam.enter_line(line, alpha, r)
-            self.enter_sighting(line, self._record.see(self.last, line, seen[k], cov[k]), 0.0, alpha)
+            self.enter_observation(line, self._record.see(self.last, line, seen[k], cov[k]), 0.0, alpha)
         self._show(ids, lines)
 
-    def enter_sighting(self, line: int, number: int, epsilon: float, alpha: float, again: bool = False) -> None:
-        """Enter a sighting that departs by `epsilon` from its line, which has the direction `alpha`.
+    def enter_observation(self, line: int, number: int, epsilon: float, alpha: float, again: bool = False) -> None:
+        """Enter an observation that departs by `epsilon` from its line, which has the direction `alpha`.
 
-        With `again` it replaces an earlier factor of the same sighting.
+        With `again` it replaces an earlier factor of the same observation.
         """
         seen = self._record.seen[number]
         most = self._config.most_turn_rad
@@ -130,8 +130,8 @@ class Solver:
         self._loose.note(line, number, seen, alpha, again)
         self._is_settled = False
 
-    def leave_sightings(self, line: int, numbers: Sequence[int]) -> None:
-        """Take the factors of a line's sightings out; all must be settled. A line with none left drops out too."""
+    def leave_observations(self, line: int, numbers: Sequence[int]) -> None:
+        """Take the factors of a line's observations out; all must be settled. A line with none left drops out too."""
         for number in numbers:
             self.isam.leave(number)
             self._loose.leave(line, number)
@@ -216,7 +216,7 @@ class Solver:
             )
 
     def _tighten(self) -> int:
-        """Collect anew the sightings that their line's present direction puts wrong; return how many."""
+        """Collect anew the observations that their line's present direction puts wrong; return how many."""
         count = 0
         for line, numbers in self._loose.touched().items():
             row = int(np.searchsorted(self.ids, line))
@@ -226,8 +226,8 @@ class Solver:
                 heading = float(self.pose[2] if index == self.last else self.isam.pose(index)[2])
                 epsilon = wrapped(seen[0] - alpha + heading)
                 if abs(epsilon - self._record.epsilons[number]) > self._loose.turn(seen):
-                    self.leave_sightings(line, [number])
-                    self.enter_sighting(line, number, epsilon, alpha, again=True)
+                    self.leave_observations(line, [number])
+                    self.enter_observation(line, number, epsilon, alpha, again=True)
                     count += 1
         return count
 

@@ -11,4 +11,5 @@ class EkfConfig:
     """Lines are anchored where they were seen; without, at the world's origin (the paper's form), where the error of a
     line grows with its way there."""
     relinearise: bool = True
-    """A joint update takes its Jacobian where the wheels slipped to; relocation, then fusion, has no use for it."""
+    """A joint update takes its Jacobian at the pose that corrects the odometry; filters that relocate first have no use
+    for it."""

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...estimation.backend import POSE, Belief, Joint, Observations, StaleBeliefError
-from ...estimation.models import Growth, Innovations, Linear, Motion, grow, innovations, move, stack
+from ...estimation.models import Initialisation, Innovations, Linear, Motion, initialise, innovations, move, stack
 from ...robot import Odometry
 from ..frame import Frame
 from .config import EkfConfig
@@ -78,8 +78,8 @@ class Ekf(Generic[M]):
 
     new_map: Callable[[np.ndarray, np.ndarray], M]
     """Makes the map that this filter works on, from a pose and its covariance."""
-    _slip: Float[np.ndarray, "3 3"]
-    """Covariance of what the wheels have slipped since the last update."""
+    _odometry_cov: Float[np.ndarray, "3 3"]
+    """Covariance of the odometry since the last update."""
 
     def __init__(
         self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], config: EkfConfig = DEFAULTS
@@ -101,13 +101,13 @@ class Ekf(Generic[M]):
         return self._belief
 
     def predict(self, odometry: Odometry) -> None:
-        """Move the pose by what the wheels report."""
+        """Move the pose by the odometry."""
         self._move_on()
         self._has_driven = True
         motion = self._motion(odometry)
         noise = motion.W @ odometry.cov @ motion.W.T
         self._map.move(motion.pose_world, motion.F, noise)
-        self._slip = motion.F @ self._slip @ motion.F.T + noise
+        self._odometry_cov = motion.F @ self._odometry_cov @ motion.F.T + noise
 
     def update(self, first: Observations, second: Observations) -> None:
         """Fuse one scan's matches at once (`second`; a joint filter has no use for `first`)."""
@@ -115,7 +115,7 @@ class Ekf(Generic[M]):
             rows = self.belief.rows(second.ids)
             self._move_on()
             self._condition(self._linear(rows, second))
-            self._slip = np.zeros((POSE, POSE))
+            self._odometry_cov = np.zeros((POSE, POSE))
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
@@ -124,7 +124,7 @@ class Ekf(Generic[M]):
         if self._config.at_wall and self._has_driven and not len(self._map.ids):
             self._begin_frame()
         self._move_on()
-        new = self._growth(lines, centres)
+        new = self._initialisation(lines, centres)
         return self._map.append(new.anchors, new.means, new.G_pose, new.G_line @ cov @ new.G_line.swapaxes(1, 2))
 
     def merge(self, keep: int, drop: int) -> None:
@@ -146,7 +146,7 @@ class Ekf(Generic[M]):
 
     def _begin(self) -> None:
         """Begin what the filter remembers beside its map, which has no lines."""
-        self._slip = np.zeros((POSE, POSE))
+        self._odometry_cov = np.zeros((POSE, POSE))
 
     def _begin_frame(self) -> None:
         """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
@@ -164,11 +164,11 @@ class Ekf(Generic[M]):
         pose_world: Float[np.ndarray, "3"],
         means: Float[np.ndarray, "m 2"],
     ) -> Innovations:
-        """Compare sightings with what a pose and the means of those rows predict."""
+        """Compare observations with what a pose and the means of those rows predict."""
         return innovations(pose_world, self._map.anchors[rows], means, seen.lines, seen.cov)
 
-    def _growth(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Growth:
-        return grow(self._map.pose_world, lines, centres, self._config.at_wall)
+    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
+        return initialise(self._map.pose_world, lines, centres, self._config.at_wall)
 
     def _condition(self, model: Linear) -> None:
         self._map.condition(model)
@@ -178,18 +178,19 @@ class Ekf(Generic[M]):
         return None
 
     def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
-        """Linearise a scan at the pose that the wheels slipped to, not where they left the estimate.
+        """Linearise a scan at the pose that corrects the odometry, not where it left the estimate.
 
-        A slip by 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The slip
-        is what the scan says of it if all else were known: were pose and lines to go where the whole update takes them,
-        their common shift and turn, which no scan can tell, would move the Jacobian too, and be taken for measured.
+        An error of 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The
+        correction is what the scan says of the odometry if all else were known: were pose and lines to go where the
+        whole update takes them, their common shift and turn, which no scan can tell, would move the Jacobian too, and
+        be taken for measured.
         """
         pose, means = self._map.pose_world, self._map.means[rows]
         here = stack(rows, self._innovations(rows, seen, pose, means))
         if not self._config.relinearise:
             return here
         H = here.H[:, :POSE]
-        step = self._slip @ H.T @ np.linalg.solve(H @ self._slip @ H.T + here.R, here.e)
+        step = self._odometry_cov @ H.T @ np.linalg.solve(H @ self._odometry_cov @ H.T + here.R, here.e)
         there = stack(rows, self._innovations(rows, seen, pose + step, means))
         return Linear(there.rows, there.H, there.e + there.H[:, :POSE] @ step, there.R)
 

@@ -10,7 +10,7 @@ from slam.backends.kalman.config import EkfConfig
 from slam.backends.kalman.dense_map import DenseMap
 from slam.backends.kalman.linear import carry, equality
 from slam.estimation.backend import Observations
-from slam.estimation.models import grow, innovations, move
+from slam.estimation.models import initialise, innovations, move
 from slam.geometry.poses import J
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
@@ -68,13 +68,13 @@ def test_no_measurement_sees_a_shift_or_a_turn_of_everything_wherever_it_is_line
 
 @few
 @given(seed=seeds)
-def test_motion_and_growth_carry_the_unobservable_directions_on(seed):
+def test_motion_and_initialisation_carry_the_unobservable_directions_on(seed):
     rng, pose, _, lines, _ = anything(seed)
     position = rng.uniform(-9, 9, 2)
     motion = move(pose, rng.uniform(-1, 1, 3), position)
     np.testing.assert_allclose(motion.F @ of_pose(position), of_pose(motion.pose_world[:2]), atol=1e-13)
     for at_wall in (True, False):
-        new = grow(pose, lines, rng.uniform(-3, 3, (5, 2)), at_wall, position)
+        new = initialise(pose, lines, rng.uniform(-3, 3, (5, 2)), at_wall, position)
         carried = new.G_pose @ of_pose(position)
         np.testing.assert_allclose(carried, of_lines(new.means[:, 0], new.anchors), atol=1e-13)
 

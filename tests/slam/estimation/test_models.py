@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.models import grow, halfway, innovations, lines_robot, move
+from slam.estimation.models import halfway, initialise, innovations, lines_robot, move
 from slam.extraction.line_fit import Beams, fit_runs, polar, prefix_sums
 from slam.geometry.lines import lines_to_world
 from slam.geometry.poses import to_robot, to_world, wrap
@@ -90,7 +90,7 @@ def test_halfway_a_slip_of_the_heading_is_linear_in_what_is_seen(seed, slip_rad)
     rng = np.random.default_rng(seed)
     pose = random_pose(rng)
     line, cov, centre = seen_line(rng)
-    new = grow(pose, line[None], centre[None])
+    new = initialise(pose, line[None], centre[None])
     slipped = pose - [0.0, 0.0, slip_rad]
     model = innovations(slipped, new.anchors, new.means, line[None], cov[None])
     model = halfway(model, line[None], cov[None], model.e[:, 0])
@@ -109,7 +109,7 @@ def test_a_line_seen_where_the_map_has_it_leaves_no_innovation(seed):
     rng = np.random.default_rng(seed)
     pose = random_pose(rng)
     line, cov, centre = seen_line(rng)
-    new = grow(pose, line[None], centre[None])
+    new = initialise(pose, line[None], centre[None])
     model = innovations(pose, new.anchors, new.means, line[None], cov[None])
     np.testing.assert_allclose(model.e, 0.0, atol=1e-12)
     predicted = lines_robot(pose, new.anchors, new.means)[0]
@@ -172,11 +172,11 @@ def test_what_the_innovation_owes_to_the_measurement_is_r(seed):
 @pytest.mark.parametrize("at_wall", [True, False])
 @few
 @given(seed=seeds)
-def test_the_growth_jacobians_are_the_derivatives_about_the_constant_anchor(at_wall, seed):
+def test_the_initialisation_jacobians_are_the_derivatives_about_the_constant_anchor(at_wall, seed):
     rng = np.random.default_rng(seed)
     pose = random_pose(rng)
     line, _, centre = seen_line(rng)
-    new = grow(pose, line[None], centre[None], at_wall)
+    new = initialise(pose, line[None], centre[None], at_wall)
 
     def state(pose, line):
         alpha, r = lines_to_world(line[None], pose)[0]
@@ -193,10 +193,10 @@ def test_a_line_anchored_where_it_was_seen_has_no_offset_from_its_anchor(seed):
     rng = np.random.default_rng(seed)
     pose = random_pose(rng)
     line, _, centre = seen_line(rng)
-    new = grow(pose, line[None], centre[None])
+    new = initialise(pose, line[None], centre[None])
     np.testing.assert_allclose(new.means[0, 1], 0.0, atol=1e-10)
     np.testing.assert_allclose(to_robot(new.anchors, pose)[0], centre, atol=1e-10)
-    world = grow(pose, line[None], centre[None], at_wall=False)
+    world = initialise(pose, line[None], centre[None], at_wall=False)
     np.testing.assert_allclose(world.means, lines_to_world(line[None], pose), atol=1e-10)
 
 

@@ -43,7 +43,7 @@ def test_retracting_a_line_equals_a_run_without_its_sightings():
     np.testing.assert_allclose(a.mean[3::2], b.mean[3::2], atol=1e-5)
     np.testing.assert_allclose(a.cov[:3, :3], b.cov[:3, :3], atol=1e-3 * np.trace(b.cov[:3, :3]))
     with pytest.raises(KeyError):
-        full.sightings_of(gone)
+        full.observations_of(gone)
 
 
 def test_retracting_a_wrong_match_equals_a_run_without_it():
@@ -52,37 +52,37 @@ def test_retracting_a_wrong_match_equals_a_run_without_it():
     wrong.relinearise()
     line, rng = trip.ids[0], np.random.default_rng(1)
     before = everything(wrong)
-    sane = len(wrong.sightings_of(line))
+    sane = len(wrong.observations_of(line))
     z, cov, _ = look(wrong.belief.pose_world, START[:2], 0.3, (0.01, 0.005), rng)
     see(wrong, [line], [z], [cov])
-    wrong_number, step = wrong.sightings_of(line)[-1].tolist()
+    wrong_number, step = wrong.observations_of(line)[-1].tolist()
     assert step == len(trip.seen) - 1
     assert np.abs(everything(wrong).mean - before.mean).max() > 0.01
-    wrong.retract_sightings(line, [wrong_number])
-    assert len(wrong.sightings_of(line)) == sane
+    wrong.retract_observations(line, [wrong_number])
+    assert len(wrong.observations_of(line)) == sane
     wrong.relinearise()
     assert_same(everything(wrong), before, place=2e-4, angle=2e-4, cov=0.01)
     with pytest.raises(KeyError):
-        wrong.retract_sightings(line, [wrong_number])
+        wrong.retract_observations(line, [wrong_number])
 
 
 def test_a_line_without_any_sighting_left_is_gone():
     trip = Trip.record(10, steps=3)
     backend = trip.run(Graph(START, P0))
     line = next(iter(trip.ids.values()))
-    backend.retract_sightings(line, backend.sightings_of(line)[:, 0].tolist())
+    backend.retract_observations(line, backend.observations_of(line)[:, 0].tolist())
     assert line not in backend.belief.ids
     everything(backend)
 
 
-@pytest.mark.parametrize("verb", ["merge", "retract", "retract_sightings", "trajectory", "relinearise", "arrays"])
+@pytest.mark.parametrize("verb", ["merge", "retract", "retract_observations", "trajectory", "relinearise", "arrays"])
 def test_what_only_a_graph_can_do_makes_beliefs_stale_too(verb):
     trip = Trip.record(11, steps=20)
     backend = trip.run(Graph(START, P0))
     a, b, c = (trip.ids[i] for i in (0, 1, 2))
     belief = backend.belief
-    number = int(backend.sightings_of(c)[-1, 0])
-    arguments = {"merge": (a, b), "retract": ([a],), "retract_sightings": (c, [number])}.get(verb, ())
+    number = int(backend.observations_of(c)[-1, 0])
+    arguments = {"merge": (a, b), "retract": ([a],), "retract_observations": (c, [number])}.get(verb, ())
     getattr(backend, verb)(*arguments)
     with pytest.raises(StaleBeliefError):
         belief.joint(belief.ids[:1])
