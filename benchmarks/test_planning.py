@@ -16,6 +16,7 @@ from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import load
 from slam.backends import BACKENDS
+from slam.mapper import Mapper
 
 PLAN = Path(os.environ.get("PLAN", Path(__file__).parents[1] / "tests" / "data" / "plans" / "school.json"))
 """A school of 333 m2 with 77 faces, or the file that the environment names."""
@@ -47,7 +48,7 @@ def test_planning_of_one_step(benchmark: BenchmarkFixture, strategy: str, monkey
 
     def drive() -> None:
         robot, backend = SimulatedRobot(world, 1, errorless=True), BACKENDS["full-ekf"].make(world.start.copy(), cov)
-        for step in explore_mission(robot, backend, STRATEGIES[strategy].make()):
+        for step in explore_mission(robot, Mapper(backend), STRATEGIES[strategy].make()):
             if step.index >= STEPS:
                 return
 

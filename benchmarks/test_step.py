@@ -13,6 +13,7 @@ from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import load
 from slam.backends import BACKENDS
+from slam.mapper import Mapper
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +34,7 @@ def test_one_step_of_a_mission(benchmark: BenchmarkFixture, backend: str) -> Non
         for seed in range(1, 1000):
             robot = SimulatedRobot(world, seed)
             estimator = BACKENDS[backend].make(world.start.copy(), cov.copy())
-            yield from explore_mission(robot, estimator, STRATEGIES["nearest-robot"].make())
+            yield from explore_mission(robot, Mapper(estimator), STRATEGIES["nearest-robot"].make())
 
     walk = steps()
     length = sum(1 for step in walk_once(walk))

@@ -16,6 +16,7 @@ from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
 from slam.backends import BACKENDS, BackendOptions
 from slam.estimation.backend import Backend
+from slam.mapper import MapperConfig
 from slam.robot import Robot
 
 P0 = Literal["zero", "small", "large"]
@@ -39,6 +40,13 @@ class UsageError(ValueError):
 
 
 @dataclass(frozen=True)
+class MappingMissionConfig(MissionConfig):
+    """What rules a mission, and the mapper that is handed to it."""
+
+    mapper: MapperConfig = field(default_factory=MapperConfig)
+
+
+@dataclass(frozen=True)
 class TrialConfig:
     """All that decides a trial: the same values give the same bytes."""
 
@@ -57,7 +65,7 @@ class TrialConfig:
     time_limit_s: float | None = None
     """On the robot's own clock."""
     robot: RobotConfig = field(default_factory=RobotConfig)
-    mission: MissionConfig = field(default_factory=MissionConfig)
+    mission: MappingMissionConfig = field(default_factory=MappingMissionConfig)
     backend_options: BackendOptions = field(default_factory=BackendOptions)
     """Of every back end, so that one file of settings fits a comparison; `backend` takes its own."""
 

@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from explore.certificate import Certificate, certify
@@ -12,6 +12,7 @@ from explore.outcome import Outcome
 from explore.step import Step
 from sim.worlds import World
 from slam.estimation.backend import Joint
+from slam.mapper import Mapper
 
 from .scenario import Scenario, TrialConfig, UsageError, build
 from .scoring.association import Votes
@@ -45,8 +46,8 @@ Mission = Callable[[Scenario], Iterator[Step]]
 def default_mission(scenario: Scenario) -> Iterator[Step]:
     """Return the closed loop over the simulated robot."""
     assert scenario.strategy is not None, "expected a strategy to explore by"
-    config = replace(scenario.config.mission, max_steps=scenario.config.max_steps)
-    return explore_mission(scenario.robot, scenario.backend, scenario.strategy, config)
+    rules = scenario.config.mission
+    return explore_mission(scenario.robot, Mapper(scenario.backend, rules.mapper), scenario.strategy, rules)
 
 
 def run_trial(

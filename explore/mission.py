@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slam.estimation.backend import Backend
-from slam.mapper import Mapper, MapperConfig
+from slam.mapper import Mapper
 from slam.robot import Odometry, Robot
 
 from .floor.accumulated_returns import RecentReturns
@@ -21,7 +20,6 @@ from .goals.explorer import Explorer, ExplorerConfig
 from .goals.homing import Homing
 from .goals.replay_driver import Passenger
 from .goals.retreat import Retreat
-from .limits import Limits, limited
 from .outcome import Outcome
 from .planning.visibility_graph import VisibilityGraph, followed_wall
 from .step import Step
@@ -30,45 +28,31 @@ from .strategies import Strategy
 
 @dataclass(frozen=True)
 class MissionConfig:
-    """All that rules a mission; each part's settings stand beside its code."""
+    """All that rules a mission but its mapper; each part's settings stand beside its code."""
 
-    mapper: MapperConfig = field(default_factory=MapperConfig)
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     floor_memory: FloorMemoryConfig = field(default_factory=FloorMemoryConfig)
-    max_steps: int = 100_000
-    """A mission that takes longer ends as `stopped`."""
     return_to_start: bool = False
     """Once there is nothing left to explore, drive back to where the mission began."""
 
 
 def explore_mission(
-    robot: Robot,
-    backend: Backend,
-    strategy: Strategy,
-    config: MissionConfig = MissionConfig(),
-    mapper: Mapper | None = None,
+    robot: Robot, mapper: Mapper, strategy: Strategy, config: MissionConfig = MissionConfig()
 ) -> Iterator[Step]:
     """Drive `robot` until every chain is closed or no open end can be reached, and yield each step.
 
-    A `mapper` made elsewhere (with oracles in place of extraction or matching) takes the place of the usual one.
+    The `mapper` holds the back end, whose pose is where the robot believes to start. `limited` ends a mission early.
     """
-    start = backend.belief.pose_world[:2].copy()
+    start = mapper.backend.belief.pose_world[:2].copy()
     explorer = Explorer(strategy, start, config.explorer)
     decider = Homing(explorer, start, config.explorer.following) if config.return_to_start else explorer
-    return limited(_mission(robot, mapper or Mapper(backend, config.mapper), decider, config), Limits(config.max_steps))
+    return _mission(robot, mapper, decider, config)
 
 
-def ride_mission(
-    robot: Robot,
-    scans: int,
-    backend: Backend,
-    config: MissionConfig = MissionConfig(),
-    mapper: Mapper | None = None,
-) -> Iterator[Step]:
+def ride_mission(robot: Robot, mapper: Mapper, scans: int, config: MissionConfig = MissionConfig()) -> Iterator[Step]:
     """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step."""
-    steps = _mission(robot, mapper or Mapper(backend, config.mapper), Passenger(scans), config)
-    return limited(steps, Limits(config.max_steps))
+    return _mission(robot, mapper, Passenger(scans), config)
 
 
 def _mission(robot: Robot, mapper: Mapper, inner: Decider, config: MissionConfig) -> Iterator[Step]:

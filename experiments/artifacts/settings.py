@@ -39,6 +39,7 @@ def read_settings(path: Path) -> Record:
 RENAMED: dict[str, str | None] = {
     "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.extraction.sure_gap_m",
     "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
+    "mission.max_steps": None,
     "mission.mapper.gaps.widest_m": None,
     "mission.mapper.gaps.corner_m": None,
     "mission.mapper.duplicates.gate": None,

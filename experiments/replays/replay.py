@@ -175,7 +175,7 @@ def replay(
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(match if oracle is None else oracle),
         )
-        return ride_mission(scenario.robot, len(recording), scenario.backend, scenario.config.mission, mapper)
+        return ride_mission(scenario.robot, mapper, len(recording), scenario.config.mission)
 
     return run_scenario(scenario, learn, mission)
 

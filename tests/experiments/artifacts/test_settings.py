@@ -72,7 +72,7 @@ def test_an_option_wins_over_set_and_set_over_config(tmp_path):
 
 def test_what_a_command_names_counts_though_it_is_the_default(tmp_path):
     path, out = tmp_path / "mine.json", tmp_path / "run"
-    path.write_text(json.dumps({"world": "paper-fig4", "seed": 5, "errorless": True, "mission": {"max_steps": 9}}))
+    path.write_text(json.dumps({"world": "paper-fig4", "seed": 5, "errorless": True, "mission": {"return_to_start": True}}))
     words = ["explore", "--config", str(path), "--max-steps", "2", "--seed", "1", "--no-errorless", "--out", str(out)]
     assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
     trial = read_trial(out / "config.json")
@@ -150,7 +150,7 @@ def test_a_folder_and_a_pipe_are_no_files_of_settings(capsys, tmp_path):
 def test_the_settings_of_a_campaign_are_those_that_differ_from_the_defaults(tmp_path):
     path = tmp_path / "mine.json"
     path.write_bytes(json_bytes(config_record(trial_of(parse_setting("robot.radius_m=0.25"), {"world": "hall"}))))
-    words = ("mission.mapper.matching.gate=0.95", f"mission.max_steps={LEAVES['mission.max_steps']}")
+    words = ("mission.mapper.matching.gate=0.95", f"mission.explorer.attempts={LEAVES['mission.explorer.attempts']}")
     campaign = Compare(tmp_path, "smoke", config=path, set=words).campaign
     assert campaign.settings == (("mission.mapper.matching.gate", 0.95), ("robot.radius_m", 0.25))
     with pytest.raises(UsageError, match="its own option"):

@@ -12,7 +12,8 @@ from explore.floor.free_space import FloorTooLargeError, FreeSpace
 from explore.floor.touches import REACH_M, Touches
 from explore.following.wall_following import FollowingConfig, Surroundings
 from explore.goals.retreat import Retreat
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.outcome import Outcome
 from explore.planning.paths import PathConfig, Planner
 from explore.strategies import STRATEGIES
@@ -21,6 +22,7 @@ from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.geometry.poses import compose
+from slam.mapper import Mapper
 from slam.robot import MotionCommand, Odometry, Scan
 
 FACES = np.array(
@@ -192,7 +194,7 @@ def test_after_a_touch_the_robot_moves_away_and_does_not_try_the_same_place_agai
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
     robot = Glass(world, glass, seed)
     touched, poses = [], []
-    for step in explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=160)):
+    for step in limited(explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make()), Limits(steps=160)):
         poses.append(robot.true_pose[:2])
         if step.odometry.touched:
             touched.append(step.index)

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
+from slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -17,7 +19,7 @@ def explored(free, start, seed=1, errorless=True):
     world = World("drawn", shapely.orient_polygons(free), np.array(start), {})
     robot = SimulatedRobot(world, seed, errorless=errorless)
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
-    steps = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=1500))
+    steps = limited(explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make()), Limits(steps=1500))
     *_, last = steps
     return last, robot
 

@@ -27,6 +27,7 @@ from slam.estimation.backend import Belief
 from slam.geometry.lines import distance_to_segments, normals, through
 from slam.map.chains import Chain, connect
 from slam.map.stochastic_map import StochasticMap
+from slam.mapper import Mapper
 from slam.robot import Scan
 
 ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))
@@ -42,7 +43,7 @@ def begun():
 
 def steps(**changes):
     robot, backend = begun()
-    return explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(**changes)), robot
+    return explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make(), MissionConfig(**changes)), robot
 
 
 def closed_map(ring):
@@ -118,8 +119,8 @@ def test_a_robot_that_cannot_drive_again_where_it_has_been_is_told_so():
 
 @pytest.mark.usefixtures("_unchecked")
 def test_what_a_stopped_mission_has_not_seen_yet_is_told():
-    mission, _ = steps(max_steps=2)
-    *_, last = mission
+    mission, _ = steps()
+    *_, last = limited(mission, Limits(steps=2))
     certificate = certify(last, last.outcome, PathConfig(), True, WAY)
     assert {end.why for end in certificate.open_ends} == {"not explored yet"}
     assert len(certificate.open_ends) == sum(len(chain.open_ends) for chain in last.chains) > 0
@@ -130,8 +131,8 @@ def test_what_a_stopped_mission_has_not_seen_yet_is_told():
 
 @pytest.mark.usefixtures("_unchecked")
 def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
-    mission, _ = steps(max_steps=2)
-    *_, last = mission
+    mission, _ = steps()
+    *_, last = limited(mission, Limits(steps=2))
     borders = certify(last, last.outcome, PathConfig(), True, WAY).unseen
     assert borders
     near, far = borders[0].cells_world.mean(axis=0), borders[0].cells_world.mean(axis=0) + 5.0

@@ -9,6 +9,7 @@ from experiments.scenario import TrialConfig, build
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
 from slam.estimation.backend import Joint
+from slam.mapper import Mapper
 
 
 class Jumping:
@@ -42,6 +43,6 @@ def test_a_mission_does_not_end_because_its_map_has_jumped():
     """At step 302 it said complete, eight open ends left, each out of reach: it believed to stand in a wall."""
     scenario = build(TrialConfig("rooms", seed=1))
     jumping = Jumping(scenario.backend, [100, 200, 300], [0.6, 0.4])
-    *_, last = limited(explore_mission(scenario.robot, jumping, scenario.strategy), Limits(steps=310))
+    *_, last = limited(explore_mission(scenario.robot, Mapper(jumping), scenario.strategy), Limits(steps=310))
     assert last.ended == "stopped", last.reason
     assert len(last.set_aside) < 4

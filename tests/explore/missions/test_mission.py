@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.lines import distance_to_segments
+from slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
@@ -30,13 +32,14 @@ def drawn(*walls, start=(0.7, 0.7, 0.3), size=4.0):
 BLOCK = drawn((1.7, 1.6, 2.4, 2.3))
 
 
-LONG = MissionConfig(max_steps=1500)
+LONG = 1500
 
 
-def mission(world, seed=1, errorless=True, backend="full-ekf", config=LONG, strategy="nearest-robot"):
+def mission(world, seed=1, errorless=True, backend="full-ekf", max_steps=LONG, strategy="nearest-robot"):
     robot = SimulatedRobot(world, seed, errorless)
     estimator = BACKENDS[backend].make(world.start.copy(), P0.copy())
-    return list(explore_mission(robot, estimator, STRATEGIES[strategy].make(), config)), robot
+    steps = explore_mission(robot, Mapper(estimator), STRATEGIES[strategy].make())
+    return list(limited(steps, Limits(steps=max_steps))), robot
 
 
 @cache
@@ -90,8 +93,7 @@ def test_every_goal_was_an_open_end_of_the_map_at_its_step():
 
 @pytest.mark.parametrize("backend", list(BACKENDS))
 def test_the_same_seed_gives_the_same_steps_bit_for_bit(backend):
-    config = MissionConfig(max_steps=40)
-    one, other = (mission(BLOCK, 3, errorless=False, backend=backend, config=config)[0] for _ in range(2))
+    one, other = (mission(BLOCK, 3, errorless=False, backend=backend, max_steps=40)[0] for _ in range(2))
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         assert a.pose_world.tobytes() == b.pose_world.tobytes()
@@ -103,14 +105,13 @@ def test_the_same_seed_gives_the_same_steps_bit_for_bit(backend):
 
 
 def test_another_seed_gives_other_noise():
-    config = MissionConfig(max_steps=5)
-    one, other = (mission(BLOCK, seed, errorless=False, config=config)[0] for seed in (1, 2))
+    one, other = (mission(BLOCK, seed, errorless=False, max_steps=5)[0] for seed in (1, 2))
     assert one[0].scan.ranges_m.tobytes() != other[0].scan.ranges_m.tobytes()
 
 
 @pytest.mark.parametrize("limit", [1, 7])
 def test_a_mission_that_takes_longer_than_its_limit_is_stopped(limit):
-    steps, _ = mission(BLOCK, config=MissionConfig(max_steps=limit))
+    steps, _ = mission(BLOCK, max_steps=limit)
     assert len(steps) == limit
     assert steps[-1].ended == "stopped"
     assert str(limit) in steps[-1].reason
@@ -118,7 +119,7 @@ def test_a_mission_that_takes_longer_than_its_limit_is_stopped(limit):
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_with_noise_the_room_is_explored_without_touching_anything(seed):
-    steps, robot = mission(BLOCK, seed, errorless=False, config=MissionConfig(max_steps=600))
+    steps, robot = mission(BLOCK, seed, errorless=False, max_steps=600)
     assert steps[-1].ended == "complete"
     assert robot.record.collisions == 0
     poses = np.array(robot.record.poses_world)

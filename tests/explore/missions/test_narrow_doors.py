@@ -5,11 +5,13 @@ import pytest
 import shapely
 from shapely import affinity
 
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
+from slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -24,7 +26,7 @@ def explored(door_m, turn_deg, errorless):
     robot = SimulatedRobot(world, 1, errorless=errorless)
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
     right = np.array([np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))])
-    *_, last = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=1000))
+    *_, last = limited(explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make()), Limits(steps=1000))
     return last, robot, max(float(pose[:2] @ right) for pose in robot.record.poses_world)
 
 

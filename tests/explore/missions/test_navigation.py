@@ -16,6 +16,7 @@ from sim.robot import SimulatedRobot
 from sim.worlds import load
 from slam.backends import BACKENDS
 from slam.geometry.lines import normals
+from slam.mapper import Mapper
 
 STAND_OFF_M, RANGE_M, PITCH_M, BODY_M = 0.35, 4.0, 0.05, 0.2
 
@@ -115,7 +116,7 @@ def test_the_robots_own_graph_of_figure_4_leads_from_wall_8_to_wall_16():
     world, faces = figure_4()
     robot = SimulatedRobot(world, 1, errorless=True)
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
-    *_, last = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make())
+    *_, last = explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make())
     assert last.ended == "complete"
     number = numbers_of(last.map, faces)
     ids = {n: wall for wall, n in number.items()}

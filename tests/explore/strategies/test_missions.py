@@ -7,7 +7,8 @@ import shapely
 from explore.floor.free_space import FreeSpace
 from explore.following.wall_following import Surroundings
 from explore.goals.explorer import Explorer, ExplorerConfig
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.planning.visibility_graph import VisibilityGraph
 from explore.strategies import STRATEGIES, Strategy
 from sim.robot import SimulatedRobot
@@ -34,7 +35,7 @@ def robot_and_backend(world, errorless):
 @pytest.mark.parametrize("name", list(STRATEGIES))
 def test_every_strategy_closes_all_chains_without_touching_a_wall(name):
     robot, backend = robot_and_backend(two_rooms(), errorless=False)
-    steps = list(explore_mission(robot, backend, STRATEGIES[name].make(), MissionConfig(max_steps=1500)))
+    steps = list(limited(explore_mission(robot, Mapper(backend), STRATEGIES[name].make()), Limits(steps=1500)))
     assert steps[-1].ended == "complete"
     assert robot.record.collisions == 0
     assert sum(chain.is_closed for chain in steps[-1].chains) == 2

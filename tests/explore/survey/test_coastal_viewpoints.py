@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 from explore.goals.sweep import Sweep, SweepConfig
-from explore.mission import MissionConfig, explore_mission
+from explore.limits import Limits, limited
+from explore.mission import explore_mission
 from explore.planning.driving_field import DrivingField
 from explore.strategies import STRATEGIES
 from explore.survey.coastal_viewpoints import look_outs_on_coast
@@ -17,6 +18,7 @@ from sim.robot import SimulatedRobot
 from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.geometry.lines import distance_to_segments
+from slam.mapper import Mapper
 
 COAST_M = 3.0
 REACH_M = 3.2
@@ -73,7 +75,7 @@ def test_amid_a_hall_the_robot_drives_little_without_a_wall_in_sight():
     start = np.array([0.7, 0.7, 0.3])
     robot = SimulatedRobot(World("drawn", room, start, {}), 1, errorless=True)
     backend = BACKENDS["full-ekf"].make(start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
-    mission = explore_mission(robot, backend, STRATEGIES["nearest-robot"].make(), MissionConfig(max_steps=1500))
+    mission = limited(explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make()), Limits(steps=1500))
     places = [start[:2], *(robot.true_pose[:2].copy() for _ in mission)]
     assert len(places) < 1500
     moved = np.hypot(*np.diff(places, axis=0).T)
