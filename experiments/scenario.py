@@ -1,6 +1,5 @@
 """From the names in a command to a world, a robot, a back end and a strategy."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol, runtime_checkable
@@ -19,6 +18,8 @@ from slam.estimation.backend import Backend
 from slam.mapper import MapperConfig
 from slam.robot import Robot
 
+from .usage import UsageError, choose
+
 P0 = Literal["zero", "small", "large"]
 P0_SIGMAS: dict[str, tuple[float, float]] = {
     "zero": (1e-4, 1e-5),
@@ -30,13 +31,6 @@ P0_SIGMAS: dict[str, tuple[float, float]] = {
 
 STRATEGY_OF_REPLAYS = "none"
 """Nobody decides where a recorded robot goes."""
-
-
-class UsageError(ValueError):
-    """Bad usage or bad input, told in one line: what was expected, what was found, what to do."""
-
-    exit_status = 2
-    """What the command ends in."""
 
 
 @dataclass(frozen=True)
@@ -111,14 +105,6 @@ def load_world(name: str, start: tuple[float, ...] | None = None, scale: float |
         raise UsageError(
             f"expected a readable world, found {Path(name).name} ({reason}): name a bundled world or a file"
         ) from error
-
-
-def choose(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return `name` if it is known; raises UsageError otherwise."""
-    names = list(known)
-    if name not in names:
-        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}: choose one of these")
-    return name
 
 
 def strategy_of(words: str) -> Strategy:

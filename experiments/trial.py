@@ -14,13 +14,14 @@ from sim.worlds import World
 from slam.estimation.backend import Joint
 from slam.mapper import Mapper
 
-from .scenario import Scenario, TrialConfig, UsageError, build
+from .scenario import Scenario, TrialConfig, build
 from .scoring.association import Votes
 from .scoring.certificate import certificate_record
 from .scoring.records import Log, Recorder
 from .scoring.smoothing import Smoothed, smooth
 from .scoring.summary import Ending, run_keys, summarise
 from .scoring.truth import truth_of
+from .usage import UsageError
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 
 from sim.logs.archive import ArchiveError, read_archive, regular
 
-from ..scenario import UsageError
+from ..usage import UsageError
 from .formats import FORMAT
 
 LIMIT_BYTES = 2**26

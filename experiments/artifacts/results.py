@@ -24,7 +24,6 @@ from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG_FORMAT, FORMAT
 from .geojson import map_geojson
 from .occupancy import occupancy_files
-from .picture import picture_of
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 CONFIG, LOG, SUMMARY = "config.json", "log.npz", "summary.json"
@@ -92,7 +91,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
         "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
         "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title),
-        "map.png": lambda: picture_of(result),
+        "map.png": lambda: _picture(result),
     }
     if last.free_space.evidence.size:
         # Both come from one pass over the grid; a recorded robot keeps none.
@@ -110,6 +109,13 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
         except PackageNotFoundError:
             continue
     return {"format": CONFIG_FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
+
+
+def _picture(result: TrialResult) -> bytes:
+    # matplotlib takes as long to import as all else: a campaign's workers draw nothing.
+    from .picture import picture_of
+
+    return picture_of(result)
 
 
 def _commit() -> str | None:

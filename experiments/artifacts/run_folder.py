@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ..scenario import UsageError
+from ..usage import UsageError
 from .files import PART, json_bytes, write
 from .results import CONFIG, REPLAY, RUN_FILES
 from .settings import of_this_format

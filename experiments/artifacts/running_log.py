@@ -18,7 +18,7 @@ from jaxtyping import Float
 from explore.step import Step
 from sim.logs.recorded_robot import FORMAT
 
-from ..scenario import UsageError
+from ..usage import UsageError
 from .files import json_bytes, write
 from .results import RUNNING
 from .run_folder import FolderGoneError, unwritable

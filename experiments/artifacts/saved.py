@@ -18,7 +18,8 @@ from explore.outcome import Outcome
 from explore.step import Step
 from sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
-from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
+from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..usage import UsageError
 from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
 from .results import LOG, RUNNING
 from .running_log import Kept, read_running

@@ -10,7 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from ..scenario import TrialConfig, UsageError
+from ..scenario import TrialConfig
+from ..usage import UsageError
 from .files import json_bytes
 from .formats import CONFIG_FORMAT
 from .reading import UnfitError, fit, plain_json, read_json, read_plain, told

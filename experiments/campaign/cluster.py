@@ -8,7 +8,7 @@ from itertools import islice
 from time import monotonic
 from typing import Any
 
-from ..scenario import UsageError
+from ..usage import UsageError
 from .runner import Executor, lost
 from .work import Done, Job, perform
 

@@ -9,7 +9,7 @@ from typing import Any
 from ..artifacts.files import csv_bytes, json_bytes, write
 from ..artifacts.formats import FORMAT
 from ..artifacts.reading import read_json
-from ..scenario import UsageError
+from ..usage import UsageError
 from .comparison import shapes
 from .comparison.comparison import MEASURES, Row, difference, select
 from .comparison.tables import trial_row

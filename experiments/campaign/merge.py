@@ -11,8 +11,8 @@ from experiments.artifacts.formats import CONFIG_FORMAT
 
 from ..artifacts.files import json_bytes, write
 from ..artifacts.settings import plain
-from ..scenario import UsageError
 from ..scoring.summary import TIMED
+from ..usage import UsageError
 from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
 from .scores.score import Record

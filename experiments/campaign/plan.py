@@ -12,7 +12,8 @@ from slam.backends import BACKENDS
 
 from ..artifacts.settings import nested, trial_of
 from ..replays.replay import Association
-from ..scenario import P0, TrialConfig, UsageError, check, choose
+from ..scenario import P0, TrialConfig, check
+from ..usage import UsageError, choose
 
 CLOSED, RECORDING = "closed", "recording"
 ARMS = (CLOSED, "replay-own", "replay-true")

@@ -16,7 +16,7 @@ from ..artifacts.reading import Each, UnfitError, fit, read_json, told
 from ..artifacts.results import config_record
 from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
 from ..artifacts.settings import READABLE, of_this_format, plain
-from ..scenario import UsageError
+from ..usage import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .scores.score import Record
 from .work import Done, unpack

@@ -2,24 +2,17 @@
 
 import io
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stderr
-from dataclasses import replace
+from dataclasses import dataclass, make_dataclass, replace
+from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
 import tyro
 
-from ..scenario import UsageError, choose
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
-from .compare import Compare
-from .explore import Explore
-from .listings import Backends, Strategies, Worlds
-from .measure import Measure
-from .replay import Replay
-from .report import Report
-from .reproduce import Reproduce
-from .view import View
+from ..usage import UsageError, choose
 
 FAILED, BAD_USAGE = 1, 2
 
@@ -33,17 +26,62 @@ class Command(Protocol):
         ...
 
 
-COMMANDS: dict[str, Callable[..., Any]] = {
-    "explore": Explore,
-    "replay": Replay,
-    "compare": Compare,
-    "reproduce": Reproduce,
-    "measure": Measure,
-    "view": View,
-    "report": Report,
-    "worlds": Worlds,
-    "backends": Backends,
-    "strategies": Strategies,
+@dataclass(frozen=True)
+class Entry:
+    """Where a subcommand stands, and what it is in one sentence: the help needs no more, and imports no more."""
+
+    module: str
+    name: str
+    words: str
+
+    def load(self) -> Any:
+        """Import the subcommand's class."""
+        return getattr(import_module(f".{self.module}", __package__), self.name)
+
+    def named(self) -> Any:
+        """Return a class without arguments that only says what the subcommand is."""
+        return make_dataclass(self.name, [], namespace={"__doc__": self.words}, frozen=True)
+
+
+COMMANDS = {
+    "explore": Entry(
+        "explore",
+        "Explore",
+        "Explore a world until every chain of walls is closed, and write the map beside how good it is.",
+    ),
+    "replay": Entry(
+        "replay",
+        "Replay",
+        "Send a run's own log through one or several back ends: identical scans, the back end alone.",
+    ),
+    "compare": Entry(
+        "compare",
+        "Compare",
+        "Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them honestly.",
+    ),
+    "reproduce": Entry(
+        "reproduce",
+        "Reproduce",
+        "Reproduce the paper's figures: a picture of each, and its numbers beside ours, by several back ends.",
+    ),
+    "measure": Entry(
+        "measure",
+        "Measure",
+        "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
+    ),
+    "view": Entry(
+        "view",
+        "View",
+        "Open a recording in Rerun's viewer, or a results folder: its recording, or one made now and kept in it.",
+    ),
+    "report": Entry(
+        "report",
+        "Report",
+        "Write what a campaign or a run found as one HTML file that holds everything, for a screen, a phone or paper.",
+    ),
+    "worlds": Entry("listings", "Worlds", "List the bundled worlds and families of worlds."),
+    "backends": Entry("listings", "Backends", "List the estimators."),
+    "strategies": Entry("listings", "Strategies", "List the exploration strategies."),
 }
 
 
@@ -105,12 +143,12 @@ def _parse(arguments: Sequence[str] | None) -> Command:
     try:
         with redirect_stderr(said):
             command: Any = tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
+                {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()},
                 prog="chainslam",
                 description="Explore a building by wall following and map it as chains of line segments.",
                 args=words,
             )
-        asked: Command = replace(command, given=given(words)) if isinstance(command, Explore) else command
+        asked: Command = replace(command, given=given(words)) if words[0] == "explore" else command
         return asked
     except SystemExit as leaving:
         if leaving.code in (0, None):

@@ -20,9 +20,10 @@ from ..campaign.plan import ARMS, CLOSED, DECIDED, MAX_STEPS, PRESETS, Campaign,
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened
 from ..replays.replay import Association
-from ..scenario import P0, UsageError, load_world
+from ..scenario import P0, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED
+from ..usage import UsageError
 from .echo import echo_world
 
 FAILED = 1

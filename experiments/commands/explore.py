@@ -14,11 +14,12 @@ from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
 from ..artifacts.settings import nested, parse_setting, read_settings, trial_of
-from ..scenario import P0, TrialConfig, UsageError, build, check, load_world
+from ..scenario import P0, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import print_summary, progress
 from ..trial import TrialResult, default_mission, run_scenario
+from ..usage import UsageError
 from ..views.timelines import Recording
 from .echo import echo_world
 

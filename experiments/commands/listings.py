@@ -1,10 +1,9 @@
-"""`chainslam worlds | backends | strategies`: what there is, one name first on each line."""
+"""`chainslam worlds | backends | strategies`: what there is, one name first on each line.
+
+Each listing imports only the registry that it prints.
+"""
 
 from dataclasses import dataclass
-
-from explore.strategies import STRATEGIES
-from sim.worlds import listing
-from slam.backends import BACKENDS
 
 
 @dataclass(frozen=True)
@@ -13,6 +12,8 @@ class Worlds:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
+        from sim.worlds import listing
+
         return _print(listing())
 
 
@@ -22,6 +23,8 @@ class Backends:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
+        from slam.backends import BACKENDS
+
         return _print({name: entry.description for name, entry in BACKENDS.items()})
 
 
@@ -31,6 +34,8 @@ class Strategies:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
+        from explore.strategies import STRATEGIES
+
         return _print({name: entry.description for name, entry in STRATEGIES.items()})
 
 

@@ -10,9 +10,9 @@ from rich.table import Table
 
 from ..artifacts.mapped import MappedCorners, read_corners
 from ..artifacts.saved import read_config
-from ..scenario import UsageError
 from ..scoring.measurements import Measured
 from ..terminal.console import plain_console
+from ..usage import UsageError
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ from slam.backends import BACKENDS
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..replays.replay import Association, RecordedRun, ReplayOptions, read_run, replay, replayed
-from ..scenario import UsageError, choose, load_world
+from ..scenario import load_world
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.progress import print_comparison, progress
 from ..trial import TrialResult
+from ..usage import UsageError, choose
 from ..views.timelines import Recording
 
 

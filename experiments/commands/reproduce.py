@@ -14,8 +14,8 @@ from ..artifacts.files import json_bytes, write
 from ..artifacts.run_folder import prepare
 from ..reproductions import REPRODUCTIONS, Reproduction
 from ..reproductions.reproduction import Value
-from ..scenario import UsageError, choose
 from ..terminal.console import plain_console
+from ..usage import UsageError, choose
 
 SEED_LARGEST = 2**32
 

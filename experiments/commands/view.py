@@ -16,7 +16,8 @@ from ..artifacts.run_folder import prepare
 from ..campaign.pages.film import record_campaign
 from ..campaign.store import read_campaigns
 from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
-from ..scenario import UsageError, load_world
+from ..scenario import load_world
+from ..usage import UsageError
 from ..views.timelines import Recording
 
 TRIALS = "trials.csv"

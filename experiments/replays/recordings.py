@@ -6,8 +6,9 @@ from sim.logs.recorded_robot import Recording
 
 from ..artifacts.files import json_bytes, npz_bytes, write
 from ..artifacts.results import config_record, log_arrays
-from ..scenario import TrialConfig, UsageError
+from ..scenario import TrialConfig
 from ..trial import TrialResult, run_trial
+from ..usage import UsageError
 from .replay import RecordedRun, read_run
 
 

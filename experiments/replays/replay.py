@@ -31,9 +31,10 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import read_config, read_trial
-from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, UsageError, check, load_world
+from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
+from ..usage import UsageError
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
 
 Association = Literal["own", "true"]

@@ -30,8 +30,9 @@ from ..artifacts.results import LOG
 from ..artifacts.run_folder import prepare
 from ..artifacts.saved import REMEDY, read_trial
 from ..replays.replay import read_run
-from ..scenario import TrialConfig, UsageError, load_world
+from ..scenario import TrialConfig, load_world
 from ..scoring.summary import wheels_path
+from ..usage import UsageError
 from .saved_map import saved_map
 from .timelines import true_rings
 

@@ -12,7 +12,8 @@ from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 from ..artifacts.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
 from ..replays.replay import ReplayOptions, read_options
-from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig, UsageError
+from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..usage import UsageError
 from .numbers import NONE, number, percent
 from .pictures import draw_all, read_pictured
 

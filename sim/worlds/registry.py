@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,7 @@ import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
-from .random.random_building import read_seed
 from .readers.files import read_bytes, read_json_map
-from .readers.raster import read_image
-from .readers.ros_map import read_ros_map
-from .readers.svg import read_svg
 from .solid import build
 from .world import World
 
@@ -38,6 +35,11 @@ WORLDS: dict[str, Bundled] = {
 }
 
 
+def _lazily(module: str, name: str) -> Callable[..., Drawing]:
+    """Return a reader that imports its module (and the library behind it) when first used."""
+    return lambda *arguments: getattr(import_module(f".{module}", __package__), name)(*arguments)
+
+
 @dataclass(frozen=True)
 class Family:
     """Worlds without number: NAME:WHICH."""
@@ -50,16 +52,21 @@ class Family:
 
 FAMILIES: dict[str, Family] = {
     "random": Family(
-        read_seed, "random:1", "rooms, corridors, halls and slanted walls by chance; any seed after the colon"
+        _lazily("random.random_building", "read_seed"),
+        "random:1",
+        "rooms, corridors, halls and slanted walls by chance; any seed after the colon",
     ),
 }
 
+_read_svg = _lazily("readers.svg", "read_svg")
 READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
-    ".json": lambda path, scale: read_json_map(read_bytes(path), scale),
-    ".geojson": lambda path, scale: read_json_map(read_bytes(path), scale),
-    ".svg": lambda path, scale: read_svg(read_bytes(path), scale),
-    **dict.fromkeys((".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"), read_image),
-    **dict.fromkeys((".yaml", ".yml"), read_ros_map),
+    **dict.fromkeys((".json", ".geojson"), lambda path, scale: read_json_map(read_bytes(path), scale)),
+    ".svg": lambda path, scale: _read_svg(read_bytes(path), scale),
+    **dict.fromkeys(
+        (".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"),
+        _lazily("readers.raster", "read_image"),
+    ),
+    **dict.fromkeys((".yaml", ".yml"), _lazily("readers.ros_map", "read_ros_map")),
 }
 """Reader by file name extension; each takes the path and the scale that the caller states, or None."""
 
@@ -96,7 +103,7 @@ def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
     if scale is not None and not 0 < scale < np.inf:
         raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
     if text in WORLDS:
-        return text, read_svg((HERE / WORLDS[text].file).read_bytes())
+        return text, _read_svg((HERE / WORLDS[text].file).read_bytes())
     family, colon, which = text.partition(":")
     if colon and family in FAMILIES:
         return text, FAMILIES[family].read(which)

@@ -21,9 +21,10 @@ from experiments.campaign.scores.score import offsets, wall_errors
 from experiments.replays.recordings import record
 from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
 from experiments.replays.sightings import Sightings, ride, sightings_of
-from experiments.scenario import TrialConfig, UsageError, choose, strategy_of
+from experiments.scenario import TrialConfig, strategy_of
 from experiments.scoring.coverage import alignment
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees
 from slam.evaluation.trajectories import ate

@@ -17,7 +17,8 @@ import tyro
 from experiments.replays.recordings import record
 from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
 from experiments.replays.sightings import Sightings, ride, sightings_of, start
-from experiments.scenario import P0, P0_SIGMAS, TrialConfig, UsageError, choose
+from experiments.scenario import P0, P0_SIGMAS, TrialConfig
+from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees, share_in_band
 

@@ -17,7 +17,8 @@ from jaxtyping import Float
 
 from experiments.artifacts.files import write
 from experiments.replays.corridor import Loop, drive
-from experiments.scenario import P0, P0_SIGMAS, UsageError, choose
+from experiments.scenario import P0, P0_SIGMAS
+from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from viz.figures.anees_map import Field, anees_map
 from viz.figures.maps import saved

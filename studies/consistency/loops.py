@@ -16,7 +16,8 @@ import tyro
 
 from experiments.replays.corridor import Loop, drive
 from experiments.replays.sightings import Sightings, ride, start
-from experiments.scenario import P0, P0_SIGMAS, UsageError, choose
+from experiments.scenario import P0, P0_SIGMAS
+from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.geometry.poses import wrap
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import tyro
 
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 
 from ..runner.rows import rows_of
 from .court_worlds import court

@@ -11,8 +11,9 @@ import tyro
 from jaxtyping import Float
 from shapely.geometry.polygon import orient
 
-from experiments.scenario import TrialConfig, UsageError, check
+from experiments.scenario import TrialConfig, check
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 from sim.worlds import World
 
 ROOM_M = (3.5, 3.0)

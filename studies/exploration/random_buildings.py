@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import tyro
 
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 
 from ..runner.rows import rows_of
 from .suite import table

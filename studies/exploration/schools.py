@@ -13,8 +13,9 @@ import numpy as np
 import tyro
 from rich.table import Table
 
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
 from ..runner.rows import rows_of

@@ -13,8 +13,9 @@ import numpy as np
 import tyro
 from rich.table import Table
 
-from experiments.scenario import P0, TrialConfig, UsageError
+from experiments.scenario import P0, TrialConfig
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 from sim.worlds import WORLDS
 
 from ..runner.rows import rows_of

@@ -14,9 +14,10 @@ import numpy as np
 import explore
 import sim
 import slam
-from experiments.scenario import TrialConfig, UsageError, check, load_world
+from experiments.scenario import TrialConfig, check, load_world
 from experiments.scoring.summary import TIMED
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 from sim.worlds import World
 
 Row = dict[str, Any]

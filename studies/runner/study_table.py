@@ -12,8 +12,8 @@ from rich.progress import track
 from rich.table import Table
 
 from experiments.artifacts.files import csv_bytes, write
-from experiments.scenario import UsageError
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 
 Key = tuple[str, ...]
 Rows = dict[Key, Sequence[Any]]

@@ -17,8 +17,9 @@ from experiments.replays.replay import ReplayOptions, replay
 from experiments.replays.sightings import ride, sightings_of, start
 from experiments.reproductions.runs.origin import Study as OriginStudy
 from experiments.reproductions.runs.standing import slope, stand
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 from slam.backends import BACKENDS
 from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations

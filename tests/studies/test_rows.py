@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
+from experiments.usage import UsageError
 from studies.runner import rows
 from studies.runner.rows import PARTS, one, rows_of
 

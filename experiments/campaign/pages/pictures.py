@@ -13,7 +13,8 @@ from viz.figures.maps import png
 from viz.reports.report import PagePicture
 
 from ...artifacts.reading import fit, told
-from ...scenario import UsageError, load_world
+from ...scenario import load_world
+from ...usage import UsageError
 from ..comparison.comparison import BASELINE_STRATEGY
 from ..comparison.tables import read_rows
 from ..comparison.words import ARMS_SHORT

@@ -23,8 +23,9 @@ from slam.geometry.lines import normals
 
 from ...replays.corridor import Loop, drive
 from ...replays.sightings import Sightings, ride, start
-from ...scenario import P0, P0_SIGMAS, choose
+from ...scenario import P0, P0_SIGMAS
 from ...terminal.console import plain_console
+from ...usage import choose
 
 FILTERS: tuple[type[Any], ...] = (BlockEkf, RelocationEkf, FullEkf, FejEkf, InvariantEkf)
 

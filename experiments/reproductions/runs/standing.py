@@ -18,8 +18,9 @@ from slam.geometry.poses import J
 
 from ...replays.corridor import look, on_ring, ring
 from ...replays.sightings import start
-from ...scenario import P0, P0_SIGMAS, UsageError, choose
+from ...scenario import P0, P0_SIGMAS
 from ...terminal.console import plain_console
+from ...usage import UsageError, choose
 
 MARKS = (10, 100, 1000)
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from experiments.artifacts.saved import SavedRun
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 from explore.outcome import Outcome
 from sim.logs.recorded_robot import Recording
 

@@ -20,8 +20,9 @@ from experiments.artifacts.run_folder import LOCK, FolderGoneError, held, refuse
 from experiments.artifacts.running_log import RunningLog, read_running
 from experiments.artifacts.saved import read_saved
 from experiments.commands.cli import main
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 from tests.experiments.commands.test_control import timeless
 
 ROOT = Path(__file__).parents[3]

@@ -23,7 +23,8 @@ from experiments.artifacts.settings import (
 from experiments.commands.cli import main
 from experiments.commands.compare import Compare
 from experiments.commands.explore import Explore
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
+from experiments.usage import UsageError
 
 LEAVES = dict(leaves(defaults()))
 

@@ -9,7 +9,7 @@ from experiments.campaign.merge import merge
 from experiments.campaign.plan import Campaign
 from experiments.campaign.store import read_campaigns
 from experiments.commands.cli import main
-from experiments.scenario import UsageError
+from experiments.usage import UsageError
 from tests.experiments.campaign.running import run
 
 WHOLE = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, arms=("closed",), max_steps=6)

@@ -18,9 +18,10 @@ from experiments.artifacts.files import json_bytes
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.commands.cli import main
-from experiments.scenario import TrialConfig, UsageError
+from experiments.scenario import TrialConfig
 from experiments.scoring.summary import TIMED
 from experiments.terminal.interrupts import first_interrupt_waits, nothing_half_built_speaks
+from experiments.usage import UsageError
 from explore.goals.explorer import ExplorerConfig
 from explore.mission import MissionConfig
 from sim.logs.recorded_robot import FORMAT

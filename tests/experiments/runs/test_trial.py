@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from experiments.artifacts.results import write_results
-from experiments.scenario import TrialConfig, UsageError, build
+from experiments.scenario import TrialConfig, build
 from experiments.scoring.summary import TIMED, odometry_path, pose_nees
 from experiments.trial import run_trial
+from experiments.usage import UsageError
 
 FILES = (
     "config.json summary.json steps.csv log.npz map.npz map.geojson map.svg map.png"

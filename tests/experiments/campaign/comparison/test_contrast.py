@@ -13,7 +13,7 @@ from experiments.campaign.plan import Campaign, trials
 from experiments.campaign.store import opened
 from experiments.campaign.work import Done, pack
 from experiments.commands.cli import main
-from experiments.scenario import UsageError
+from experiments.usage import UsageError
 from tests.experiments.campaign.running import run
 
 CAMPAIGN = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 3, arms=("closed",), max_steps=6)

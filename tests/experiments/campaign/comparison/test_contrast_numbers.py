@@ -12,8 +12,8 @@ from experiments.campaign.plan import Campaign, trials
 from experiments.campaign.scores.score import Record
 from experiments.campaign.store import opened
 from experiments.campaign.work import Done, pack
-from experiments.scenario import UsageError
 from experiments.scoring import statistics
+from experiments.usage import UsageError
 
 BACKENDS, ARMS = ("block-ekf", "full-ekf"), ("closed", "replay-true")
 CAMPAIGN = Campaign(("paper-fig4",), BACKENDS, ("nearest-robot",), 3, arms=ARMS, max_steps=6)

@@ -1,0 +1,54 @@
+"""What a command imports before it knows what it is asked: nothing that takes long."""
+
+import subprocess
+import sys
+
+import pytest
+
+from experiments.commands.cli import COMMANDS
+
+HEAVY = (
+    "gtsam",
+    "jinja2",
+    "joblib",
+    "matplotlib",
+    "networkx",
+    "pandas",
+    "PIL",
+    "pyarrow",
+    "rerun",
+    "scipy",
+    "shapely",
+    "skimage",
+)
+
+
+def imported(program):
+    """The heavy packages that a program has imported when it ends."""
+    code = f"import sys\n{program}\nprint(*sorted(set({HEAVY!r}) & set(sys.modules)), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "needed"),
+    [
+        (["--help"], set()),
+        (["worlds"], {"shapely"}),
+        (["backends"], {"scipy"}),
+    ],
+)
+def test_the_help_and_the_listings_import_only_what_they_show(words, needed):
+    program = f"from experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    assert imported(program) <= needed
+
+
+def test_a_campaigns_worker_imports_nothing_that_draws():
+    drawing = {"matplotlib", "rerun", "jinja2", "pandas", "gtsam"}
+    assert not imported("import experiments.campaign.work") & drawing
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_says_of_each_command_what_it_says_of_itself(name):
+    command = COMMANDS[name].load()
+    assert " ".join(command.__doc__.partition("\n\n")[0].split()) == COMMANDS[name].words
