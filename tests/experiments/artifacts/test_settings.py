@@ -73,7 +73,8 @@ def test_an_option_wins_over_set_and_set_over_config(tmp_path):
 
 def test_what_a_command_names_counts_though_it_is_the_default(tmp_path):
     path, out = tmp_path / "mine.json", tmp_path / "run"
-    path.write_text(json.dumps({"world": "paper-fig4", "seed": 5, "errorless": True, "mission": {"return_to_start": True}}))
+    said = {"world": "paper-fig4", "seed": 5, "errorless": True, "mission": {"return_to_start": True}}
+    path.write_text(json.dumps(said))
     words = ["explore", "--config", str(path), "--max-steps", "2", "--seed", "1", "--no-errorless", "--out", str(out)]
     assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
     trial = read_trial(out / "config.json")
