@@ -1,9 +1,43 @@
-"""The format numbers of the files that are read back: a file's keys and their order change only with its number.
+"""The format number of every file that is read back: its keys and their order change only with its number.
 
-A recorded log (`log.npz`, `log.arrow`) has its own, in `sim.logs.recorded_robot`.
+A file of another number is refused with the reason, but for those of `OLDEST`.
 """
 
-FORMAT = 1
-"""Of `summary.json`, `map.npz`, `map.geojson`, the records of a campaign, `comparison.json` and `contrast.json`."""
-CONFIG_FORMAT = 2
-"""Of `config.json`, of a run or of a campaign. 1 had no `settings` in a campaign, and what `settings.RENAMED` lists."""
+from typing import Any
+
+from sim.logs import recorded_robot
+
+CONFIG = "config.json"
+RECORD = "trials/*.npz"
+FORMATS = {
+    CONFIG: 2,
+    "summary.json": 1,
+    "log.npz": recorded_robot.FORMAT,
+    "log.arrow": 1,
+    "map.npz": 1,
+    "map.geojson": 1,
+    RECORD: 1,
+    "comparison.json": 1,
+    "contrast.json": 1,
+}
+"""By name; `config.json` is that of a run, of a campaign and of merged campaigns."""
+OLDEST = {CONFIG: 1}
+"""The first format that can still be looked at and replayed, where that is not the one of now. Format 1 of
+`config.json` had other names for some settings (`settings.RENAMED`), and a campaign no `settings`: nothing goes on."""
+
+
+def stamp(name: str) -> dict[str, int]:
+    """Return what every file of this name holds: the number of its format."""
+    return {"format": FORMATS[name]}
+
+
+def fault(said: Any, name: str, older: bool = True) -> str:
+    """Return in words what is wrong with the format number in a file; empty where it can be read.
+
+    `older` says whether the formats since `OLDEST` will do.
+    """
+    least = OLDEST.get(name, FORMATS[name]) if older else FORMATS[name]
+    if type(said) is int and least <= said <= FORMATS[name]:
+        return ""
+    shown = said if isinstance(said, int | float) else type(said).__name__
+    return f"format {str(shown)[:20]}, where this version reads {FORMATS[name]}"

@@ -14,7 +14,7 @@ from slam.map.stochastic_map import StochasticMap
 from ..scoring.certificate import contour_record, open_end_record, unexplained_record, unseen_record
 from ..scoring.corners import Corner, corners
 from ..scoring.records import Log
-from .formats import FORMAT
+from .formats import stamp
 
 FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
 LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
@@ -31,7 +31,7 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
     return {
         "type": "FeatureCollection",
         "name": "map",
-        "format": FORMAT,
+        **stamp("map.geojson"),
         "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
         "coordinate_system": FRAME,
         "features": [

@@ -18,7 +18,7 @@ import numpy as np
 from sim.logs.archive import ArchiveError, read_archive, regular
 
 from ..usage import UsageError
-from .formats import FORMAT
+from .formats import fault
 
 LIMIT_BYTES = 2**26
 """A JSON file of more than this is not read."""
@@ -83,17 +83,15 @@ def told(path: Path, todo: str) -> Iterator[None]:
         raise UsageError(f"{expected}, found {error}: {todo}") from error
 
 
-def read_json(
-    path: Path, shape: Mapping[str, Shape], todo: str, formats: tuple[int, ...] = (FORMAT,)
-) -> dict[str, Any]:
-    """Return the object in a file of one of these formats, of a shape; raises UsageError, with what to do about it."""
+def read_json(path: Path, shape: Mapping[str, Shape], todo: str) -> dict[str, Any]:
+    """Return the object in a file named in `FORMATS`, of a shape; raises UsageError, with what to do about it."""
     with told(path, todo):
-        return _formed(read_plain(path), shape, formats)
+        return _formed(read_plain(path), path.name, shape)
 
 
-def parse_json(content: bytes, shape: Mapping[str, Shape], formats: tuple[int, ...] = (FORMAT,)) -> dict[str, Any]:
-    """Return the object in some JSON of one of these formats, of a shape; raises UnfitError."""
-    return _formed(plain_json(content), shape, formats)
+def parse_json(content: bytes, name: str, shape: Mapping[str, Shape]) -> dict[str, Any]:
+    """Return the object in the JSON of a file with a name of `FORMATS`, of a shape; raises UnfitError."""
+    return _formed(plain_json(content), name, shape)
 
 
 def read_plain(path: Path) -> dict[str, Any]:
@@ -132,22 +130,26 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return said
 
 
-def _formed(said: Any, shape: Mapping[str, Shape], formats: tuple[int, ...]) -> dict[str, Any]:
+def _formed(said: Any, name: str, shape: Mapping[str, Shape]) -> dict[str, Any]:
+    check_format(said, name)
+    fit(shape, said)
+    return dict(said)
+
+
+def check_format(said: Any, name: str, older: bool = True) -> None:
+    """Raise UnfitError where what a file says has no format that is read."""
     if not isinstance(said, dict) or "format" not in said:
         raise UnfitError("no format number")
-    if type(said["format"]) is not int or said["format"] not in formats:
-        known = " and ".join(map(str, formats))
-        raise UnfitError(f"format {_shown(said['format'])}, where this version reads {known}")
-    fit(shape, said)
-    return said
+    if wrong := fault(said["format"], name, older):
+        raise UnfitError(wrong)
 
 
 def read_arrays(path: Path, needed: Mapping[str, str], todo: str) -> dict[str, np.ndarray]:
     """Return the arrays of an .npz file of this format, by their layouts (`sim.logs.archive`); raises UsageError."""
     with told(path, todo):
         said = read_archive(path, {"format": "int"})["format"]
-        if said != FORMAT:
-            raise ArchiveError(f"format {said}, where this version reads {FORMAT}")
+        if wrong := fault(int(said), path.name):
+            raise ArchiveError(wrong)
         return read_archive(path, needed)
 
 

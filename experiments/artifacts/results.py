@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sim.logs.recorded_robot import FORMAT as LOG_FORMAT
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
 from viz.figures.floor_plan import floor_plan
@@ -21,17 +20,17 @@ from ..scoring.records import Log
 from ..scoring.summary import odometry_path, pose_nees
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
-from .formats import CONFIG_FORMAT, FORMAT
+from .formats import CONFIG, stamp
 from .geojson import map_geojson
 from .occupancy import occupancy_files
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
-CONFIG, LOG, SUMMARY = "config.json", "log.npz", "summary.json"
+LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
 RUNNING = "log.arrow"
 """The log while the run goes on: it is there until all results are."""
 RECORDING = "run.rrd"
 RUN_FILES = (
-    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, "map.npz", "map.geojson", "map.svg", "map.png", "map.pgm"),
+    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.png", "map.pgm"),
     *("map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
     *(RECORDING, "report.html", "tables.tex"),
 )
@@ -71,7 +70,7 @@ def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | No
 def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
     files: dict[str, Callable[[], bytes]] = {
         CONFIG: lambda: json_bytes(config),
-        SUMMARY: lambda: json_bytes({"format": FORMAT} | result.summary),
+        SUMMARY: lambda: json_bytes(stamp(SUMMARY) | result.summary),
     }
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()
@@ -85,7 +84,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
-        "map.npz": lambda: npz_bytes(map_arrays(result)),
+        MAP: lambda: npz_bytes(map_arrays(result)),
         "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
         "steps.csv": lambda: steps_csv(log),
         "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
@@ -108,7 +107,7 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"format": CONFIG_FORMAT, "trial": asdict(config), "versions": versions, "commit": _commit()}
+    return {**stamp(CONFIG), "trial": asdict(config), "versions": versions, "commit": _commit()}
 
 
 def _picture(result: TrialResult) -> bytes:
@@ -136,7 +135,7 @@ def _commit() -> str | None:
 def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
     """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
     return {
-        "format": LOG_FORMAT,
+        **stamp(LOG),
         "time_s": log.time_s,
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,
@@ -166,7 +165,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
     walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
     size = 3 + 2 * len(walls)
     return {
-        "format": FORMAT,
+        **stamp(MAP),
         "pose": walls.belief.pose_world,
         "ids": walls.ids,
         "lines": walls.belief.means,

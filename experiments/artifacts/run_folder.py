@@ -11,8 +11,8 @@ from typing import Any
 
 from ..usage import UsageError
 from .files import PART, json_bytes, write
-from .results import CONFIG, REPLAY, RUN_FILES
-from .settings import of_this_format
+from .formats import CONFIG, FORMATS
+from .results import REPLAY, RUN_FILES
 
 LOCK = ".lock"
 
@@ -146,7 +146,8 @@ def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
         there = json.loads((folder / CONFIG).read_text())
         if "campaign" in there or "merged" in there:
             return _CAMPAIGN
-        there = of_this_format(there)
+        if there["format"] != FORMATS[CONFIG]:
+            return f"a run of format {str(there['format'])[:9]}, where this version writes {FORMATS[CONFIG]},"
         now = json.loads(json_bytes(config))
         if there.get(REPLAY) != now.get(REPLAY):
             return "a replay of other options" if REPLAY in there and REPLAY in now else "another kind of run"

@@ -19,11 +19,13 @@ from explore.step import Step
 from sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..terminal.console import say
 from ..usage import UsageError
+from .formats import CONFIG, FORMATS
 from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
 from .results import LOG, RUNNING
 from .running_log import Kept, read_running
-from .settings import READABLE, of_this_format
+from .settings import converted
 
 REMEDY = "keep a run's files together, or make it anew"
 NUMBERS = (
@@ -99,7 +101,13 @@ class SavedRun:
 def read_saved(folder: Path) -> SavedRun:
     """Read what a run left in its folder, whatever ended it; raises UsageError where none can go on."""
     kept = read_running(folder)
-    trial = read_trial(folder / "config.json") if kept is None else _trial_of(kept, folder / RUNNING)
+    config = read_config(folder / CONFIG) if kept is None else _config_in(kept, folder / RUNNING)
+    trial = config.trial
+    if config.format < FORMATS[CONFIG]:
+        raise UsageError(
+            f"expected a run of format {FORMATS[CONFIG]}, found one of format {config.format} in {folder}, of which"
+            " some settings had other names and values: it cannot go on, explore anew with --force"
+        )
     if trial.strategy == STRATEGY_OF_REPLAYS:
         raise UsageError(f"expected the folder of a run that drove, found that of a replay in {folder}: replay again")
     time_s, ranges_m, odometry = np.empty(0), np.empty((0, 0)), np.empty((0, 3))
@@ -132,35 +140,48 @@ class SavedConfig:
     """The options of a replay as they stand there; None for a run that drove."""
     versions: dict[str, str]
     commit: str | None
+    format: int
+    unknown: tuple[str, ...]
+    """Keys of an older format that mean nothing now."""
 
 
-CONFIG = {"format": int, "trial": TrialConfig, "versions?": Each(str), "commit?": str | None, "replay?": Any}
+SHAPE = {"format": int, "trial": dict, "versions?": Each(str), "commit?": str | None, "replay?": Any}
 
 
 def read_config(path: Path) -> SavedConfig:
     """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
-    return _config_of(read_json(path, {}, REMEDY, READABLE), path)
+    return _config_of(read_json(path, SHAPE, REMEDY), path)
 
 
-def _trial_of(kept: Kept, path: Path) -> TrialConfig:
+def _config_in(kept: Kept, path: Path) -> SavedConfig:
     with told(path, REMEDY):
-        said = parse_json(kept.config, {}, READABLE)
-    return _config_of(said, path).trial
+        said = parse_json(kept.config, CONFIG, SHAPE)
+    return _config_of(said, path)
 
 
 def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
     with told(path, REMEDY):
-        for key in said.keys() - {key.removesuffix("?") for key in CONFIG}:
+        for key in said.keys() - {key.removesuffix("?") for key in SHAPE}:
             raise UnfitError(f"an unknown {key[:40]!r}")
-        said = of_this_format(said)
-        fit(CONFIG, said)
-        trial: TrialConfig = fit(TrialConfig, said["trial"], "trial")
-    return SavedConfig(trial, said.get("replay"), said.get("versions", {}), said.get("commit"))
+        trial, unknown = (
+            (fit(TrialConfig, said["trial"], "trial"), ())
+            if said["format"] == FORMATS[CONFIG]
+            else converted(said["trial"])
+        )
+    made_by = said.get("versions", {}), said.get("commit")
+    return SavedConfig(trial, said.get("replay"), *made_by, said["format"], unknown)
 
 
 def read_trial(path: Path) -> TrialConfig:
-    """Read the settings of a run from its `config.json`; raises UsageError."""
-    return read_config(path).trial
+    """Read the settings of a run from its `config.json`; raises UsageError.
+
+    What of an older one means nothing now is told on standard error.
+    """
+    config = read_config(path)
+    if config.unknown:
+        few = ", ".join(config.unknown[:3]) + (f" and {len(config.unknown) - 3} more" if config.unknown[3:] else "")
+        say(f"chainslam: {path} is of format {config.format}; not known any more, left aside: {few}", stderr=True)
+    return config.trial
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

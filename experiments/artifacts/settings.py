@@ -13,8 +13,8 @@ from typing import Any, get_type_hints
 from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import json_bytes
-from .formats import CONFIG_FORMAT
-from .reading import UnfitError, fit, plain_json, read_json, read_plain, told
+from .formats import CONFIG
+from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 SEE = "config.json of any run names all"
@@ -32,9 +32,10 @@ def read_settings(path: Path) -> Record:
             for key, value in leaves(said):
                 _place(key, value)
             return said
-        said = of_this_format(read_json(path, {"trial": dict}, REMEDY, READABLE))["trial"]
-        fit(TrialConfig, said, "trial")
-    return said
+        check_format(said, CONFIG, older=False)
+        fit(TrialConfig, said["trial"], "trial")
+        trial: Record = said["trial"]
+    return trial
 
 
 RENAMED: dict[str, str | None] = {
@@ -45,28 +46,28 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.gaps.corner_m": None,
     "mission.mapper.duplicates.gate": None,
 }
-"""Settings of a trial that had other names in format 1 of `config.json`; None where there is none any more."""
-READABLE = (1, CONFIG_FORMAT)
-"""Formats of `config.json` that can be read."""
+"""Settings of a trial that had other names in format 1 of `config.json`; None where they said nothing of their own."""
 
 
-def of_this_format(said: Record) -> Record:
-    """Return what a `config.json` of a readable format says, with the keys that it has today.
+def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:
+    """Return what still holds of a trial in an older format, and the keys of what means nothing now.
 
-    A setting that an older format lacks is the default: that is what ruled the run. Raises UnfitError for a trial that
-    lacks a setting, or has one too many.
+    The defaults take the places of settings that are not there. Raises UnfitError where no world is named.
     """
-    if said["format"] == CONFIG_FORMAT:
-        return said
-    said = dict(said)
-    if isinstance(said.get("trial"), dict):
-        settings = [(RENAMED.get(key, key), value) for key, value in leaves(said["trial"])]
-        said["trial"] = over(defaults(), nested((key, value) for key, value in settings if key is not None))
-    if isinstance(said.get("campaign"), dict):
-        said["campaign"] = {"settings": []} | said["campaign"]
-    if isinstance(said.get("merged"), list):
-        said["merged"] = [{"settings": []} | each if isinstance(each, dict) else each for each in said["merged"]]
-    return said | {"format": CONFIG_FORMAT}
+    record, unknown = defaults(), []
+    for key, value in leaves(said):
+        now = RENAMED.get(key, key)
+        if now is None:
+            continue
+        try:
+            _place(now, value)
+        except UnfitError:
+            unknown.append(key)
+        else:
+            record = over(record, nested([(now, value)]))
+    if not record["world"]:
+        raise UnfitError("no trial.world")
+    return fit(TrialConfig, record), tuple(unknown)
 
 
 def parse_setting(text: str) -> Record:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..artifacts.files import csv_bytes, json_bytes, write
-from ..artifacts.formats import FORMAT
+from ..artifacts.formats import stamp
 from ..artifacts.reading import read_json
 from ..usage import UsageError
 from .comparison import shapes
@@ -46,7 +46,7 @@ def contrast(first: Path, second: Path, out: Path) -> None:
         if not agree(*records):
             different.append(_side_by_side(*pair))
     said = {
-        "format": FORMAT,
+        **stamp(CONTRAST),
         "first": str(first),
         "second": str(second),
         "settings": _settings(first, second),

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.artifacts.formats import CONFIG_FORMAT
-
 from ..artifacts.files import json_bytes, write
+from ..artifacts.formats import CONFIG, FORMATS, stamp
 from ..artifacts.settings import plain
 from ..scoring.summary import TIMED
 from ..usage import UsageError
 from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
 from .scores.score import Record
-from .store import CONFIG, MERGED, Store, opened_anew, read_campaigns, read_config
+from .store import MERGED, Store, opened_anew, outdated, read_campaigns, read_config
 
-SHARED = ("driver", "p0", "max_steps")
+SHARED = ("driver", "p0", "max_steps", "settings")
 """What campaigns must have in common to be one."""
 
 
@@ -29,12 +28,16 @@ def merge(folders: Sequence[Path], out: Path) -> None:
     """
     if len(folders) < 2:
         raise UsageError(f"expected two or more campaigns to merge, found {len(folders)}: name another")
+    for folder in folders:
+        if read_config(folder).format < FORMATS[CONFIG]:
+            raise UsageError(outdated(folder, "run it again to merge it"))
     stores = [Store(folder, campaign) for folder in folders for campaign in read_campaigns(folder)]
     campaigns = [store.campaign for store in stores]
     for name in SHARED:
-        values = {getattr(campaign, name) for campaign in campaigns}
+        values = {str(getattr(campaign, name)) for campaign in campaigns}
         if len(values) > 1:
-            raise UsageError(f"expected campaigns of one {name}, found {sorted(map(str, values))}: merge others")
+            words = " and ".join(sorted(values)) if name != "settings" else "campaigns that differ in them"
+            raise UsageError(f"expected campaigns of one {name}, found {words}: merge others")
     digests: dict[str, Any] = {}
     for folder in folders:
         for world, digest in read_config(folder).worlds_sha256.items():
@@ -50,7 +53,7 @@ def merge(folders: Sequence[Path], out: Path) -> None:
             copy = merged.path(trial)
             copy.parent.mkdir(parents=True, exist_ok=True)
             write(copy, store.path(trial).read_bytes())
-        config = {"format": CONFIG_FORMAT, MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
+        config = {**stamp(CONFIG), MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
         write(out / CONFIG, json_bytes(config | {"from": [read_config(folder).said for folder in folders]}))
         write_tables(out, levels, in_order(found, levels), merged.record)
 

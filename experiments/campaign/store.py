@@ -11,17 +11,16 @@ from typing import Any
 from sim.logs.archive import regular
 
 from ..artifacts.files import json_bytes, write
-from ..artifacts.formats import CONFIG_FORMAT
+from ..artifacts.formats import CONFIG, FORMATS, stamp
 from ..artifacts.reading import Each, UnfitError, fit, read_json, told
 from ..artifacts.results import config_record
 from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
-from ..artifacts.settings import READABLE, of_this_format, plain
+from ..artifacts.settings import plain
 from ..usage import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .scores.score import Record
 from .work import Done, unpack
 
-CONFIG = "config.json"
 REMEDY = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
@@ -56,7 +55,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             # So that the recording is one that `chainslam replay` takes, too.
             config = config_of(self.campaign, done.trial.recording)
-            write(path.with_name(CONFIG), json_bytes({"format": CONFIG_FORMAT, "trial": asdict(config)}))
+            write(path.with_name(CONFIG), json_bytes({**stamp(CONFIG), "trial": asdict(config)}))
             write(path, done.log)
         if done.trial.arm != "recording":
             path = self.path(done.trial)
@@ -106,6 +105,11 @@ class Settled:
     said: dict[str, Any]
     """As it stands in the file."""
 
+    @property
+    def format(self) -> int:
+        """Of the file; one of before can be read and compared, and does not go on."""
+        return int(self.said["format"])
+
 
 def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
     """Return the campaigns whose results stand in a folder, several where it was merged; raises UsageError."""
@@ -114,12 +118,14 @@ def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
 
 def read_config(folder: Path) -> Settled:
     """Return the config of a campaign's folder; raises UsageError where it has none."""
-    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY, READABLE)
+    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY)
     with told(folder / CONFIG, REMEDY):
-        said = of_this_format(said)
         if MERGED in said:
             fit({MERGED: [dict], "from": [dict]}, said)
-        campaigns = tuple(fit(Campaign, each, "campaign") for each in said.get(MERGED, [said.get("campaign")]))
+        later: dict[str, Any] = {} if said["format"] == FORMATS[CONFIG] else {"settings": []}
+        found = said.get(MERGED, [said.get("campaign")])
+        found = [{**later, **each} if isinstance(each, dict) else each for each in found]
+        campaigns = tuple(fit(Campaign, each, "campaign") for each in found)
         made = said
         while "from" in made:
             if not made["from"]:
@@ -133,15 +139,26 @@ def read_config(folder: Path) -> Settled:
     return Settled(campaigns, said["worlds_sha256"], made["versions"], made["commit"], said)
 
 
+def outdated(folder: Path, todo: str) -> str:
+    """Return what is told of a campaign whose trials ran with settings that had other names."""
+    return (
+        f"expected a campaign of format {FORMATS[CONFIG]}, found one of before in {folder}, of which some settings had"
+        f" other names and values: {todo}, `report` and --against still read it"
+    )
+
+
 def _settle(folder: Path, campaign: Campaign) -> None:
     """Write the config, or hold it against the one that is there."""
     path = folder / CONFIG
-    before = read_config(folder).said if os.path.lexists(path) else None
+    held = read_config(folder) if os.path.lexists(path) else None
+    if held is not None and held.format < FORMATS[CONFIG]:
+        raise UsageError(outdated(folder, "name another with --out"))
+    before = None if held is None else held.said
     try:
         digests = world_digests(campaign)
     except OSError as error:
         raise UsageError(f"expected readable worlds, found {error.filename} ({error.strerror})") from error
-    now = plain({"format": CONFIG_FORMAT, "campaign": asdict(campaign), "worlds_sha256": digests})
+    now = plain({**stamp(CONFIG), "campaign": asdict(campaign), "worlds_sha256": digests})
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
     if before is None:

@@ -19,7 +19,7 @@ from slam.mapper import Extractor
 from slam.robot import Scan
 
 from ..artifacts.files import json_bytes, npz_bytes
-from ..artifacts.formats import FORMAT
+from ..artifacts.formats import RECORD, stamp
 from ..artifacts.reading import Each, Maybe, UnfitError, parse_json
 from ..artifacts.results import log_arrays
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
@@ -128,13 +128,13 @@ def failed(job: Job, reason: str, trace: str = "") -> Record:
 
 def pack(record: Record) -> bytes:
     """Return a record as the bytes of an archive without pickles."""
-    return npz_bytes({SUMMARY: json_bytes({"format": FORMAT} | record.summary).decode(), **record.arrays})
+    return npz_bytes({SUMMARY: json_bytes(stamp(RECORD) | record.summary).decode(), **record.arrays})
 
 
 def unpack(content: bytes, trial: Trial) -> Record:
     """Return the record in the bytes of a trial's file; raises ArchiveError or UnfitError for anything else."""
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
-    summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), SHAPE)
+    summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), RECORD, SHAPE)
     arrays.pop("format", None)
     for name, value in _names(trial).items():
         if summary[name] != value:

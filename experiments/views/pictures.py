@@ -28,7 +28,7 @@ from ..artifacts.map_files import read_map
 from ..artifacts.reading import UnfitError, told
 from ..artifacts.results import LOG
 from ..artifacts.run_folder import prepare
-from ..artifacts.saved import REMEDY, read_trial
+from ..artifacts.saved import REMEDY
 from ..replays.replay import read_run
 from ..scenario import TrialConfig, load_world
 from ..scoring.summary import wheels_path
@@ -76,7 +76,6 @@ class PicturedRun:
 
 def read_pictured(folder: Path) -> PicturedRun:
     """Read a run's folder; raises UsageError where it holds none."""
-    trial = read_trial(folder / "config.json")
     run = read_run(folder / LOG)
     walls, steps = read_map(folder), read_steps(folder)
     if len(steps) != len(run.recording):
@@ -85,7 +84,7 @@ def read_pictured(folder: Path) -> PicturedRun:
             " keep a run's files together"
         )
     arrays = {"true_poses": run.true_poses_world, "start_pose": run.start_pose, "odometry": run.recording.odometry}
-    return PicturedRun(trial, arrays, walls, steps[:, :3], steps[:, 3])
+    return PicturedRun(run.trial, arrays, walls, steps[:, :3], steps[:, 3])
 
 
 def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:

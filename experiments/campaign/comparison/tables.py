@@ -16,7 +16,7 @@ from slam.association.matching import MatchingConfig
 from slam.evaluation.consistency import chi2_band, pooled_band
 
 from ...artifacts.files import csv_bytes, json_bytes, write
-from ...artifacts.formats import FORMAT
+from ...artifacts.formats import stamp
 from ...artifacts.reading import UnfitError, told
 from ...scoring.measurements import Z_95
 from ..plan import Campaign, Trial
@@ -207,6 +207,6 @@ def write_tables(
     write_table(folder / "marks", marks)
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
-    said |= {"format": FORMAT, "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
+    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     write(folder / "comparison.json", json_bytes(said))
     return said

@@ -7,7 +7,7 @@ from dataclasses import asdict
 import pytest
 
 from experiments.artifacts.files import json_bytes
-from experiments.artifacts.formats import CONFIG_FORMAT
+from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.artifacts.settings import (
@@ -125,7 +125,7 @@ FILES = {
     "another type": b'{"mission": {"max_steps": "many"}}',
     "another format": b'{"format": 99, "trial": {}}',
     "no format": b'{"trial": {}}',
-    "a missing key": b'{"format": %d, "trial": {"world": "hall"}}' % CONFIG_FORMAT,
+    "a missing key": b'{"format": %d, "trial": {"world": "hall"}}' % FORMATS[CONFIG],
     "no number": b'{"scale": NaN}',
 }
 
@@ -168,6 +168,6 @@ def test_a_config_of_the_first_format_is_read_as_what_it_was(tmp_path):
     path = tmp_path / "config.json"
     path.write_text(json.dumps(record))
     assert read_trial(path) == TrialConfig("hall", seed=4)
-    path.write_text(json.dumps(record | {"format": CONFIG_FORMAT}))
+    path.write_text(json.dumps(record | {"format": FORMATS[CONFIG]}))
     with pytest.raises(UsageError, match="gate"):
         read_trial(path)

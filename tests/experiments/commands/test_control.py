@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from experiments.artifacts.files import json_bytes
+from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.commands.cli import main
@@ -24,7 +25,6 @@ from experiments.terminal.interrupts import first_interrupt_waits, nothing_half_
 from experiments.usage import UsageError
 from explore.goals.explorer import ExplorerConfig
 from explore.mission import MissionConfig
-from sim.logs.recorded_robot import FORMAT
 
 ROOT = Path(__file__).parents[3]
 
@@ -109,7 +109,7 @@ def test_settings_are_read_as_they_were_written(tmp_path):
     trial = said["trial"]
     wrong = {
         "trial should be an object": {**said, "trial": []},
-        "no trial": {"format": FORMAT},
+        "no trial": {"format": FORMATS[CONFIG]},
         "no format": {"trial": trial},
         "format 0": {**said, "format": 0},
         "trial.seed should be a whole number": {**said, "trial": {**trial, "seed": "one"}},
