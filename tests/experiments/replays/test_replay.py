@@ -1,5 +1,7 @@
 """A recording played back: identical scans, the back end alone, the truth in place of a part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,9 @@ from experiments.replays.replay import ReplayOptions, read_run, replay
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
 from sim.logs.recorded_robot import RecordedRobot
+from slam.backends import BackendOptions
+from slam.backends.kalman.config import EkfConfig
+from slam.extraction.config import ExtractionConfig
 from slam.geometry.poses import compose
 from slam.robot import MotionCommand
 from studies.runner.study_table import bootstrap
@@ -103,3 +108,15 @@ def test_the_interval_of_a_mean_holds_it_and_shrinks_with_the_runs():
     few = bootstrap(values[:40])
     assert low < values.mean() < high
     assert high - low < few[1] - few[0]
+
+
+@pytest.mark.parametrize("perfect_extraction", [False, True])
+def test_a_replay_goes_by_its_runs_options_of_the_back_end_and_settings_of_the_extraction(made, perfect_extraction):
+    """Where every segment has too few beams nothing is mapped, whoever extracts."""
+    run = recorded(made[0])
+    mapper = replace(run.trial.mission.mapper, extraction=ExtractionConfig(sure_beams=1000))
+    options = BackendOptions(EkfConfig(at_wall=False))
+    trial = replace(run.trial, mission=replace(run.trial.mission, mapper=mapper), backend_options=options)
+    again = replay(replace(run, trial=trial), "full-ekf", ReplayOptions("own", perfect_extraction))
+    assert again.scenario.backend._config is options.ekf
+    assert len(again.last.map) == 0
