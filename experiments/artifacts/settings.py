@@ -4,7 +4,7 @@ Keys are those of `config.json`, with a dot between an object and what it holds:
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -88,6 +88,29 @@ def parse_setting(text: str) -> Record:
     return dict(value)
 
 
+def asked(file: Path | None, sets: Sequence[str], settled: Collection[str]) -> Record:
+    """Return what --config and --set ask for, --set on top, of a command that settles some keys itself.
+
+    Those are left aside in a file. Raises UsageError, also where --set names one of them.
+    """
+    named = over({}, *map(parse_setting, sets))
+    for key in named.keys() & set(settled):
+        raise UsageError(f"expected --set of what this command leaves open, found {key!r}: it is settled otherwise")
+    base = {} if file is None else read_settings(file)
+    return over({key: value for key, value in base.items() if key not in settled}, named)
+
+
+def differing(trial: TrialConfig) -> list[tuple[str, Any]]:
+    """Return the dotted keys and values in which the settings of a trial are not the defaults."""
+    before = dict(leaves(defaults()))
+    return [(key, value) for key, value in leaves(record_of(trial)) if key not in before or before[key] != value]
+
+
+def options_of(settings: Iterable[tuple[str, Any]]) -> list[str]:
+    """Return the words of a command that ask for some settings."""
+    return [word for key, value in settings for word in ("--set", f"{key}={json.dumps(value)}")]
+
+
 def over(base: Record, *changes: Mapping[str, Any]) -> Record:
     """Return a nested record with the changes laid over it, the last one on top."""
     result = dict(base)
@@ -113,7 +136,12 @@ def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
 
 def defaults() -> Record:
     """Return the settings of a trial as they are where nothing else is said, as they come back from a file."""
-    record: Record = plain(asdict(TrialConfig("")))
+    return record_of(TrialConfig(""))
+
+
+def record_of(trial: TrialConfig) -> Record:
+    """Return the settings of a trial as they come back from a file."""
+    record: Record = plain(asdict(trial))
     return record
 
 

@@ -1,7 +1,6 @@
 """Two campaigns held against each other, trial by trial: which trials differ, and by how much on the whole."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -9,12 +8,13 @@ from typing import Any
 from ..artifacts.files import csv_bytes, json_bytes, write
 from ..artifacts.formats import stamp
 from ..artifacts.reading import read_json
+from ..artifacts.settings import leaves, nested, record_of, trial_of
 from ..usage import UsageError
 from .comparison import shapes
 from .comparison.comparison import MEASURES, Row, difference, select
 from .comparison.tables import trial_row
 from .merge import agree, in_order, union
-from .plan import Trial, trials
+from .plan import Trial, gate_of, trials
 from .store import Store, opened_anew, read_campaigns, read_config
 
 CONTRAST, TRIALS = "contrast.json", "contrast.csv"
@@ -38,9 +38,10 @@ def contrast(first: Path, second: Path, out: Path) -> None:
         raise UsageError(f"expected campaigns that share trials, found {first} and {second} with none: name others")
     rows: tuple[list[Row], list[Row]] = ([], [])
     different = []
+    gates = tuple(gate_of(read_campaigns(folder)[0]) for folder in (first, second))
     for trial in both:
         records = ours[trial].record(trial), theirs[trial].record(trial)
-        pair = tuple(trial_row(record) for record in records)
+        pair = tuple(trial_row(record, gate) for record, gate in zip(records, gates, strict=True))
         for side, row in zip(rows, pair, strict=True):
             side.append(row)
         if not agree(*records):
@@ -94,8 +95,10 @@ def _settings(first: Path, second: Path) -> dict[str, list[Any]]:
 
 def _made_with(folder: Path) -> dict[str, Any]:
     config = read_config(folder)
-    plain: dict[str, Any] = {name: asdict(config.campaigns[0])[name] for name in SETTINGS}
-    return plain | {"commit": config.commit} | config.versions
+    campaign = config.campaigns[0]
+    settings = dict(leaves(record_of(trial_of(nested(campaign.settings)))))
+    ruled: dict[str, Any] = {name: getattr(campaign, name) for name in SETTINGS}
+    return settings | ruled | {"commit": config.commit} | config.versions
 
 
 def _side_by_side(first: Row, second: Row) -> Row:

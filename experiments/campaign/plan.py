@@ -81,7 +81,7 @@ class Trial:
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
 
-DECIDED = ("world", "backend", "strategy", "seed", "p0", "max_steps", "errorless", "start")
+DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start", "scale")
 """Settings of a trial that the campaign itself decides, or that would make its statistics none."""
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -134,6 +134,11 @@ def config_of(campaign: Campaign, trial: Trial) -> TrialConfig:
         "max_steps": campaign.max_steps,
     }
     return trial_of(nested(campaign.settings), decided)
+
+
+def gate_of(campaign: Campaign) -> float:
+    """Return the level of the gate that all trials of a campaign match with."""
+    return trial_of(nested(campaign.settings)).mission.mapper.matching.gate
 
 
 def world_key(world: str) -> str:

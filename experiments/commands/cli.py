@@ -148,7 +148,7 @@ def _parse(arguments: Sequence[str] | None) -> Command:
                 description="Explore a building by wall following and map it as chains of line segments.",
                 args=words,
             )
-        asked: Command = replace(command, given=given(words)) if words[0] == "explore" else command
+        asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
         return asked
     except SystemExit as leaving:
         if leaving.code in (0, None):

@@ -4,11 +4,11 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
-from ..artifacts.settings import defaults, leaves, over, parse_setting, read_settings
+from ..artifacts.settings import asked, differing, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.tables import write_tables
 from ..campaign.comparison.words import left_out
@@ -64,7 +64,7 @@ class Compare:
     """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
     config: Path | None = None
     """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
-    itself (worlds, back ends, seeds, limits) is not taken from there."""
+    itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
     """One setting of every trial by its key in `config.json`, over those of --config; may be given again."""
     jobs: int | None = None
@@ -78,36 +78,26 @@ class Compare:
 
     rrd: Path | None = None
     """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this file."""
+    given: tyro.conf.Suppress[frozenset[str]] = frozenset()
+    """The options that stand in the command, with whatever value."""
 
     @property
     def campaign(self) -> Campaign:
         """The campaign that the options describe; raises UsageError where they leave something open."""
         given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
+        settings = asked(self.config, self.set, DECIDED)
+        ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
+        ruled |= {"p0": self.p0} if "p0" in self.given or self.p0 != Compare.p0 else {}
         named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
+        named = ruled | named
         chosen = {"max_steps": MAX_STEPS} | (PRESETS[self.preset] if self.preset else {}) | named
         missing = [f"--{name}" for name in given if name not in chosen]
         if missing:
             raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
         arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
         arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
-        settings: dict[str, Any] = {
-            "driver": self.driver,
-            "p0": self.p0,
-            "first_seed": self.first_seed,
-            "settings": self._settings(),
-        }
-        return Campaign(**chosen, arms=tuple(arms), **settings)
-
-    def _settings(self) -> tuple[tuple[str, Any], ...]:
-        """Return what --config and --set change of every trial, by dotted keys in alphabetical order."""
-        named = [parse_setting(words) for words in self.set]
-        for key, _ in leaves(over({}, *named)):
-            if key in DECIDED:
-                raise UsageError(f"expected --set of what a campaign leaves open, found {key!r}: it has its own option")
-        base = {} if self.config is None else read_settings(self.config)
-        before = dict(leaves(defaults()))
-        asked = over({key: value for key, value in base.items() if key not in DECIDED}, *named)
-        return tuple(sorted((key, value) for key, value in leaves(asked) if before.get(key, value) != value))
+        changed = tuple(sorted(differing(trial_of(settings))))
+        return Campaign(**chosen, arms=tuple(arms), driver=self.driver, first_seed=self.first_seed, settings=changed)
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

@@ -109,7 +109,7 @@ class Explore:
     def continued(self, saved: TrialConfig) -> TrialConfig:
         """Return a saved run with the limits given now; raises UsageError where anything else is given, too."""
         for name in SETTLED:
-            if getattr(self, name) != getattr(Explore, name):
+            if self._is_given(name):
                 raise UsageError(
                     f"expected nothing but limits and --out with --resume, found {name}: the saved run has settled it"
                 )

@@ -14,7 +14,7 @@ from slam.backends import BACKENDS
 
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
-from ..replays.replay import Association, RecordedRun, ReplayOptions, read_run, replay, replayed
+from ..replays.replay import Association, RecordedRun, ReplayOptions, read_run, replay, replayed, retuned
 from ..scenario import load_world
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.progress import print_comparison, progress
@@ -37,6 +37,11 @@ class Replay:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
+    config: Path | None = None
+    """Settings of the mission and of the back ends from this file, in place of those of the run: a run's `config.json`,
+    or an object of some of its keys. --set goes before it."""
+    set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
+    """One of these settings by its key in `config.json`, as `mission.mapper.matching.gate=0.95`; may be given again."""
     out: Path | None = None
     """Folder for the results, one folder for each of several back ends; by default replay-ASSOCIATION beside LOG."""
     force: bool = False
@@ -48,7 +53,7 @@ class Replay:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         for name in self.backend:
             choose("back end", name, BACKENDS)
-        run = read_run(self.log)
+        run = retuned(read_run(self.log), self.config, self.set)
         out = self.out or self.log.parent / f"replay-{self.association}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
         trial = run.trial

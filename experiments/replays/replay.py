@@ -1,6 +1,6 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -31,6 +31,7 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import read_config, read_trial
+from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
@@ -39,6 +40,8 @@ from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
 
 Association = Literal["own", "true"]
 _NEVER = 10**9
+OPEN_TO_REPLAYS = ("mission", "backend_options")
+"""The settings that a replay may have of its own; the log has settled all others."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,12 @@ class ReplayedRobot(RecordedRobot):
         self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
         self._record.collisions += odometry.touched
         return odometry
+
+
+def retuned(run: RecordedRun, config: Path | None, sets: Sequence[str]) -> RecordedRun:
+    """Return a run to be replayed with the settings of a file and of `KEY=VALUE` over its own; raises UsageError."""
+    settled = record_of(run.trial).keys() - set(OPEN_TO_REPLAYS)
+    return replace(run, trial=trial_of(record_of(run.trial), asked(config, sets, settled)))
 
 
 def replayed(run: RecordedRun, backend: str) -> TrialConfig:

@@ -11,7 +11,8 @@ from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
-from ..replays.replay import ReplayOptions, read_options
+from ..artifacts.settings import differing, options_of
+from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..usage import UsageError
 from .numbers import NONE, number, percent
@@ -36,6 +37,9 @@ FIGURES: dict[str, tuple[str, float]] = {
 """What the table tells: the key of summary.json, words, and what it is multiplied by."""
 
 LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
+
+
+BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start")
 
 
 def is_run(folder: Path) -> bool:
@@ -162,10 +166,14 @@ def _by_truth(options: ReplayOptions) -> str:
 
 def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> str:
     """Return the command that makes the run again."""
+    tuned = [(key, value) for key, value in differing(trial) if "." in key and key not in BY_OPTION]
     if trial.strategy == STRATEGY_OF_REPLAYS:
+        tuned = [(key, value) for key, value in tuned if key.split(".")[0] in OPEN_TO_REPLAYS]
         truth = {"--perfect-extraction": options.perfect_extraction, "--perfect-odometry": options.perfect_odometry}
         words = ["chainslam", "replay", "LOG", "--backend", *names, "--association", options.association]
-        return shlex.join([*words, *(name for name, given in truth.items() if given), "--out", "DIR"])
+        return shlex.join(
+            [*words, *(name for name, given in truth.items() if given), *options_of(tuned), "--out", "DIR"]
+        )
     plain, mission = TrialConfig(trial.world), trial.mission
     words = ["chainslam", "explore", trial.world, "--backend", trial.backend, "--strategy", trial.strategy]
     words += ["--seed", str(trial.seed), "--p0", trial.p0, *(["--errorless"] if trial.errorless else [])]
@@ -175,4 +183,4 @@ def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> st
     for option, name in LIMITS.items():
         value = getattr(trial, name)
         words += [] if value == getattr(plain, name) else [option, str(value)]
-    return shlex.join([*words, "--out", "DIR"])
+    return shlex.join([*words, *options_of(tuned), "--out", "DIR"])

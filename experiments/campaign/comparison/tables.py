@@ -19,7 +19,7 @@ from ...artifacts.files import csv_bytes, json_bytes, write
 from ...artifacts.formats import stamp
 from ...artifacts.reading import UnfitError, told
 from ...scoring.measurements import Z_95
-from ..plan import Campaign, Trial
+from ..plan import Campaign, Trial, gate_of
 from ..scores.score import END, Record
 from .comparison import compare
 from .findings import findings
@@ -35,20 +35,20 @@ FIRST = (
 TIMINGS = "step_ms_"
 """What the names of all columns begin with that differ from run to run."""
 GATE = MatchingConfig().gate
-"""Level of the gate that all trials of a campaign match with."""
+"""Level of the gate that the trials of a campaign match with where nothing else is said."""
 KEYS = ("world", "strategy", "backend", "mode", "association")
 PLAIN = (str, int, float, bool)
 
 Row = dict[str, Any]
 
 
-def trial_row(record: Record) -> Row:
+def trial_row(record: Record, gate: float = GATE) -> Row:
     """Return the plain values of a trial's summary, and how its intervals of distances fared."""
     summary = record.summary
     row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
     row.pop("traceback", None)
     row["set_aside"] = len(summary.get("set_aside") or ())
-    row |= doubles(summary)
+    row |= doubles(summary, gate)
     off, sigma = distance_errors(record)
     row["distances"] = len(off)
     row["distances_in_95"] = float(np.mean(np.abs(off) <= Z_95 * sigma)) if len(off) else None
@@ -56,7 +56,7 @@ def trial_row(record: Record) -> Row:
     return row
 
 
-def doubles(summary: Row) -> Row:
+def doubles(summary: Row, gate: float = GATE) -> Row:
     """Return how many sightings of known walls there were, and how many walls were entered twice, merged since or not.
 
     A gate at level g refuses 1 - g of the sightings of a calibrated estimate, each of which may enter a wall anew:
@@ -72,7 +72,7 @@ def doubles(summary: Row) -> Row:
         "sightings": seen,
         "missed_share": found["matches_missed"] / seen if seen else None,
         "double_entries": entries,
-        "doubles_beyond_gate": entries - (1.0 - GATE) * seen,
+        "doubles_beyond_gate": entries - (1.0 - gate) * seen,
     }
 
 
@@ -196,9 +196,10 @@ def write_tables(
     `campaign` names the levels.
     """
     rows, marks, steps, bands = [], [], [], []
+    gate = gate_of(campaign)
     for _, cell in groupby(trials, key=lambda t: (t.world, t.strategy, t.backend, t.arm)):
         records = [record_of(trial) for trial in cell]
-        rows += [trial_row(record) for record in records]
+        rows += [trial_row(record, gate) for record in records]
         marks += [row for record in records for row in mark_rows(record)]
         mine = step_rows(records)
         steps += mine
@@ -207,6 +208,6 @@ def write_tables(
     write_table(folder / "marks", marks)
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
-    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
+    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], gate)}
     write(folder / "comparison.json", json_bytes(said))
     return said

@@ -3,6 +3,7 @@
 import shlex
 from typing import Any
 
+from ...artifacts.settings import options_of
 from ...views.numbers import NONE, number, percent
 from ..plan import CLOSED, Campaign
 from ..scores.score import END
@@ -126,4 +127,5 @@ def command_of(campaign: Campaign) -> str:
     for option, name in SETTINGS:
         value = getattr(campaign, name)
         words += [] if value == getattr(plain, name) else [option, str(value)]
+    words += options_of(campaign.settings)
     return shlex.join([*words, "--out", "DIR"])
