@@ -34,7 +34,7 @@ def _unchecked() -> Iterator[None]:
 @pytest.mark.parametrize("strategy", list(STRATEGIES))
 def test_planning_of_one_step(benchmark: BenchmarkFixture, strategy: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Processor time of the decisions over the first errorless steps; `extra_info` holds the figures."""
-    decide, spent = Explorer.command, []
+    decide, spent = Explorer.decide, []
 
     def timed(self: Explorer, *known: object) -> object:
         began = time.thread_time()
@@ -42,7 +42,7 @@ def test_planning_of_one_step(benchmark: BenchmarkFixture, strategy: str, monkey
         spent.append(1e3 * (time.thread_time() - began))
         return command
 
-    monkeypatch.setattr(Explorer, "command", timed)
+    monkeypatch.setattr(Explorer, "decide", timed)
     world = load(str(PLAN))
     cov = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 

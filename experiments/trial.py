@@ -89,7 +89,7 @@ def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
             recorder.add(step)
             watch(step)
             if step.outcome is not None:
-                return Ending(step.outcome, step.reason)
+                return Ending(step.outcome, step.decision.words)
     except KeyboardInterrupt as interrupt:
         return Ending(Outcome.INTERRUPTED, f"interrupted by {interrupt or 'Ctrl-C'}")
     except UsageError:

@@ -12,8 +12,7 @@ from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
 from .floor.free_space import FreeSpace
-from .goal import LeftPlace
-from .goals.sweep import SweepConfig
+from .goal import GivenUp
 from .outcome import Outcome
 from .planning.driving_field import DrivingField
 from .planning.paths import PathConfig
@@ -154,7 +153,7 @@ def floor_of(found: tuple[Contour, ...]) -> shapely.Polygon | shapely.MultiPolyg
 
 def left_open(step: Step, outcome: Outcome) -> tuple[LeftOpen, ...]:
     """Return the open ends of the last map, each with the reason why it is one."""
-    reasons = {(end.wall, end.side): end.reason for end in step.set_aside}
+    reasons = {(end.wall, end.side): end.reason for end in step.decision.given_up.ends}
     otherwise = "not explored yet" if outcome.status != "complete" else "seen at the end"
     return tuple(
         LeftOpen(end.wall, end.side, end.position_world, reasons.get((end.wall, end.side), otherwise))
@@ -172,7 +171,7 @@ def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen,
         LeftUnseen(
             border,
             len(border) * cell,
-            _why_left(border, step.left_places, "what lies behind was not all seen from there")
+            _why_left(border, step.decision.given_up, "what lies behind was not all seen from there")
             if sweep
             else "unseen floor was not to be visited",
         )
@@ -185,7 +184,7 @@ def left_unexplained(step: Step, sweep: bool) -> tuple[LeftUnexplained, ...]:
     return tuple(
         LeftUnexplained(
             thing,
-            _why_left(thing, step.left_places, "no scan from there shows a wall")
+            _why_left(thing, step.decision.given_up, "no scan from there shows a wall")
             if sweep
             else "what is no wall of the map was not to be looked at",
         )
@@ -199,13 +198,9 @@ def reachable_way(step: Step, paths: PathConfig, way_world: Float[np.ndarray, "s
     return float(np.isfinite(metres).mean())
 
 
-def _why_left(points: Float[np.ndarray, "n 2"], places: tuple[LeftPlace, ...], in_vain: str) -> str:
+def _why_left(points: Float[np.ndarray, "n 2"], given_up: GivenUp, in_vain: str) -> str:
     """Return what came of the visits of a border of unseen floor, or of a thing; `in_vain`, if all got there."""
-    troubles = [
-        place.trouble
-        for place in places
-        if np.hypot(*(place.position_world - points.mean(axis=0))) < SweepConfig().near_m
-    ]
+    troubles = given_up.troubles_at(points.mean(axis=0))
     if not troubles:
         return "not visited yet"
     in_the_way = [trouble for trouble in troubles if trouble]

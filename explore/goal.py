@@ -1,4 +1,4 @@
-"""What a strategy decides: where to go next and why."""
+"""Where the robot goes next and why, and what it gave up."""
 
 from dataclasses import dataclass
 
@@ -39,3 +39,24 @@ class LeftPlace:
 
     position_world: Float[np.ndarray, "2"]
     trouble: str
+
+
+@dataclass(frozen=True)
+class GivenUp:
+    """What exploration gave up so far, as its ledger holds it at one step."""
+
+    ends: tuple[SetAside, ...] = ()
+    """The ends that are set aside, whether the map has them open still or not."""
+    places: tuple[LeftPlace, ...] = ()
+    near_m: float = 0.0
+    """Places this near to each other are one."""
+
+    @property
+    def keys(self) -> frozenset[tuple[int, int]]:
+        """(wall id, side) of the ends."""
+        return frozenset((end.wall, end.side) for end in self.ends)
+
+    def troubles_at(self, position_world: Float[np.ndarray, "2"]) -> list[str]:
+        """Return what was in the way at each visit of a place, m."""
+        near = (p for p in self.places if np.hypot(*(p.position_world - position_world)) < self.near_m)
+        return [place.trouble for place in near]

@@ -13,7 +13,7 @@ class Limits:
 
     steps: int | None = None
     path_m: float | None = None
-    """By the wheels."""
+    """By odometry."""
     time_s: float | None = None
     """On the robot's own clock: driving and scanning, not computing."""
 
@@ -33,6 +33,6 @@ def limited(steps: Iterable[Step], limits: Limits) -> Iterator[Step]:
     for step in steps:
         end = limits.reached(step) if step.outcome is None else None
         if end is not None:
-            yield replace(step, outcome=end[0], reason=end[1], command=None)
+            yield replace(step, decision=replace(step.decision, outcome=end[0], words=end[1], command=None))
             return
         yield step

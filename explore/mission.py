@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from slam.mapper import Mapper
 from slam.robot import Odometry, Robot
 
-from .floor.accumulated_returns import RecentReturns
+from .floor.accumulated_returns import AccumulatedReturns
 from .floor.floor_memory import FloorMemory, FloorMemoryConfig
 from .floor.free_space import FreeSpace, FreeSpaceConfig
 from .following.wall_following import Surroundings
-from .goals.decider import Decider
+from .goal import GivenUp
+from .goals.decider import Driver
 from .goals.explorer import Explorer, ExplorerConfig
-from .goals.homing import Homing
-from .goals.replay_driver import Passenger
-from .goals.retreat import Retreat
+from .goals.homing import Homing, HomingConfig
+from .goals.replay_driver import ReplayDriver
+from .goals.retreat import Retreat, RetreatConfig
 from .outcome import Outcome
 from .planning.visibility_graph import VisibilityGraph, followed_wall
 from .step import Step
@@ -33,6 +34,8 @@ class MissionConfig:
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     floor_memory: FloorMemoryConfig = field(default_factory=FloorMemoryConfig)
+    retreat: RetreatConfig = field(default_factory=RetreatConfig)
+    homing: HomingConfig = field(default_factory=HomingConfig)
     return_to_start: bool = False
     """Once there is nothing left to explore, drive back to where the mission began."""
 
@@ -45,51 +48,67 @@ def explore_mission(
     The `mapper` holds the back end, whose pose is where the robot believes to start. `limited` ends a mission early.
     """
     start = mapper.backend.belief.pose_world[:2].copy()
+    following = config.explorer.following
     explorer = Explorer(strategy, start, config.explorer)
-    decider = Homing(explorer, start, config.explorer.following) if config.return_to_start else explorer
-    return _mission(robot, mapper, decider, config)
+    inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
+    floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
+    return _mission(robot, mapper, Retreat(inner, floor, config.retreat, following), floor)
 
 
-def ride_mission(robot: Robot, mapper: Mapper, scans: int, config: MissionConfig = MissionConfig()) -> Iterator[Step]:
-    """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step."""
-    return _mission(robot, mapper, Passenger(scans), config)
+def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
+    """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step.
+
+    Nobody plans, so nobody keeps the free floor.
+    """
+    return _mission(robot, mapper, ReplayDriver(scans), None)
 
 
-def _mission(robot: Robot, mapper: Mapper, inner: Decider, config: MissionConfig) -> Iterator[Step]:
-    free_space, graph, recent = FreeSpace(config.free_space), VisibilityGraph(), RecentReturns()
-    floor = FloorMemory(free_space, config.floor_memory)
-    decider = Retreat(inner, floor, config.explorer.following)
+def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
+    graph, recent = VisibilityGraph(), AccumulatedReturns()
+    free_space = FreeSpace() if floor is None else floor.free_space
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
+    given_up = GivenUp()
     path_length, index = 0.0, 0
     while True:
         began = time.perf_counter()
         scan = robot.sense()
-        update = mapper.step(scan, decider.set_aside.keys())
-        if decider.needs_floor:
+        update = mapper.step(scan, given_up.keys)
+        if floor is not None:
             floor.see(update.map, scan)
         decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
         around = Surroundings(update.map, free_space, scan, recent.points_robot)
-        command = decider.command(around, update.chains, graph.graph)
-        outcome, reason = None, decider.doing
-        if command is None:
-            outcome, reason = decider.outcome, decider.closing_words
-            if outcome is Outcome.ALL_CLOSED and not update.chains:
-                outcome, reason = Outcome.NO_WALL, "no wall was found"
+        decision = driver.decide(around, update.chains, graph.graph)
+        given_up = decision.given_up
+        if decision.outcome is Outcome.ALL_CLOSED and not update.chains:
+            decision = replace(decision, outcome=Outcome.NO_WALL, words="no wall was found")
         decided = time.thread_time() - decides
         yield Step(
-            index, scan.time_s, odometry, scan, update.segments, update.matches, update.walls_of_segments,
-            update.map, update.chains, free_space, graph.graph, decider.goal, decider.walls_to_follow,
-            decider.still_open, command, path_length, time.perf_counter() - began, decided,
-            outcome, reason, update.merged, decider.left_places,
-        )  # fmt: skip
-        if command is None:
+            index=index,
+            time_s=scan.time_s,
+            odometry=odometry,
+            scan=scan,
+            segments=update.segments,
+            matches=update.matches,
+            walls_of_segments=update.walls_of_segments,
+            map=update.map,
+            chains=update.chains,
+            merged=update.merged,
+            free_space=free_space,
+            graph=graph.graph,
+            decision=decision,
+            path_length_m=path_length,
+            seconds=time.perf_counter() - began,
+            planning_seconds=decided,
+        )
+        if decision.command is None:
             return
-        odometry = robot.drive(command)
+        odometry = robot.drive(decision.command)
         mapper.predict(odometry)
-        floor.move(odometry)
-        decider.moved(command, odometry)
+        if floor is not None:
+            floor.move(odometry)
+        driver.moved(decision.command, odometry)
         recent.see(scan)
         recent.move(odometry)
         path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))

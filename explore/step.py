@@ -12,14 +12,15 @@ from slam.association.matching import Matches
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import MotionCommand, Odometry, Scan
+from slam.robot import Odometry, Scan
 
 from .floor.free_space import FreeSpace
-from .goal import Goal, LeftPlace, SetAside
+from .goal import SetAside
+from .goals.decider import Decision
 from .outcome import Outcome
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Step:
     """Everything that one turn of sense, map, choose, drive has seen and decided."""
 
@@ -39,25 +40,27 @@ class Step:
     """A view that the mission goes on updating: read it at once or copy it."""
     graph: nx.DiGraph[int]
     """The visibility graph, likewise."""
-    goal: Goal | None
-    walls_to_follow: tuple[int, ...]
-    set_aside: tuple[SetAside, ...]
-    command: MotionCommand | None
-    """None at the last step."""
+    decision: Decision
+    """The command with its goal, and why; at the last step, why the mission is over."""
     path_length_m: float
-    """By the wheels, so far."""
+    """By odometry, so far."""
     seconds: float
     """Wall-clock time of this step, sense to command."""
     planning_seconds: float
     """Processor time of what the step decided: the visibility graph, the choice, the way, the command."""
-    outcome: Outcome | None
-    """Why the mission is over, at its last step, else None."""
-    reason: str
-    """What the robot is doing and why; at the last step, why it ended."""
     merged: tuple[tuple[int, int], ...] = ()
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
-    left_places: tuple[LeftPlace, ...] = ()
-    """The borders of unseen floor that were to be visited so far, and what was in the way."""
+
+    @property
+    def set_aside(self) -> tuple[SetAside, ...]:
+        """The ends that were set aside and are open still."""
+        open_ends = {(end.wall, end.side) for chain in self.chains for end in chain.open_ends}
+        return tuple(end for end in self.decision.given_up.ends if (end.wall, end.side) in open_ends)
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """Why the mission is over, at its last step, else None."""
+        return self.decision.outcome
 
     @property
     def ended(self) -> str | None:

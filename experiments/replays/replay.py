@@ -185,7 +185,7 @@ def replay(
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(match if oracle is None else oracle),
         )
-        return ride_mission(scenario.robot, mapper, len(recording), scenario.config.mission)
+        return ride_mission(scenario.robot, mapper, len(recording))
 
     return run_scenario(scenario, learn, mission)
 

@@ -94,7 +94,7 @@ class Recorder:
                 "set_aside": len(step.set_aside),
                 "seconds": step.seconds,
                 "planning_seconds": step.planning_seconds,
-                "reasons": step.reason,
+                "reasons": step.decision.words,
             }
         )
 

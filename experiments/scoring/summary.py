@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from explore.goals.homing import HOME_M
 from explore.outcome import Outcome
 from explore.step import Step
 from slam.estimation.backend import POSE, Joint, columns_of
@@ -108,7 +107,7 @@ def summarise(
         "path_length_true_m": scenario.robot.record.path_length_m,
         "drive_time_s": scenario.robot.record.drive_time_s,
         "collisions": scenario.robot.record.collisions,
-        "return_to_start": _return(log) if config.mission.return_to_start else None,
+        "return_to_start": _return(log, config.mission.homing.home_m) if config.mission.return_to_start else None,
         "open_ends": int(log.open_ends[-1]),
         "set_aside": [
             {"wall": int(end.wall), "side": int(end.side), "position_m": end.position_world.tolist(), "why": end.reason}
@@ -121,10 +120,10 @@ def summarise(
     }
 
 
-def _return(log: Log) -> dict[str, Any]:
+def _return(log: Log, home_m: float) -> dict[str, Any]:
     """Return how far from its start the robot is at the end, m: as it believes, and truly."""
     believed, true = (float(np.hypot(*(p[-1] - p[0])[:2])) for p in (log.estimated_world, log.true_world))
-    return {"reached": believed <= HOME_M, "distance_m": believed, "distance_true_m": true}
+    return {"reached": believed <= home_m, "distance_m": believed, "distance_true_m": true}
 
 
 def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:

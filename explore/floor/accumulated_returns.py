@@ -16,7 +16,7 @@ SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
 """Returns of two scans so near in bearing and distance are of one place: half a beam's step, and four sigmas."""
 
 
-class RecentReturns:
+class AccumulatedReturns:
     """Returns near the robot, kept in its frame by what the wheels report."""
 
     def __init__(self) -> None:

@@ -42,11 +42,11 @@ class WallErrand(Errand):
 
     def _places(self, part: int, end: OpenEnd, around: Surroundings, planner: Planner) -> Float[np.ndarray, "n 2"]:
         """Return where to go for one part of the rounding; towards the end, as far along the wall as there is a way."""
-        looks = self._config.looks
-        places = places_near(ideal_places(end, around.walls, looks)[part], end, around.free_space, planner, looks)
+        config = self._config.viewpoints
+        places = places_near(ideal_places(end, around.walls, config)[part], end, around.free_space, planner, config)
         if part > 0 or planner.to(places) is not None:
             return places
-        along = lane(self._wall, around.walls, looks.standoff_m)
+        along = lane(self._wall, around.walls, config.standoff_m)
         for place in along[:: -1 if end.side == HEAD else 1]:
             if planner.to(place[None]) is not None:
                 return place[None]

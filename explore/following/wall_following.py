@@ -16,7 +16,7 @@ from slam.robot import MotionCommand, Scan
 
 from ..floor.free_space import FreeSpace
 from ..planning.paths import PathConfig, Planner
-from ..survey.viewpoints import LOOKS, LooksConfig, ideal_places, lane, places_beyond, places_near, places_that_see
+from ..survey.viewpoints import LOOKS, ViewpointsConfig, ideal_places, lane, places_beyond, places_near, places_that_see
 from .driving import DrivingConfig, Pilot
 
 
@@ -26,7 +26,7 @@ class FollowingConfig:
 
     paths: PathConfig = field(default_factory=PathConfig)
     driving: DrivingConfig = field(default_factory=DrivingConfig)
-    looks: LooksConfig = field(default_factory=LooksConfig)
+    viewpoints: ViewpointsConfig = field(default_factory=ViewpointsConfig)
     window_m: float = 6.0
     """Paths are sought this far around the robot first, then along the route of walls, then everywhere."""
     moved_m: float = 0.2
@@ -173,11 +173,11 @@ class EndErrand(Errand):
 
     def _plan(self, around: Surroundings) -> bool:
         planner = self._planner(around, self._config.window_m)
-        ideal = ideal_places(self.end, around.walls, self._config.looks)
+        ideal = ideal_places(self.end, around.walls, self._config.viewpoints)
         whole: Planner | None = None
         while self._stage < len(LOOKS):
             places = self._fresh(
-                places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.looks)
+                places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.viewpoints)
             )
             self.doing = f"to look {LOOKS[self._stage]} the open end of wall {self.end.wall}"
             if self._drive(planner, places):
@@ -186,7 +186,7 @@ class EndErrand(Errand):
                 return True
             whole = whole or self._planner(around, None)
             places = self._fresh(
-                places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.looks)
+                places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.viewpoints)
             )
             if self._drive(whole, places) or self._plan_beyond(around, whole):
                 return self._note()
@@ -208,7 +208,7 @@ class EndErrand(Errand):
         """Approach the wall farthest along the route to which a way is known nearby."""
         present = set(around.walls.ids.tolist())
         for wall in reversed(self.route[1:]):
-            if wall in present and self._drive(planner, lane(wall, around.walls, self._config.looks.standoff_m)):
+            if wall in present and self._drive(planner, lane(wall, around.walls, self._config.viewpoints.standoff_m)):
                 self._on_route = True
                 self.route = self.route[self.route.index(wall) :]
                 self.doing = f"along wall {wall} towards wall {self.end.wall}"
@@ -219,13 +219,13 @@ class EndErrand(Errand):
         """Nobody can stand near the ideal place past the end: one farther off will do."""
         if LOOKS[self._stage] not in ("past", "round"):
             return False
-        places = places_beyond(self.end, around.walls, around.free_space, planner, self._config.looks)
+        places = places_beyond(self.end, around.walls, around.free_space, planner, self._config.viewpoints)
         return self._drive(planner, self._fresh(places))
 
     def _plan_anywhere(self, around: Surroundings, planner: Planner) -> bool:
         """No ideal place can be reached: any place that sees the end will do."""
-        for reach in (self._config.looks.near_m, self._config.looks.far_m):
-            places = places_that_see(self.end, around.free_space, planner, reach, self._config.looks)
+        for reach in (self._config.viewpoints.near_m, self._config.viewpoints.far_m):
+            places = places_that_see(self.end, around.free_space, planner, reach, self._config.viewpoints)
             if self._drive(planner, self._fresh(places)):
                 self.doing = f"to where the open end of wall {self.end.wall} can be seen"
                 return self._note()

@@ -1,70 +1,56 @@
-"""Who chooses where the robot goes: the explorer, those that it is wrapped in, or a passenger of a recorded robot."""
+"""What the robot does next and why, as one value, and who decides it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import networkx as nx
 
 from slam.map.chains import Chain
-from slam.robot import MotionCommand
+from slam.robot import MotionCommand, Odometry
 
 from ..following.wall_following import Surroundings
-from ..goal import Goal, LeftPlace, SetAside
+from ..goal import GivenUp, Goal
 from ..outcome import Outcome
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the robot does next, and why."""
+
+    command: MotionCommand | None
+    """None once there is nothing left to do; then the outcome says why."""
+    words: str
+    """What the robot is about and why; at the end, why there is nothing left to do."""
+    goal: Goal | None = None
+    """The open end or the place that it is about."""
+    walls_to_follow: tuple[int, ...] = ()
+    """The walls along which the goal is approached."""
+    given_up: GivenUp = field(default_factory=GivenUp)
+    outcome: Outcome | None = None
+    """Why the mission is over, at its last step, else None."""
+
+
+@runtime_checkable
+class Driver(Protocol):
+    """Who drives: the robot itself, or whoever drove when a recording was made."""
+
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do after one more scan."""
+        ...
+
+    def moved(self, command: MotionCommand, odometry: Odometry) -> None:
+        """Take note of what the odometry reported of a command."""
+        ...
 
 
 @runtime_checkable
 class Decider(Protocol):
-    """Who chooses where to go: the explorer, or a passenger of a recorded robot."""
+    """Who chooses where to go: the explorer, or what it is wrapped in."""
 
-    @property
-    def set_aside(self) -> dict[tuple[int, int], SetAside]:
-        """The ends that exploration gave up, by (wall id, side)."""
-        ...
-
-    @property
-    def goal(self) -> Goal | None:
-        """The open end or the place that the robot is about."""
-        ...
-
-    @property
-    def walls_to_follow(self) -> tuple[int, ...]:
-        """The walls along which the goal is approached."""
-        ...
-
-    @property
-    def needs_floor(self) -> bool:
-        """Whether it plans paths; nobody else reads the free space."""
-        ...
-
-    @property
-    def still_open(self) -> tuple[SetAside, ...]:
-        """The ends that were set aside and are open still."""
-        ...
-
-    @property
-    def left_places(self) -> tuple[LeftPlace, ...]:
-        """The borders of unseen floor that were to be visited, and what was in the way."""
-        ...
-
-    @property
-    def doing(self) -> str:
-        """What the robot is about, in words."""
-        ...
-
-    @property
-    def outcome(self) -> Outcome:
-        """Why there is nothing left to do."""
-        ...
-
-    @property
-    def closing_words(self) -> str:
-        """The same in words."""
-        ...
-
-    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
-        """Return the next step, or None at the end."""
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do after one more scan."""
         ...
 
     def interrupt(self, around: Surroundings) -> None:

@@ -13,14 +13,14 @@ from slam.robot import MotionCommand
 
 from ..following.ping_pong import WallErrand
 from ..following.wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
-from ..goal import Goal, LeftPlace, SetAside
+from ..goal import Goal
 from ..outcome import Outcome
-from ..planning.visibility_graph import followed_wall
 from ..planning.wall_routes import route
 from ..strategies import Choice, Place, Situation, Strategy
 from ..survey.frontiers import known_floor
+from .decider import Decision
+from .ledger import Event, Key, Ledger
 from .sweep import Sweep, SweepConfig
-from .visited_places import Spots
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,12 @@ class ExplorerConfig:
     """When an end is given up, and for how long."""
 
     following: FollowingConfig = field(default_factory=FollowingConfig)
+    near_m: float = 0.3
+    """Ends, and places to be visited, this near to each other are one: a body's radius and the errors of a map."""
     moved_m: float = 0.2
     """An end that was set aside is tried again when it has moved this far."""
     attempts: int = 3
-    """So many ends set aside at one place (within 0.3 m) are enough: it is not tried again."""
+    """So many ends set aside at one place (within `near_m`) are enough: it is not tried again."""
     returns: int = 8
     """An end that was gone so often while the robot was about it, and came back, is set aside."""
     grown: float = 0.1
@@ -45,28 +47,39 @@ class ExplorerConfig:
     sweeping: SweepConfig = field(default_factory=SweepConfig)
 
 
+@dataclass
+class _Task:
+    """What the robot is about."""
+
+    choice: Choice
+    errand: Errand
+    goal: Goal
+    walls_to_follow: tuple[int, ...]
+    is_sweep: bool
+    steps: int = 0
+    """So many were spent on it."""
+
+    @property
+    def doing(self) -> str:
+        """What the robot is about and why, in words."""
+        return f"{self.errand.doing} ({self.choice.reason})"
+
+
 class Explorer:
-    """Holds the present goal and the memory of what was given up."""
+    """Holds the present task and the ledger of what was given up."""
 
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
         self._strategy = strategy
         self._start, self._config = start_world, config
         self._step = -1
-        self._errand: Errand | None = None
-        self._choice: Choice | None = None
-        self._sweeping = False
-        self._steps_on_goal = 0
-        self._attempts = Spots(0.3)
-        self._sweep = Sweep(config.sweeping, config.sweep)
-        self._walked: set[tuple[int, int]] = set()
-        self._gone = Spots(0.3)
-        self._floor_known: dict[tuple[int, int], int] = {}
-        self.set_aside: dict[tuple[int, int], SetAside] = {}
+        self.start_over()
+
+    def start_over(self) -> None:
+        """Forget what was given up, and where: the floor is drawn anew."""
+        self._task: _Task | None = None
+        self._ledger = Ledger(self._config.near_m)
+        self._sweep = Sweep(self._config.sweeping, self._ledger, self._config.sweep)
         self._looked_again = 0
-        self._open: frozenset[tuple[int, int]] = frozenset()
-        self.needs_floor = True
-        self.goal: Goal | None = None
-        self.walls_to_follow: tuple[int, ...] = ()
 
     @property
     def strategy(self) -> Strategy:
@@ -75,70 +88,46 @@ class Explorer:
 
     @strategy.setter
     def strategy(self, strategy: Strategy) -> None:
-        self._strategy = strategy
-        self._drop()
+        self._strategy, self._task = strategy, None
 
-    @property
-    def doing(self) -> str:
-        """What the robot is about and why, in words."""
-        if self._errand is None or self._choice is None:
-            return ""
-        return f"{self._errand.doing} ({self._choice.reason})"
-
-    @property
-    def still_open(self) -> tuple[SetAside, ...]:
-        """The ends that were set aside and are open still."""
-        return tuple(aside for key, aside in self.set_aside.items() if key in self._open)
-
-    @property
-    def left_places(self) -> tuple[LeftPlace, ...]:
-        """The borders of unseen floor that were to be visited, and what was in the way."""
-        return self._sweep.left
-
-    @property
-    def outcome(self) -> Outcome:
-        """Why there is nowhere left to go."""
-        return Outcome.ENDS_LEFT if self.still_open else Outcome.ALL_CLOSED
-
-    @property
-    def closing_words(self) -> str:
-        """The same in words."""
-        left = len(self.still_open)
-        return "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
-
-    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
-        """Return the next step, or None when there is nowhere left to go."""
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do next; at the end, which ends are left."""
         self._step += 1
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
-        self._open = frozenset(ends)
         self._revive(ends)
         self._abandon(around, ends)
-        known = len(self.set_aside)
+        command = self._command(around, chains, ends, graph)
+        given_up, task = self._ledger.given_up, self._task
+        if command is not None:
+            if task is None:
+                return Decision(command, "", given_up=given_up)
+            return Decision(command, task.doing, task.goal, task.walls_to_follow, given_up)
+        left = len(given_up.keys & ends.keys())
+        words = "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
+        outcome = Outcome.ENDS_LEFT if left else Outcome.ALL_CLOSED
+        return Decision(None, words, given_up=given_up, outcome=outcome)
+
+    def _command(
+        self, around: Surroundings, chains: tuple[Chain, ...], ends: dict[Key, OpenEnd], graph: nx.DiGraph[int]
+    ) -> MotionCommand | None:
+        """Return the next step, or None when there is nowhere left to go."""
+        known = len(self._ledger.set_aside)
         for _ in range(len(ends) + 20):
-            if self._errand is None and not self._choose(around, chains, ends, graph):
-                return self._look_again(around, len(self.set_aside) > known)
-            assert self._errand is not None
-            self._steps_on_goal += 1
-            command = self._errand.command(around)
-            if command is not None and self._steps_on_goal <= self._config.patience_steps:
+            task = self._task = self._task or self._choose(around, chains, ends, graph)
+            if task is None:
+                break
+            task.steps += 1
+            command = task.errand.command(around)
+            if command is not None and task.steps <= self._config.patience_steps:
                 self._looked_again = 0
                 return command
-            self._give_up(around)
-        return self._look_again(around, len(self.set_aside) > known)
+            self._task = self._give_up(task, around)
+        return self._look_again(around, len(self._ledger.set_aside) > known)
 
     def interrupt(self, around: Surroundings) -> None:
         """Look for another way to the present goal: something stands in this one."""
-        if self._errand is not None:
-            self._errand.interrupt(around)
-
-    def start_over(self) -> None:
-        """Forget what was given up, and where: the floor is drawn anew."""
-        self._drop()
-        self._sweep = Sweep(self._config.sweeping, self._config.sweep)
-        self._attempts, self._gone = Spots(0.3), Spots(0.3)
-        self._walked, self._floor_known = set(), {}
-        self.set_aside.clear()
-        self._looked_again = 0
+        if self._task is not None:
+            self._task.errand.interrupt(around)
 
     def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
         """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do.
@@ -151,124 +140,111 @@ class Explorer:
             return None
         return MotionCommand(0.0, self._config.following.driving.turn_rad)
 
-    def _revive(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
+    def _revive(self, ends: dict[Key, OpenEnd]) -> None:
         """Forget what was set aside where the end is gone or has moved: there it may be tried again."""
-        for key, aside in list(self.set_aside.items()):
+        for key, aside in self._ledger.set_aside.items():
             end = ends.get(key)
             if end is None or self._is_hopeless(end.position_world):
                 continue
             if np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m:
-                del self.set_aside[key]
+                self._ledger.take_up(key)
 
-    def _abandon(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
+    def _abandon(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Drop a goal that is no open end any longer or no longer holds; a sweep, as soon as there is an end."""
-        if self._choice is None:
+        task = self._task
+        if task is None:
             return
-        holds = self._choice.holds(around) and not (self._sweeping and self._candidates(ends))
-        if isinstance(self._choice.target, OpenEnd):
-            key = (self._choice.target.wall, self._choice.target.side)
+        holds = task.choice.holds(around) and not (task.is_sweep and self._candidates(ends))
+        target = task.choice.target
+        if isinstance(target, OpenEnd):
+            key = (target.wall, target.side)
             if key not in ends:
-                self._gone.add(self._choice.target.position_world)
-            holds = holds and key in ends and key not in self.set_aside
-            if holds and isinstance(self._errand, EndErrand):
-                self._errand.follow(ends[key])
+                self._ledger.note(Event.GONE, target.position_world)
+            holds = holds and key in ends and self._ledger.end(key).set_aside is None
+            if holds and isinstance(task.errand, EndErrand):
+                task.errand.follow(ends[key])
         if not holds:
-            self._drop()
+            self._task = None
 
-    def _candidates(self, ends: dict[tuple[int, int], OpenEnd]) -> tuple[OpenEnd, ...]:
-        return tuple(end for key, end in ends.items() if key not in self.set_aside)
+    def _candidates(self, ends: dict[Key, OpenEnd]) -> tuple[OpenEnd, ...]:
+        return tuple(end for key, end in ends.items() if self._ledger.end(key).set_aside is None)
 
     def _choose(
-        self,
-        around: Surroundings,
-        chains: tuple[Chain, ...],
-        ends: dict[tuple[int, int], OpenEnd],
-        graph: nx.DiGraph[int],
-    ) -> bool:
-        """Ask the strategy where to go, and set out; False when there is nowhere left."""
-        following = self._config.following
+        self, around: Surroundings, chains: tuple[Chain, ...], ends: dict[Key, OpenEnd], graph: nx.DiGraph[int]
+    ) -> _Task | None:
+        """Ask the strategy where to go, and set out; None when there is nowhere left."""
         self._tire(ends)
         if not self._candidates(ends):
             self._retry(around, ends)
         situation = Situation(
-            around, chains, self._candidates(ends), graph, self._start, followed_wall(around.walls), self._step,
-            self._sweep.was_in_vain, following.paths, following.looks,
-        )  # fmt: skip
+            around=around,
+            chains=chains,
+            open_ends=self._candidates(ends),
+            graph=graph,
+            start_world=self._start,
+            step=self._step,
+            was_in_vain=self._sweep.was_in_vain,
+            following=self._config.following,
+        )
         choice = self.strategy.choose(situation)
-        self._sweeping = choice is None and not situation.open_ends
+        is_sweep = choice is None and not situation.open_ends
         if choice is None:
-            choice = self._sweep.choose(situation) if self._sweeping else _straight_to_nearest(situation)
-        if choice is None:
-            return False
-        self._set_out(choice, situation)
-        return True
+            choice = self._sweep.choose(situation) if is_sweep else _straight_to_nearest(situation)
+        return None if choice is None else self._set_out(choice, situation, is_sweep)
 
-    def _tire(self, ends: dict[tuple[int, int], OpenEnd]) -> None:
+    def _tire(self, ends: dict[Key, OpenEnd]) -> None:
         """Set aside what opens and closes without end, as a chain can that looks closed from one side only."""
         for end in self._candidates(ends):
-            if (times := self._gone.count(end.position_world)) >= self._config.returns:
-                reason = f"open again after it was gone {times} times"
-                self.set_aside[end.wall, end.side] = SetAside(end.wall, end.side, end.position_world, reason)
+            if (times := self._ledger.count(Event.GONE, end.position_world)) >= self._config.returns:
+                self._ledger.put_aside(end, f"open again after it was gone {times} times")
 
-    def _set_out(self, choice: Choice, situation: Situation) -> None:
-        self._choice, self._steps_on_goal = choice, 0
+    def _set_out(self, choice: Choice, situation: Situation, is_sweep: bool) -> _Task:
         target, following = choice.target, self._config.following
         if isinstance(target, OpenEnd):
-            self.walls_to_follow = route(situation.graph, situation.current_wall, target.wall)
-            self._errand = EndErrand(target, self.walls_to_follow, following)
-            self.goal = Goal("open-end", target.wall, target.side, target.position_world, choice.reason)
-        else:
-            self.walls_to_follow = ()
-            self._errand = PlaceErrand(target.points_world, f"to where {target.what}", following)
-            self.goal = Goal(target.kind, None, None, target.centre_world, choice.reason)
+            walls = route(situation.graph, situation.current_wall, target.wall)
+            goal = Goal("open-end", target.wall, target.side, target.position_world, choice.reason)
+            return _Task(choice, EndErrand(target, walls, following), goal, walls, is_sweep)
+        errand = PlaceErrand(target.points_world, f"to where {target.what}", following)
+        return _Task(choice, errand, Goal(target.kind, None, None, target.centre_world, choice.reason), (), is_sweep)
 
-    def _drop(self) -> None:
-        self._errand = self._choice = self.goal = None
-
-    def _give_up(self, around: Surroundings) -> None:
+    def _give_up(self, task: _Task, around: Surroundings) -> _Task | None:
         """Set the goal aside with the reason; an end that nothing was seen of, only after a walk along its wall."""
-        errand, choice = self._errand, self._choice
-        assert errand is not None
-        assert choice is not None
-        target, following = choice.target, self._config.following
-        in_time = self._steps_on_goal <= self._config.patience_steps
+        errand, target, following = task.errand, task.choice.target, self._config.following
+        in_time = task.steps <= self._config.patience_steps
         late = "" if in_time else f"not reached in {self._config.patience_steps} steps"
         if isinstance(target, Place):
-            self._drop()
             self._sweep.ended(target, late or errand.trouble)
-            return
+            return None
         key = (target.wall, target.side)
         if in_time and isinstance(errand, WallErrand):
-            self._errand = EndErrand(target, (target.wall,), following)
-            return
-        if in_time and not errand.looks_done and key not in self._walked:
-            self._walked.add(key)
-            self._errand = WallErrand(target.wall, target.side, following)
-            return
-        self._drop()
+            task.errand = EndErrand(target, (target.wall,), following)
+            return task
+        if in_time and not errand.looks_done and not self._ledger.end(key).was_walked:
+            self._ledger.note_walk(key)
+            task.errand = WallErrand(target.wall, target.side, following)
+            return task
         end = errand.end if isinstance(errand, EndErrand) else target
         if not in_time:
-            reason = late
+            self._ledger.put_aside(end, late)
         elif errand.looks_done:
-            reason = f"still open after {errand.looks_done} looks"
+            self._ledger.put_aside(end, f"still open after {errand.looks_done} looks")
         else:
-            reason = errand.trouble
-            self._floor_known[key] = known_floor(around.free_space, end.position_world, following.looks.near_m)
-        self.set_aside[key] = SetAside(end.wall, end.side, end.position_world, reason)
-        self._attempts.add(end.position_world)
+            known = known_floor(around.free_space, end.position_world, following.viewpoints.near_m)
+            self._ledger.put_aside(end, errand.trouble, known)
+        self._ledger.note(Event.SET_ASIDE, end.position_world)
+        return None
 
-    def _retry(self, around: Surroundings, ends: dict[tuple[int, int], OpenEnd]) -> None:
+    def _retry(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Forget that no look at an end was possible where the floor has become known since."""
-        reach = self._config.following.looks.near_m
-        for key, before in list(self._floor_known.items()):
+        reach = self._config.following.viewpoints.near_m
+        for key, before in self._ledger.unlooked():
             if key not in ends or self._is_hopeless(ends[key].position_world):
                 continue
             if known_floor(around.free_space, ends[key].position_world, reach) > (1.0 + self._config.grown) * before:
-                del self._floor_known[key]
-                self.set_aside.pop(key, None)
+                self._ledger.take_up_unlooked(key)
 
     def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
-        return self._attempts.count(place) >= self._config.attempts
+        return self._ledger.count(Event.SET_ASIDE, place) >= self._config.attempts
 
 
 def _straight_to_nearest(situation: Situation) -> Choice:

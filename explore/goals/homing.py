@@ -2,100 +2,70 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain
-from slam.robot import MotionCommand
 
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
-from ..goal import Goal, LeftPlace, SetAside
-from ..outcome import Outcome
+from ..goal import Goal
 from ..planning.paths import cells_within
+from .decider import Decision
 from .explorer import Explorer
 
-HOME_M = 0.2
-"""The robot is at its start again within this distance of it."""
-AIM_M = 0.1
-"""What it drives to: the free places this near to the start."""
-ROUNDS = 5
-"""What the way home shows is explored too, and the robot goes home again, up to this often."""
+
+@dataclass(frozen=True)
+class HomingConfig:
+    """When the robot is at its start again."""
+
+    home_m: float = 0.2
+    """The robot is at its start again within this distance of it: one radius of the body."""
+    aim_m: float = 0.1
+    """What it drives to: the free places this near to the start, all well within `home_m`."""
+    rounds: int = 5
+    """What the way home shows is explored too, and the robot goes home again; a bound, so that every mission ends."""
 
 
 class Homing:
     """An explorer that ends where it started; everything else is left to the explorer itself."""
 
-    def __init__(self, explorer: Explorer, start_world: Float[np.ndarray, 2], config: FollowingConfig) -> None:
-        self._explorer, self._start, self._config = explorer, start_world, config
+    def __init__(
+        self, explorer: Explorer, start_world: Float[np.ndarray, 2], config: HomingConfig, following: FollowingConfig
+    ) -> None:
+        self._explorer, self._start, self._config, self._following = explorer, start_world, config, following
         self._way: PlaceErrand | None = None
         self._rounds = 0
-        self._trouble = ""
-        self.needs_floor = True
+        self._explored = Decision(None, "")
 
-    @property
-    def set_aside(self) -> dict[tuple[int, int], SetAside]:
-        """The ends that exploration gave up."""
-        return self._explorer.set_aside
-
-    @property
-    def still_open(self) -> tuple[SetAside, ...]:
-        """Those of them that are open still."""
-        return self._explorer.still_open
-
-    @property
-    def left_places(self) -> tuple[LeftPlace, ...]:
-        """The borders of unseen floor that were to be visited, and what was in the way."""
-        return self._explorer.left_places
-
-    @property
-    def goal(self) -> Goal | None:
-        """The open end or the place that the robot is about."""
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do next: explore, then drive home; at the end, whether the robot is at its start again."""
         if self._way is None:
-            return self._explorer.goal
-        return Goal("start", None, None, self._start, "nothing is left to explore")
-
-    @property
-    def walls_to_follow(self) -> tuple[int, ...]:
-        """The walls along which the goal is approached; none on the way home."""
-        return () if self._way is not None else self._explorer.walls_to_follow
-
-    @property
-    def doing(self) -> str:
-        """What the robot is about, in words."""
-        return self._explorer.doing if self._way is None else self._way.doing
-
-    @property
-    def outcome(self) -> Outcome:
-        """Why exploration is over."""
-        return self._explorer.outcome
-
-    @property
-    def closing_words(self) -> str:
-        """Why exploration is over, and whether the robot is at its start again."""
-        return f"{self._explorer.closing_words}; {self._trouble or 'back at the start'}"
-
-    def command(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> MotionCommand | None:
-        """Return the next step, or None when all is explored and the robot is back, or cannot get back."""
-        if self._way is None:
-            command = self._explorer.command(around, chains, graph)
-            if command is not None:
-                return command
-            if self._is_home(around) or self._rounds >= ROUNDS:
-                self._trouble = "" if self._is_home(around) else f"the start was not reached in {ROUNDS} rounds"
-                return None
+            self._explored = self._explorer.decide(around, chains, graph)
+            if self._explored.command is not None:
+                return self._explored
+            if self._is_home(around) or self._rounds >= self._config.rounds:
+                home = self._is_home(around)
+                return self._end("" if home else f"the start was not reached in {self._config.rounds} rounds")
             self._rounds += 1
-            places = cells_within(around.free_space, self._start, AIM_M)
-            self._way = PlaceErrand(around.free_space.points(places), "back to the start", self._config)
+            places = cells_within(around.free_space, self._start, self._config.aim_m)
+            self._way = PlaceErrand(around.free_space.points(places), "back to the start", self._following)
         command = self._way.command(around)
         if command is not None:
-            return command
+            goal = Goal("start", None, None, self._start, "nothing is left to explore")
+            return replace(
+                self._explored, command=command, words=self._way.doing, goal=goal, walls_to_follow=(), outcome=None
+            )
         trouble, self._way = self._way.trouble, None
         if not self._is_home(around):
-            self._trouble = f"the start cannot be reached: {trouble or 'no way leads there'}"
-            return None
+            return self._end(f"the start cannot be reached: {trouble or 'no way leads there'}")
         # The way home may have shown something new.
-        return self.command(around, chains, graph)
+        return self.decide(around, chains, graph)
+
+    def _end(self, trouble: str) -> Decision:
+        return replace(self._explored, words=f"{self._explored.words}; {trouble or 'back at the start'}")
 
     def interrupt(self, around: Surroundings) -> None:
         """Look for another way from here."""
@@ -105,8 +75,8 @@ class Homing:
 
     def start_over(self) -> None:
         """Forget what was given up, the way home included."""
-        self._way, self._trouble = None, ""
+        self._way = None
         self._explorer.start_over()
 
     def _is_home(self, around: Surroundings) -> bool:
-        return float(np.hypot(*(around.pose_world[:2] - self._start))) <= HOME_M
+        return float(np.hypot(*(around.pose_world[:2] - self._start))) <= self._config.home_m

@@ -6,14 +6,13 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from ..goal import LeftPlace
 from ..planning.driving_field import NEAR_M
 from ..strategies import Choice, Place, Situation
 from ..strategies.nearest import nearest_seen_from, nearest_unexplained, nearest_unseen
 from ..survey.coastal_viewpoints import look_outs_on_coast
 from ..survey.frontiers import pieces
 from ..survey.trusted_walls import TrustedWalls
-from .visited_places import Spots
+from .ledger import Event, Ledger
 
 
 @dataclass(frozen=True)
@@ -22,38 +21,27 @@ class SweepConfig:
 
     visits: int = 2
     """A border of unseen floor, or a thing that is no wall, that is still one after so many visits is left."""
-    near_m: float = 0.3
-    """Borders whose middles lie this near to each other are one."""
     reach: float = 0.8
     """Unseen floor in a hall is looked at from within this share of the scanner's range."""
 
 
 class Sweep:
-    """Chooses the next place, and remembers what came of the visits."""
+    """Chooses the next place, by what the ledger says of earlier visits."""
 
-    def __init__(self, config: SweepConfig, is_on: bool) -> None:
+    def __init__(self, config: SweepConfig, ledger: Ledger, is_on: bool) -> None:
         """Without `is_on`, only look for a first wall."""
-        self._config, self._is_on = config, is_on
-        self._visited = Spots(config.near_m)
-        self._looked_at = Spots(config.near_m)
-        self._left: list[LeftPlace] = []
-
-    @property
-    def left(self) -> tuple[LeftPlace, ...]:
-        """The borders of unseen floor that were visited, or not reached, and why each visit ended."""
-        return tuple(self._left)
+        self._config, self._ledger, self._is_on = config, ledger, is_on
 
     def was_in_vain(self, place_world: Float[ndarray, "2"]) -> bool:
         """Return whether going there was of no use before."""
-        return self._visited.count(place_world) >= self._config.visits
+        return self._ledger.count(Event.VISITED, place_world) >= self._config.visits
 
     def ended(self, place: Place, trouble: str) -> None:
         """Take note that the visit of a place ended, and what was in the way, if anything."""
         if _is_seen_from_afar(place):
-            self._looked_at.add(place.centre_world)
-            return
-        self._visited.add(place.centre_world)
-        self._left.append(LeftPlace(place.centre_world, trouble))
+            self._ledger.note(Event.VIEWED, place.centre_world)
+        else:
+            self._ledger.note(Event.VISITED, place.centre_world, trouble)
 
     def choose(self, situation: Situation) -> Choice | None:
         """Go to the nearest floor that borders on unseen floor; when none is left, to what is no wall of the map.
@@ -74,7 +62,7 @@ class Sweep:
 
     def _beside_walls(self, situation: Situation, *, only_near: bool) -> dict[Place, Place]:
         """Return where to go with walls in sight, each with the unseen floor that is seen from there."""
-        floor, coast_m = situation.around.free_space, situation.paths.coast_m
+        floor, coast_m = situation.around.free_space, situation.following.paths.coast_m
         reach_m = self._config.reach * situation.around.scan.range_max_m
         walls, found = TrustedWalls(situation.map), {}
         for place in situation.unseen_near if only_near else situation.unseen:
@@ -83,7 +71,7 @@ class Sweep:
                 continue
             for tile in pieces(place.points_world):
                 middle = tile.mean(axis=0)
-                if self._looked_at.count(middle):
+                if self._ledger.count(Event.VIEWED, middle):
                     continue
                 spots = look_outs_on_coast(middle, walls, coast_m, reach_m, floor, situation.field, only_near=only_near)
                 if len(spots):

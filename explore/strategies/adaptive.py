@@ -38,7 +38,7 @@ class Adaptive:
         if choice is None or isinstance(choice.target, Place):
             return choice
         row = next(k for k, end in enumerate(situation.open_ends) if end is choice.target)
-        place = ideal_places(choice.target, situation.map, situation.looks)[0]
+        place = ideal_places(choice.target, situation.map, situation.following.viewpoints)[0]
         metres = float(situation.nearest_end_metres[row])
         there = _expected(situation, choice.target.wall, place, metres).position_sigma_m
         worst = self._lost(max(now, there))
@@ -54,7 +54,7 @@ class Adaptive:
         """Return the nearest place from which walls known well enough are in sight."""
         walls = situation.map
         ids = walls.ids[~walls.tentative].tolist()
-        lanes = [lane(wall, walls, situation.looks.standoff_m) for wall in ids]
+        lanes = [lane(wall, walls, situation.following.viewpoints.standoff_m) for wall in ids]
         metres = np.array([situation.field.metres(points).min() for points in lanes])
         for k in np.argsort(metres, kind="stable")[: np.count_nonzero(np.isfinite(metres))]:
             middle = lanes[k][len(lanes[k]) // 2]

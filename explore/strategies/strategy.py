@@ -14,12 +14,12 @@ from jaxtyping import Float
 from slam.map.chains import Chain, OpenEnd
 from slam.map.stochastic_map import StochasticMap
 
-from ..following.wall_following import Surroundings
+from ..following.wall_following import FollowingConfig, Surroundings
 from ..planning.driving_field import DrivingField
-from ..planning.paths import PathConfig
+from ..planning.visibility_graph import followed_wall
 from ..survey.frontiers import LEAST_CELLS, pieces, unseen_borders
 from ..survey.unmapped_obstacles import look_outs, unexplained
-from ..survey.viewpoints import LooksConfig, ideal_places
+from ..survey.viewpoints import ideal_places
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Place:
         return self.points_world.mean(axis=0) if self.about_world is None else self.about_world
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Situation:
     """What a strategy may read: the map and its covariance, the floor seen free, never the truth.
 
@@ -55,14 +55,17 @@ class Situation:
     """The visibility graph: an edge from one wall to another means that this was seen while that was followed."""
     start_world: Float[np.ndarray, 2]
     """Where the robot began, m."""
-    current_wall: int | None
-    """Id of the wall that the robot follows."""
     step: int
     """Number of the step, from 0."""
     was_in_vain: Callable[[Float[np.ndarray, 2]], bool]
     """Whether going to a place was of no use before."""
-    paths: PathConfig
-    looks: LooksConfig
+    following: FollowingConfig
+    """How the robot drives to what is chosen: its paths, its places to look from."""
+
+    @cached_property
+    def current_wall(self) -> int | None:
+        """Id of the wall that the robot follows."""
+        return followed_wall(self.map)
 
     @property
     def map(self) -> StochasticMap:
@@ -72,7 +75,7 @@ class Situation:
     @cached_property
     def field(self) -> DrivingField:
         """How far it is to drive from the robot to anywhere."""
-        return DrivingField(self.around.free_space, self.around.pose_world[:2], self.paths)
+        return DrivingField(self.around.free_space, self.around.pose_world[:2], self.following.paths)
 
     @cached_property
     def end_metres(self) -> Float[np.ndarray, " n"]:
@@ -85,7 +88,7 @@ class Situation:
         return self._end_metres(beyond_nearest=False)
 
     def _end_metres(self, beyond_nearest: bool) -> Float[np.ndarray, " n"]:
-        places = [ideal_places(end, self.map, self.looks)[:2] for end in self.open_ends]
+        places = [ideal_places(end, self.map, self.following.viewpoints)[:2] for end in self.open_ends]
         metres = self.field.metres(np.reshape(places, (-1, 2)), beyond_nearest)
         return metres.reshape(-1, 2).min(axis=1)
 

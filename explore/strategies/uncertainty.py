@@ -39,7 +39,7 @@ class Uncertainty:
 
 def _gain(situation: Situation, end: OpenEnd, metres: float) -> tuple[float, float]:
     """Return the nats expected of the wall that goes on at an end, and of the walls known there."""
-    place = ideal_places(end, situation.map, situation.looks)[0]
+    place = ideal_places(end, situation.map, situation.following.viewpoints)[0]
     seen = walls_seen_from(situation.map, situation.graph, end.wall, place)
     expected = expect(situation.map, seen, place, metres)
     return new_wall_nats(situation, end, expected), expected.map_gain_nats

@@ -14,7 +14,7 @@ from ..planning.paths import Planner, cells_within, sees
 
 
 @dataclass(frozen=True)
-class LooksConfig:
+class ViewpointsConfig:
     """The places from which an end is looked at."""
 
     standoff_m: float = 0.35
@@ -39,7 +39,7 @@ BEYOND_RAD = float(np.deg2rad(45.0))
 """Seen from this far round, the face that follows is in sight, though at a flat angle."""
 
 
-def ideal_places(end: OpenEnd, walls: StochasticMap, config: LooksConfig) -> Float[np.ndarray, "4 2"]:
+def ideal_places(end: OpenEnd, walls: StochasticMap, config: ViewpointsConfig) -> Float[np.ndarray, "4 2"]:
     """Return the four ideal places, one for each of `LOOKS`, world frame, m."""
     alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
     into, outward = normals(alpha), _outward(end, alpha)
@@ -48,7 +48,7 @@ def ideal_places(end: OpenEnd, walls: StochasticMap, config: LooksConfig) -> Flo
 
 
 def places_near(
-    ideal_world: Float[np.ndarray, "2"], end: OpenEnd, free_space: FreeSpace, planner: Planner, config: LooksConfig
+    ideal_world: Float[np.ndarray, "2"], end: OpenEnd, free_space: FreeSpace, planner: Planner, config: ViewpointsConfig
 ) -> Float[np.ndarray, "n 2"]:
     """Return passable places near an ideal one that see the end, the nearest to the ideal first."""
     points = planner.passable_points(cells_within(free_space, ideal_world, config.slack_m))
@@ -57,7 +57,7 @@ def places_near(
 
 
 def places_beyond(
-    end: OpenEnd, walls: StochasticMap, free_space: FreeSpace, planner: Planner, config: LooksConfig
+    end: OpenEnd, walls: StochasticMap, free_space: FreeSpace, planner: Planner, config: ViewpointsConfig
 ) -> Float[np.ndarray, "n 2"]:
     """Return passable places that see the end from past it, for where nobody can stand near the ideal ones."""
     alpha = walls.belief.means[walls.belief.rows([end.wall])[0], 0]
@@ -74,7 +74,7 @@ def _outward(end: OpenEnd, alpha_rad: np.floating) -> Float[np.ndarray, "2"]:
 
 
 def places_that_see(
-    end: OpenEnd, free_space: FreeSpace, planner: Planner, reach_m: float, config: LooksConfig
+    end: OpenEnd, free_space: FreeSpace, planner: Planner, reach_m: float, config: ViewpointsConfig
 ) -> Float[np.ndarray, "n 2"]:
     """Return passable places within reach of the end from which it is in sight, in no particular order."""
     points = planner.passable_points(cells_within(free_space, end.position_world, reach_m))

@@ -12,6 +12,7 @@ from experiments.scoring.records import Log
 from experiments.scoring.summary import Ending, summarise
 from experiments.scoring.truth import truth_of
 from explore.floor.free_space import FreeSpace
+from explore.goals.decider import Decision
 from explore.outcome import Outcome
 from explore.step import Step
 from sim.robot import RobotConfig
@@ -69,9 +70,8 @@ def step_of(walls, chains, **changes):
     kept = {
         "index": 2, "time_s": 2.0, "odometry": Odometry(np.zeros(3), np.zeros((3, 3))), "scan": scan,
         "segments": segments, "matches": NO_MATCHES, "walls_of_segments": np.zeros(0, int), "map": walls,
-        "chains": chains, "free_space": FreeSpace(), "graph": nx.DiGraph(), "goal": None, "walls_to_follow": (),
-        "set_aside": (), "command": None, "path_length_m": 0.25, "seconds": 0.0, "planning_seconds": 0.0,
-        "outcome": Outcome.STEP_LIMIT, "reason": "",
+        "chains": chains, "free_space": FreeSpace(), "graph": nx.DiGraph(), "path_length_m": 0.25, "seconds": 0.0,
+        "planning_seconds": 0.0, "decision": Decision(None, "", outcome=Outcome.STEP_LIMIT),
     }  # fmt: skip
     return Step(**(kept | changes))
 

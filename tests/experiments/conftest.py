@@ -6,6 +6,7 @@ import pytest
 import shapely
 
 from explore.floor.free_space import FreeSpace
+from explore.goals.decider import Decision
 from explore.outcome import Outcome
 from explore.step import Step
 from sim.worlds import World
@@ -93,11 +94,12 @@ def scripted(scenario, commands=None, closed=True, fail_at=None, error=RuntimeEr
         beams = scenario.robot.record.faces_of_beams[-1]
         segments, owners = segments_of(scan, beams, faces, pose)
         last = index == len(commands)
+        command = None if last else commands[index]
         yield Step(
-            index, scan.time_s, odometry, scan, segments, NO_MATCHES, owners, map_of(faces, pose),
-            chains_of(faces, rings, closed), FreeSpace(), nx.DiGraph(), None, (), (),
-            None if last else commands[index], length, 0.001, 0.0005,
-            Outcome.ALL_CLOSED if last else None, "as scripted",
+            index=index, time_s=scan.time_s, odometry=odometry, scan=scan, segments=segments, matches=NO_MATCHES,
+            walls_of_segments=owners, map=map_of(faces, pose), chains=chains_of(faces, rings, closed),
+            free_space=FreeSpace(), graph=nx.DiGraph(), path_length_m=length, seconds=0.001, planning_seconds=0.0005,
+            decision=Decision(command, "as scripted", outcome=Outcome.ALL_CLOSED if last else None),
         )  # fmt: skip
         if not last:
             odometry = scenario.robot.drive(commands[index])

@@ -9,11 +9,8 @@ import pytest
 import shapely
 
 from explore.floor.free_space import FreeSpace
-from explore.following.wall_following import Surroundings
-from explore.planning.paths import PathConfig
-from explore.planning.visibility_graph import followed_wall
+from explore.following.wall_following import FollowingConfig, Surroundings
 from explore.strategies import Situation
-from explore.survey.viewpoints import LooksConfig
 from sim.lidar import LidarConfig, RangeFinder
 from slam.estimation.backend import Belief, Joint
 from slam.geometry.lines import normals, through
@@ -62,9 +59,15 @@ class Scene:
         candidates = tuple(e for c in found for e in c.open_ends if (e.wall, e.side) not in set_aside)
         scan = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.nan), 0.01, 4.0, 0.0)
         return Situation(
-            Surroundings(walls, self.grid, scan), found, candidates, graph or nx.DiGraph(), np.asarray(start),
-            followed_wall(walls), step, lambda place: False, PathConfig(), LooksConfig(),
-        )  # fmt: skip
+            around=Surroundings(walls, self.grid, scan),
+            chains=found,
+            open_ends=candidates,
+            graph=graph or nx.DiGraph(),
+            start_world=np.asarray(start),
+            step=step,
+            was_in_vain=lambda place: False,
+            following=FollowingConfig(),
+        )
 
 
 @cache

@@ -25,7 +25,7 @@ def test_pillars_that_show_three_beams_from_afar_are_walls_in_the_end():
     goals: set[str] = set()
 
     def watch(step: Step) -> None:
-        goals.update({step.goal.kind} if step.goal is not None else ())
+        goals.update({step.decision.goal.kind} if step.decision.goal is not None else ())
 
     summary = run_trial(TrialConfig("random:138", errorless=True, max_steps=5000), watch=watch).summary
     assert "unexplained" in goals

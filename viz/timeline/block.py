@@ -8,8 +8,8 @@ from jaxtyping import Float, Int, UInt32
 
 from slam.geometry.lines import directions, normals
 
-from .moment import Moment
-from .recording import Moments
+from .drawn_step import DrawnStep
+from .recording import Timestamps
 
 UNUSED, FUSED, NEW, REFUSED = 0, 1, 2, 3
 """What became of a segment."""
@@ -18,11 +18,11 @@ UNUSED, FUSED, NEW, REFUSED = 0, 1, 2, 3
 class Block:
     """Consecutive moments; arrays over all their walls (k) or segments (s), row after row."""
 
-    def __init__(self, rows: Sequence[Moment]) -> None:
+    def __init__(self, rows: Sequence[DrawnStep]) -> None:
         self.rows = rows
-        self.moments = Moments(np.array([row.index for row in rows]), np.array([row.time_s for row in rows]))
+        self.moments = Timestamps(np.array([row.index for row in rows]), np.array([row.time_s for row in rows]))
         self.poses: Float[np.ndarray, "n 3"] = np.array([row.pose for row in rows])
-        self._first = np.cumsum([0, *(len(row.ids) for row in rows)])
+        self._first = np.cumsum([0, *(len(row.walls.ids) for row in rows)])
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -34,7 +34,7 @@ class Block:
     @cached_property
     def colours(self) -> UInt32[np.ndarray, " k"]:
         """Colour of each wall."""
-        return np.concatenate([row.colours for row in self.rows])
+        return np.concatenate([row.walls.colours for row in self.rows])
 
     @cached_property
     def lines(self) -> Float[np.ndarray, "k 2"]:
@@ -47,16 +47,16 @@ class Block:
         """First and last point of each wall, world frame, m."""
         alpha, d = self._means.T
         feet = self._anchors + d[:, None] * normals(alpha)
-        extents = np.concatenate([row.extents for row in self.rows])
+        extents = np.concatenate([row.walls.extents for row in self.rows])
         return feet[:, None, :] + extents[..., None] * directions(alpha)[:, None, :]
 
     @property
     def _means(self) -> Float[np.ndarray, "k 2"]:
-        return np.concatenate([row.means for row in self.rows])
+        return np.concatenate([row.walls.means for row in self.rows])
 
     @property
     def _anchors(self) -> Float[np.ndarray, "k 2"]:
-        return np.concatenate([row.anchors for row in self.rows])
+        return np.concatenate([row.walls.anchors for row in self.rows])
 
     @cached_property
     def row_of_segment(self) -> Int[np.ndarray, " s"]:

@@ -8,13 +8,13 @@ from jaxtyping import Float
 from explore.step import Step
 
 from .block import Block
+from .drawn_step import DrawnStep, Keeper
 from .layers.curves import Curves, Decisions
 from .layers.map_layers import Corners, OpenEnds, Plan, Swept, Walls
 from .layers.model_layer import ModelSpace
 from .layers.robot_layers import Robot, Seen
 from .layers.sights import SightsLayer
 from .layers.truth import Nees, NeesOf, Truth
-from .moment import Keeper, Moment
 from .recording import Recording
 
 
@@ -31,7 +31,7 @@ class Lane:
 
     def __init__(self, recording: Recording, backend: str, truth: Truth, nees_of: NeesOf | None) -> None:
         self._keeper = Keeper()
-        self._kept: list[Moment] = []
+        self._kept: list[DrawnStep] = []
         self._r_span = (0.0, 0.0)
         kinds = (Swept, Walls, Corners, OpenEnds, Plan, Robot, Seen, SightsLayer, ModelSpace, Curves, Decisions)
         self._layers: list[Layer] = [kind(recording, backend) for kind in kinds]
@@ -47,7 +47,7 @@ class Lane:
 
     def add(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> None:
         """Keep a step; its belief is asked at once, before the back end moves on."""
-        self._kept.append(self._keeper.moment(step, true_pose_world))
+        self._kept.append(self._keeper.keep(step, true_pose_world))
 
     def flush(self) -> None:
         """Send what was kept since the last time."""

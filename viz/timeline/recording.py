@@ -24,7 +24,7 @@ _STRIP = pa.list_(pa.field("item", _VEC2, nullable=False))
 
 
 @dataclass(frozen=True)
-class Moments:
+class Timestamps:
     """When each row of some columns holds."""
 
     step: Int[np.ndarray, " n"]
@@ -33,9 +33,9 @@ class Moments:
     def __len__(self) -> int:
         return len(self.step)
 
-    def take(self, index: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"] | list[int] | slice) -> "Moments":
+    def take(self, index: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"] | list[int] | slice) -> "Timestamps":
         """Return the chosen moments."""
-        return Moments(self.step[index], self.seconds[index])
+        return Timestamps(self.step[index], self.seconds[index])
 
 
 class Recording:
@@ -70,7 +70,7 @@ class Recording:
     def strips(
         self,
         entity: str,
-        moments: Moments,
+        moments: Timestamps,
         counts: Int[np.ndarray, " n"],
         points: Float[np.ndarray, "k v 2"],
         colors: UInt32[np.ndarray, " k"] | None = None,
@@ -88,7 +88,7 @@ class Recording:
     def points(
         self,
         entity: str,
-        moments: Moments,
+        moments: Timestamps,
         counts: Int[np.ndarray, " n"],
         positions: Float[np.ndarray, "k 2"],
         colors: UInt32[np.ndarray, " k"] | None = None,
@@ -101,7 +101,7 @@ class Recording:
     def circles(
         self,
         entity: str,
-        moments: Moments,
+        moments: Timestamps,
         counts: Int[np.ndarray, " n"],
         centres: Float[np.ndarray, "k 2"],
         radii_m: Float[np.ndarray, " k"],
@@ -112,7 +112,7 @@ class Recording:
         columns = rr.Ellipses2D.columns(centers=_vectors(centres), half_sizes=_vectors(halves), colors=_colors(colors))
         self._send(entity, moments, columns.partition(counts))
 
-    def poses(self, entity: str, moments: Moments, poses: Float[np.ndarray, "n 3"]) -> None:
+    def poses(self, entity: str, moments: Timestamps, poses: Float[np.ndarray, "n 3"]) -> None:
         """Send the frame of an entity: position m and heading rad in the frame above it."""
         half = 0.5 * poses[:, 2]
         zero = np.zeros_like(half)
@@ -120,18 +120,18 @@ class Recording:
         quaternion = np.column_stack([zero, zero, np.sin(half), np.cos(half)])
         self._send(entity, moments, rr.Transform3D.columns(translation=translation, quaternion=quaternion))
 
-    def values(self, entity: str, moments: Moments, values: Float[np.ndarray, " n"]) -> None:
+    def values(self, entity: str, moments: Timestamps, values: Float[np.ndarray, " n"]) -> None:
         """Send a curve."""
         self._send(entity, moments, rr.Scalars.columns(scalars=_plain(values.astype(np.float64), pa.float64())))
 
-    def words(self, entity: str, moments: Moments, texts: Sequence[str], levels: Sequence[str]) -> None:
+    def words(self, entity: str, moments: Timestamps, texts: Sequence[str], levels: Sequence[str]) -> None:
         """Send lines of a log."""
         self._send(entity, moments, rr.TextLog.columns(text=_words(texts), level=_words(levels)))
 
     def grids(
         self,
         entity: str,
-        moments: Moments,
+        moments: Timestamps,
         grids: Sequence[Bool[np.ndarray, "_ _"]],
         corners: Float[np.ndarray, "n 2"],
         cell: float,
@@ -154,7 +154,7 @@ class Recording:
     def graph(
         self,
         entity: str,
-        moments: Moments,
+        moments: Timestamps,
         nodes: Sequence[tuple[Sequence[str], Float[np.ndarray, "_ 2"], UInt32[np.ndarray, " _"]]],
         edges: Sequence[Sequence[tuple[str, str]]],
     ) -> None:
@@ -175,7 +175,7 @@ class Recording:
         ]
         self._send(entity, moments, columns)
 
-    def _send(self, entity: str, moments: Moments, columns: Any) -> None:
+    def _send(self, entity: str, moments: Timestamps, columns: Any) -> None:
         if not len(moments):
             return
         indexes = [_Times(STEP, moments.step, pa.int64()), _nanoseconds(moments.seconds)]

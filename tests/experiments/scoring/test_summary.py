@@ -12,12 +12,13 @@ from scipy.stats import chi2
 from experiments.scoring.coverage import alignment
 from experiments.scoring.summary import Ending, map_anees, nees_of_poses
 from experiments.scoring.truth import truth_of
-from explore.goal import SetAside
+from explore.goal import GivenUp, SetAside
 from explore.outcome import Outcome
 from sim.robot import RobotConfig
 from slam.estimation.backend import Joint
 from slam.geometry.lines import through
 from slam.geometry.poses import compose, inverse, to_world
+from slam.map.chains import OpenEnd
 from tests.experiments.by_hand import COVS, OFF, TRUE, log_of, true_map
 
 
@@ -70,8 +71,11 @@ def test_a_summary_says_how_the_run_ended(run, outcome, status, code):
 def test_what_the_robot_did_is_taken_from_its_record_and_its_last_step(run):
     record = run.scenario.robot.record
     record.collisions, record.drive_time_s, record.path_length_m = 2, 7.5, 0.375
-    aside = SetAside(6, 1, np.array([2.0, 3.0]), "too narrow")
-    found = replace(run, step=replace(run.step, set_aside=(aside,))).summary()
+    gone, aside = (SetAside(wall, 1, np.array([2.0, 3.0]), "too narrow") for wall in (99, 6))
+    closed, opened = run.step.chains
+    chains = (closed, replace(opened, open_ends=(OpenEnd(6, 1, aside.position_world),)))
+    decision = replace(run.step.decision, given_up=GivenUp((gone, aside)))
+    found = replace(run, step=replace(run.step, chains=chains, decision=decision)).summary()
     assert (found["steps"], found["path_length_m"], found["path_length_true_m"]) == (3, 0.25, 0.375)
     assert (found["collisions"], found["drive_time_s"], found["open_ends"]) == (2, 7.5, 4)
     assert (found["chains_closed"], found["chains_open"]) == (1, 1)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.floor.accumulated_returns import NEAR_M, SCANS, RecentReturns, returns, steadied
+from explore.floor.accumulated_returns import NEAR_M, SCANS, AccumulatedReturns, returns, steadied
 from explore.floor.free_space import FreeSpace
 from explore.following.driving import DrivingConfig, Pilot
 from explore.planning.paths import Path, PathConfig, Planner
@@ -85,7 +85,7 @@ def test_a_corner_that_this_scan_shows_too_far_is_kept_clear_of_where_the_scans_
     way = np.array([np.cos(-0.97), np.sin(-0.97)])
     ranges = np.full(180, np.nan)
     ranges[np.argmin(np.abs(BEARINGS + 0.97))] = 0.239
-    recent = RecentReturns()
+    recent = AccumulatedReturns()
     recent.see(scan_of(np.where(np.isfinite(ranges), 0.226, np.nan)))
     pilot = pilot_to(np.array([1.0, 0.2]), pose, grid)
     bold, careful = (
@@ -102,7 +102,7 @@ def test_a_corner_that_this_scan_shows_too_far_is_kept_clear_of_where_the_scans_
 @given(st.integers(0, 2**32))
 def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
     rng = np.random.default_rng(seed)
-    recent = RecentReturns()
+    recent = AccumulatedReturns()
     ranges = np.full(180, np.nan)
     at = rng.choice(180, 5, replace=False)
     ranges[at] = rng.uniform(0.2, 0.8, 5)
@@ -196,7 +196,7 @@ def test_between_two_walls_the_mean_of_five_scans_is_nearer_to_the_truth_than_on
     rng = np.random.default_rng(4)
     widths = []
     for _ in range(40):
-        recent = RecentReturns()
+        recent = AccumulatedReturns()
         for _ in range(SCANS):
             recent.see(between(0.45, rng))
         points = returns(between(0.45, rng))
@@ -222,7 +222,7 @@ def test_what_is_steadied_keeps_its_bearing_and_what_no_scan_before_saw_there_it
 def test_out_of_a_door_the_robot_backs_without_turning_round(seed):
     """A turn on the spot slips aside: 25 of them between two walls 0.45 m apart were a collision."""
     rng = np.random.default_rng(seed)
-    pose, grid, recent = np.zeros(3), open_floor(np.zeros(3)), RecentReturns()
+    pose, grid, recent = np.zeros(3), open_floor(np.zeros(3)), AccumulatedReturns()
     for _ in range(SCANS):
         recent.see(between(0.46, rng))
     command = pilot_to(np.array([-1.0, 0.0]), pose, grid).command(pose, between(0.46, rng), grid, recent.points_robot)
@@ -240,7 +240,7 @@ def test_round_a_thin_walls_end_the_robot_keeps_to_its_path(seed):
     rounding = 0.32 * np.hstack([np.cos(angle), np.sin(angle)])
     out = straight(np.array([0.0, 0.32]), np.array([-1.0, 0.32])).points_world
     start = np.array([*(rng.uniform(0.27, 0.28) * np.array([np.cos(-1.2), np.sin(-1.2)])), rng.uniform(0.2, 0.5)])
-    pose, grid, recent = start.copy(), open_floor(start), RecentReturns()
+    pose, grid, recent = start.copy(), open_floor(start), AccumulatedReturns()
     pilot = Pilot(Path(np.vstack([rounding, out]), 1.0, 0), Planner(grid, start[:2], PathConfig()), CONFIG)
     backward = 0
     for _ in range(60):

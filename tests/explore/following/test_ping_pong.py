@@ -70,7 +70,7 @@ def test_along_a_free_wall_the_robot_keeps_its_distance(scene_of, look, side):
     gaps = poses[ends[0] : ends[1], 1]
     assert gaps.min() > 0.25
     assert gaps.max() < 0.75
-    assert np.median(gaps) == pytest.approx(FollowingConfig().looks.standoff_m, abs=0.1)
+    assert np.median(gaps) == pytest.approx(FollowingConfig().viewpoints.standoff_m, abs=0.1)
 
 
 def test_a_wall_that_is_gone_is_not_followed(scene_of):
@@ -84,19 +84,19 @@ def test_an_end_that_nothing_could_be_seen_of_is_tried_again_when_the_floor_ther
     scene = scene_of(0, 0)
     gaps = np.hypot(*np.moveaxis(scene.faces[None] - scene.places[:, None, None], -1, 0)).min(axis=2)
     row, far = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
-    assert gaps[row, far] > ExplorerConfig().following.looks.far_m + 0.7
+    assert gaps[row, far] > ExplorerConfig().following.viewpoints.far_m + 0.7
     here, far = scene.places[row], int(far)
     look(scene, here[None], 0.6)
     pose = np.append(here, 0.0)
     situation = scene.situation(pose, [(far,)])
     explorer = Explorer(NearestRobot(), here, ExplorerConfig())
-    explorer.command(situation.around, situation.chains, nx.DiGraph())
-    assert set(explorer.set_aside) == {(far, TAIL), (far, HEAD)}
-    assert all(aside.reason for aside in explorer.set_aside.values())
-    assert explorer.goal is not None
-    assert explorer.goal.kind == "unseen"
+    decision = explorer.decide(situation.around, situation.chains, nx.DiGraph())
+    assert decision.given_up.keys == {(far, TAIL), (far, HEAD)}
+    assert all(aside.reason for aside in decision.given_up.ends)
+    assert decision.goal is not None
+    assert decision.goal.kind == "unseen"
     look(scene, scene.places)
-    command = explorer.command(situation.around, situation.chains, nx.DiGraph())
-    assert command is not None
-    assert explorer.goal.kind == "open-end"
-    assert explorer.goal.wall == far
+    decision = explorer.decide(situation.around, situation.chains, nx.DiGraph())
+    assert decision.command is not None
+    assert decision.goal.kind == "open-end"
+    assert decision.goal.wall == far

@@ -19,7 +19,9 @@ def told_at(scene, config):
 
 
 def ask(explorer, situation):
-    return explorer.command(situation.around, situation.chains, nx.DiGraph())
+    """Return the command, and the ends that are set aside."""
+    decision = explorer.decide(situation.around, situation.chains, nx.DiGraph())
+    return decision.command, decision.given_up.ends
 
 
 @pytest.mark.parametrize("patience", [3, 8])
@@ -29,28 +31,28 @@ def test_a_goal_that_takes_too_long_is_set_aside_and_says_so(scene_of, patience)
     pose, explorer = told_at(scene, replace(NO_SWEEP, patience_steps=patience))
     situation = scene.situation(pose, [(0, 1)])
     for _ in range(patience):
-        assert ask(explorer, situation) is not None
-    assert not explorer.set_aside
-    ask(explorer, situation)
-    assert [aside.reason for aside in explorer.set_aside.values()] == [f"not reached in {patience} steps"]
+        command, aside = ask(explorer, situation)
+        assert command is not None
+        assert not aside
+    assert [end.reason for end in ask(explorer, situation)[1]] == [f"not reached in {patience} steps"]
 
 
 def test_an_end_that_was_given_up_is_tried_again_where_it_moved_but_three_times_only(scene_of):
     """It goes to and fro by 0.25 m, and each time it might be a new one."""
     scene = scene_of(3)
     pose, explorer = told_at(scene, replace(NO_SWEEP, patience_steps=0))
-    tried, before = [], {}
+    tried, before = [], ()
     for turn in range(12):
         situation = scene.situation(pose, [(0, 1)])
         (chain,) = situation.chains
         shift = 0.25 * (turn % 2) * np.array([1.0, 0.0])
         ends = tuple(replace(end, position_world=end.position_world + shift) for end in chain.open_ends)
-        explorer.command(situation.around, (replace(chain, open_ends=ends),), nx.DiGraph())
-        tried.append(any(explorer.set_aside[key] is not before.get(key) for key in explorer.set_aside))
-        before = dict(explorer.set_aside)
+        _, aside = ask(explorer, replace(situation, chains=(replace(chain, open_ends=ends),)))
+        tried.append(any(end not in before for end in map(id, aside)))
+        before, kept = set(map(id, aside)), aside
     attempts = NO_SWEEP.attempts
     assert tried == [True] * attempts + [False] * (12 - attempts)
-    assert len(before) == 2
+    assert len(kept) == 2
 
 
 @pytest.mark.parametrize("is_tentative", [True, False])
@@ -59,8 +61,8 @@ def test_before_it_ends_the_robot_looks_again_while_there_are_walls_that_it_saw_
     pose, explorer = told_at(scene, NO_SWEEP)
     situation = scene.situation(pose, [])
     situation.map.tentative[0] = is_tentative
-    looks = [ask(explorer, situation) for _ in range(NO_SWEEP.second_looks)]
-    assert ask(explorer, situation) is None
+    looks = [ask(explorer, situation)[0] for _ in range(NO_SWEEP.second_looks)]
+    assert ask(explorer, situation)[0] is None
     for command in looks:
         assert (command is not None) == is_tentative
         assert command is None or (command.forward_m == 0.0 and command.turn_rad != 0.0)

@@ -1,6 +1,6 @@
 """Back along its own way: out of what it touched, and out of where its own floor locks it in."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import networkx as nx
 import numpy as np
@@ -11,7 +11,8 @@ from explore.floor.floor_memory import FloorMemory
 from explore.floor.free_space import FloorTooLargeError, FreeSpace
 from explore.floor.touches import REACH_M, Touches
 from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.goals.retreat import Retreat
+from explore.goals.decider import Decision
+from explore.goals.retreat import Retreat, RetreatConfig
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
 from explore.outcome import Outcome
@@ -35,19 +36,10 @@ STEP = np.array([0.15, 0.0, 0.0])
 class Idle:
     """A decider that never knows where to go."""
 
-    set_aside: dict = field(default_factory=dict)
-    goal: None = None
-    walls_to_follow: tuple = ()
-    needs_floor: bool = True
-    still_open: tuple = ()
-    left_places: tuple = ()
-    doing: str = "nothing"
-    outcome: Outcome = Outcome.ENDS_LEFT
-    closing_words: str = "nothing is left"
     started_over: int = 0
 
-    def command(self, around, chains, graph):
-        return None
+    def decide(self, around, chains, graph):
+        return Decision(None, "nothing is left", outcome=Outcome.ENDS_LEFT)
 
     def interrupt(self, around):
         pass
@@ -74,7 +66,7 @@ def driven(scene_of):
 
     def make(memory=FloorMemory):
         scene, floor = replace(scene_of(0), faces=FACES), memory(FreeSpace())
-        retreat = Retreat(Idle(), floor, FollowingConfig())
+        retreat = Retreat(Idle(), floor, RetreatConfig(), FollowingConfig())
         pose = np.array([1.0, 1.5, 0.0])
         for step in range(28):
             floor.see(scene.walls(pose), scan_at(pose))
@@ -107,8 +99,8 @@ def test_what_the_robot_drove_through_is_passable_whatever_is_drawn_over_it(driv
     grid, pose = floor.free_space, around.pose_world
     shut(grid, pose, forget=False)
     assert way_back(grid, pose) is not None
-    assert retreat.command(around, (), nx.DiGraph()) is None
-    assert retreat.outcome is Outcome.ENDS_LEFT
+    decision = retreat.decide(around, (), nx.DiGraph())
+    assert (decision.command, decision.outcome) == (None, Outcome.ENDS_LEFT)
     grid._driven[:] = False
     assert way_back(grid, pose) is None
 
@@ -128,23 +120,23 @@ def test_the_way_goes_where_the_walls_go(driven):
 def test_a_robot_locked_in_where_it_drove_begins_its_floor_anew_and_backs_out(driven):
     floor, retreat, around = driven()
     shut(floor.free_space, around.pose_world, forget=True)
-    commands = [retreat.command(around, (), nx.DiGraph()) for _ in range(3)]
-    assert [command.forward_m for command in commands] == pytest.approx([-0.15] * 3)
+    decisions = [retreat.decide(around, (), nx.DiGraph()) for _ in range(3)]
+    assert [decision.command.forward_m for decision in decisions] == pytest.approx([-0.15] * 3)
     assert retreat._inner.started_over == 1
     assert way_back(floor.free_space, around.pose_world) is not None
-    assert "back along its way" in retreat.doing
+    assert all("back along its way" in decision.words for decision in decisions)
 
 
 def test_a_robot_that_cannot_get_back_has_failed_and_says_at_which_step(driven):
     floor, retreat, around = driven(Stubborn)
     shut(floor.free_space, around.pose_world, forget=True)
     steps = 0
-    while retreat.command(around, (), nx.DiGraph()) is not None:
+    while (decision := retreat.decide(around, (), nx.DiGraph())).command is not None:
         steps += 1
     assert 5 <= steps <= 8  # a metre back first
-    assert retreat.outcome is Outcome.FAILED
-    assert retreat.outcome.status == "failed"
-    assert retreat.closing_words == f"locked in at step {steps}"
+    assert decision.outcome is Outcome.FAILED
+    assert decision.outcome.status == "failed"
+    assert decision.words == f"locked in at step {steps}"
 
 
 def test_a_robot_far_off_all_bounds_is_told_in_one_line():

@@ -3,24 +3,27 @@
 import numpy as np
 import pytest
 
+from explore.goals.ledger import Ledger
 from explore.goals.sweep import Sweep, SweepConfig
 from explore.strategies import Place
 
 
 @pytest.mark.parametrize("trouble", ["", "the way was blocked"])
 def test_a_border_is_visited_twice_and_what_came_of_it_is_kept(trouble):
-    sweep, place = Sweep(SweepConfig(), is_on=True), Place(np.array([[1.0, 1.0], [1.1, 1.0]]), "unseen floor is left")
+    ledger, place = Ledger(0.3), Place(np.array([[1.0, 1.0], [1.1, 1.0]]), "unseen floor is left")
+    sweep = Sweep(SweepConfig(), ledger, is_on=True)
     for _ in range(2):
         assert not sweep.was_in_vain(place.centre_world)
         sweep.ended(place, trouble)
     assert sweep.was_in_vain(place.centre_world)
-    assert [left.trouble for left in sweep.left] == [trouble, trouble]
-    np.testing.assert_allclose(sweep.left[0].position_world, [1.05, 1.0])
+    places = ledger.given_up.places
+    assert [left.trouble for left in places] == [trouble, trouble]
+    np.testing.assert_allclose(places[0].position_world, [1.05, 1.0])
 
 
 def test_it_goes_to_unseen_floor_only_when_it_is_on(scene_of, look):
     scene = scene_of(0, 0)
     look(scene, scene.places[:1], 1.5)
     situation = scene.situation(np.append(scene.places[0], 0.0), [])
-    assert Sweep(SweepConfig(), is_on=True).choose(situation).target.kind == "unseen"
-    assert Sweep(SweepConfig(), is_on=False).choose(situation) is None
+    assert Sweep(SweepConfig(), Ledger(0.3), is_on=True).choose(situation).target.kind == "unseen"
+    assert Sweep(SweepConfig(), Ledger(0.3), is_on=False).choose(situation) is None

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from explore.certificate import certify, contours, floor_of, unseen_area
 from explore.floor.free_space import FreeSpace
 from explore.following.wall_following import Surroundings
-from explore.goal import LeftPlace
+from explore.goal import GivenUp, LeftPlace
 from explore.goals.explorer import Explorer, ExplorerConfig
-from explore.goals.homing import Homing
+from explore.goals.homing import Homing, HomingConfig
 from explore.limits import Limits, limited
 from explore.mission import MissionConfig, explore_mission
 from explore.outcome import Outcome
@@ -46,6 +46,12 @@ def steps(**changes):
     return explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make(), MissionConfig(**changes)), robot
 
 
+def leaving(step, places):
+    """Return a step at which these places were left."""
+    given_up = GivenUp(places=places, near_m=ExplorerConfig().near_m)
+    return replace(step, decision=replace(step.decision, given_up=given_up))
+
+
 def closed_map(ring):
     """Return the map and the chain of one closed ring of points."""
     faces = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
@@ -73,8 +79,8 @@ def closed_map(ring):
 def test_a_limit_ends_a_mission_at_the_first_step_that_reaches_it(limits, outcome, word):
     mission, _ = steps()
     *before, last = limited(mission, limits)
-    assert (last.outcome, last.ended, last.command) == (outcome, "stopped", None)
-    assert word in last.reason
+    assert (last.outcome, last.ended, last.decision.command) == (outcome, "stopped", None)
+    assert word in last.decision.words
     assert all(step.outcome is None and limits.reached(step) is None for step in before)
     reached = {"step": last.index + 1 == 7, "path": last.path_length_m >= 0.5, "time": last.time_s >= 3.0}
     assert reached[outcome.split("-")[0]]
@@ -85,7 +91,7 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
     mission, robot = steps(return_to_start=True)
     *_, last = mission
     assert last.outcome is Outcome.ALL_CLOSED
-    assert "back at the start" in last.reason
+    assert "back at the start" in last.decision.words
     assert np.hypot(*(robot.true_pose - START)[:2]) <= 0.2
     certificate = certify(last, last.outcome, PathConfig(), True, WAY)
     assert sorted(contour.is_island for contour in certificate.contours) == [False, True]
@@ -142,9 +148,9 @@ def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
         ([(far, "the way was blocked")], "not visited yet"),
     ):
         left = tuple(LeftPlace(place, trouble) for place, trouble in troubles)
-        certificate = certify(replace(last, left_places=left), last.outcome, PathConfig(), True, WAY)
+        certificate = certify(leaving(last, left), last.outcome, PathConfig(), True, WAY)
         assert words in certificate.unseen[0].why
-    without = certify(replace(last, left_places=left), last.outcome, PathConfig(), False, WAY)
+    without = certify(leaving(last, left), last.outcome, PathConfig(), False, WAY)
     assert {border.why for border in without.unseen} == {"unseen floor was not to be visited"}
 
 
@@ -164,7 +170,7 @@ def test_what_stands_and_is_no_wall_of_the_map_is_told():
         ([""], False, "was not to be looked at"),
     ):
         left = tuple(LeftPlace(lonely, trouble) for trouble in troubles)
-        (thing,) = certify(replace(last, left_places=left), last.outcome, PathConfig(), sweep, WAY).unexplained
+        (thing,) = certify(leaving(last, left), last.outcome, PathConfig(), sweep, WAY).unexplained
         assert len(thing.cells_world) == 3
         assert words in thing.why
 
@@ -174,10 +180,11 @@ def test_a_start_that_cannot_be_reached_again_is_told():
     mission, _ = steps()
     *_, last = mission
     explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
-    homing = Homing(explorer, np.array([2.0, 2.0]), ExplorerConfig().following)
+    homing = Homing(explorer, np.array([2.0, 2.0]), HomingConfig(), ExplorerConfig().following)
     around = Surroundings(last.map, last.free_space, last.scan)
-    assert homing.command(around, last.chains, nx.DiGraph()) is None
-    assert "the start cannot be reached" in homing.closing_words
+    decision = homing.decide(around, last.chains, nx.DiGraph())
+    assert decision.command is None
+    assert "the start cannot be reached" in decision.words
 
 
 def test_the_last_two_ends_to_be_given_up_may_still_join():
@@ -189,15 +196,15 @@ def test_the_last_two_ends_to_be_given_up_may_still_join():
     around = Surroundings(walls, FreeSpace(), scan)
     around.free_space.integrate(walls.belief.pose_world, scan)
     explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
-    before = connect(walls, explorer.set_aside)
+    before = connect(walls)
     assert [chain.is_closed for chain in before] == [False]
-    command = explorer.command(around, before, nx.DiGraph())
-    assert set(explorer.set_aside) == {(end.wall, end.side) for end in before[0].open_ends}
-    assert command is not None
-    after = connect(walls, explorer.set_aside)
+    decision = explorer.decide(around, before, nx.DiGraph())
+    assert decision.given_up.keys == {(end.wall, end.side) for end in before[0].open_ends}
+    assert decision.command is not None
+    after = connect(walls, decision.given_up.keys)
     assert [chain.is_closed for chain in after] == [True]
-    assert explorer.command(around, after, nx.DiGraph()) is None
-    assert explorer.outcome is Outcome.ALL_CLOSED
+    decision = explorer.decide(around, after, nx.DiGraph())
+    assert (decision.command, decision.outcome) == (None, Outcome.ALL_CLOSED)
 
 
 def test_an_end_that_opens_and_closes_without_end_is_set_aside_with_its_reason(scene_of):
@@ -208,11 +215,13 @@ def test_an_end_that_opens_and_closes_without_end_is_set_aside_with_its_reason(s
     explorer = Explorer(STRATEGIES["nearest-robot"].make(), pose[:2], replace(ExplorerConfig(), sweep=False))
     for turn in range(100):
         situation = sides[turn % 2]
-        if explorer.command(situation.around, situation.chains, nx.DiGraph()) is None and turn % 2 == 0:
+        decision = explorer.decide(situation.around, situation.chains, nx.DiGraph())
+        if decision.command is None and turn % 2 == 0:
             break
     assert 2 * ExplorerConfig().returns <= turn < 50
-    assert len(explorer.still_open) == 2
-    assert all("open again" in aside.reason for aside in explorer.still_open)
+    assert decision.outcome is Outcome.ENDS_LEFT
+    assert len(decision.given_up.ends) == 2
+    assert all("open again" in aside.reason for aside in decision.given_up.ends)
 
 
 @settings(max_examples=60, deadline=None)
@@ -264,10 +273,13 @@ def test_a_mission_does_not_end_before_every_end_has_its_reason():
     around = Surroundings(walls, FreeSpace(), scan)
     around.free_space.integrate(walls.belief.pose_world, scan)
     explorer = Explorer(STRATEGIES["nearest-robot"].make(), START[:2], ExplorerConfig())
+    given_up = GivenUp()
     for _ in range(20):
-        chains = connect(walls, explorer.set_aside)
-        if explorer.command(around, chains, nx.DiGraph()) is None:
+        chains = connect(walls, given_up.keys)
+        decision = explorer.decide(around, chains, nx.DiGraph())
+        given_up = decision.given_up
+        if decision.command is None:
             break
     ends = {(end.wall, end.side) for chain in chains for end in chain.open_ends}
     assert len(ends) == 48
-    assert set(explorer.set_aside) == ends
+    assert given_up.keys == ends

@@ -44,5 +44,5 @@ def test_a_mission_does_not_end_because_its_map_has_jumped():
     scenario = build(TrialConfig("rooms", seed=1))
     jumping = Jumping(scenario.backend, [100, 200, 300], [0.6, 0.4])
     *_, last = limited(explore_mission(scenario.robot, Mapper(jumping), scenario.strategy), Limits(steps=310))
-    assert last.ended == "stopped", last.reason
+    assert last.ended == "stopped", last.decision.words
     assert len(last.set_aside) < 4

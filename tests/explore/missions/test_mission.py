@@ -51,8 +51,8 @@ def test_a_room_with_a_block_is_explored_until_every_chain_is_closed():
     steps, robot = around_a_block()
     last = steps[-1]
     assert last.ended == "complete"
-    assert last.reason
-    assert last.command is None
+    assert last.decision.words
+    assert last.decision.command is None
     assert last.set_aside == ()
     assert robot.record.collisions == 0
     assert [chain.is_closed for chain in last.chains] == [True, True]
@@ -74,21 +74,21 @@ def test_without_errors_the_map_is_the_drawing_and_the_pose_the_truth():
 def test_steps_count_on_and_only_the_last_one_ends():
     steps, _ = around_a_block()
     assert [step.index for step in steps] == list(range(len(steps)))
-    assert all(step.ended is None and step.command is not None for step in steps[:-1])
+    assert all(step.ended is None and step.decision.command is not None for step in steps[:-1])
     assert np.all(np.diff([step.time_s for step in steps]) > 0)
     assert np.all(np.diff([step.path_length_m for step in steps]) >= 0)
-    assert all(step.reason for step in steps)
-    assert all(abs(step.command.forward_m) <= 0.15 + 1e-12 for step in steps[:-1])
+    assert all(step.decision.words for step in steps)
+    assert all(abs(step.decision.command.forward_m) <= 0.15 + 1e-12 for step in steps[:-1])
 
 
 def test_every_goal_was_an_open_end_of_the_map_at_its_step():
     steps, _ = around_a_block()
-    goals = [step for step in steps if step.goal is not None and step.goal.kind == "open-end"]
+    goals = [step for step in steps if step.decision.goal is not None and step.decision.goal.kind == "open-end"]
     assert goals
     for step in goals:
         ends = {(end.wall, end.side) for chain in step.chains for end in chain.open_ends}
-        assert (step.goal.wall, step.goal.side) in ends
-        assert step.walls_to_follow[-1] == step.goal.wall
+        assert (step.decision.goal.wall, step.decision.goal.side) in ends
+        assert step.decision.walls_to_follow[-1] == step.decision.goal.wall
 
 
 @pytest.mark.parametrize("backend", list(BACKENDS))
@@ -100,7 +100,7 @@ def test_the_same_seed_gives_the_same_steps_bit_for_bit(backend):
         assert a.map.belief.pose_cov.tobytes() == b.map.belief.pose_cov.tobytes()
         assert a.map.belief.means.tobytes() == b.map.belief.means.tobytes()
         assert a.map.extents.tobytes() == b.map.extents.tobytes()
-        assert a.command == b.command
+        assert a.decision.command == b.decision.command
         assert [chain.walls for chain in a.chains] == [chain.walls for chain in b.chains]
 
 
@@ -114,7 +114,7 @@ def test_a_mission_that_takes_longer_than_its_limit_is_stopped(limit):
     steps, _ = mission(BLOCK, max_steps=limit)
     assert len(steps) == limit
     assert steps[-1].ended == "stopped"
-    assert str(limit) in steps[-1].reason
+    assert str(limit) in steps[-1].decision.words
 
 
 @pytest.mark.parametrize("seed", range(1, 6))

@@ -6,6 +6,7 @@ import shapely
 
 from explore.floor.free_space import FreeSpace
 from explore.following.wall_following import Surroundings
+from explore.goal import GivenUp
 from explore.goals.explorer import Explorer, ExplorerConfig
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
@@ -40,9 +41,9 @@ def test_every_strategy_closes_all_chains_without_touching_a_wall(name):
     assert robot.record.collisions == 0
     assert sum(chain.is_closed for chain in steps[-1].chains) == 2
     for step in steps[:-1]:
-        if step.goal is not None:
-            assert step.goal.reason
-            assert step.goal.reason in step.reason
+        if step.decision.goal is not None:
+            assert step.decision.goal.reason
+            assert step.decision.goal.reason in step.decision.words
 
 
 @pytest.mark.parametrize("name", list(STRATEGIES))
@@ -69,18 +70,20 @@ def test_a_strategy_that_is_exchanged_on_the_way_is_asked_from_then_on():
     first, second = (Asked(STRATEGIES[name].make()) for name in ("nearest-robot", "frontier"))
     mapper, graph, floor = Mapper(backend), VisibilityGraph(), FreeSpace()
     explorer = Explorer(first, backend.belief.pose_world[:2].copy(), ExplorerConfig())
+    given_up, goal = GivenUp(), None
     for index in range(1500):
         scan = robot.sense()
-        update = mapper.step(scan, explorer.set_aside.keys())
+        update = mapper.step(scan, given_up.keys)
         floor.integrate(update.map.belief.pose_world, scan)
         graph.observe(update.map, update.chains, None, [])
         if index == 30:
-            asked, goal = first.times, explorer.goal
+            asked, before = first.times, goal
             explorer.strategy = second
-        command = explorer.command(Surroundings(update.map, floor, scan), update.chains, graph.graph)
+        decision = explorer.decide(Surroundings(update.map, floor, scan), update.chains, graph.graph)
+        command, goal, given_up = decision.command, decision.goal, decision.given_up
         if index == 30:
             assert second.times == 1
-            assert explorer.goal is not goal
+            assert goal is not before
         if command is None:
             break
         mapper.predict(robot.drive(command))

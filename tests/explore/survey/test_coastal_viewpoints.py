@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from explore.goals.ledger import Ledger
 from explore.goals.sweep import Sweep, SweepConfig
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
@@ -34,7 +35,7 @@ def test_a_border_is_cut_into_squares_and_nothing_is_lost():
 def test_the_places_have_walls_near_see_the_floor_and_can_be_driven_to(hall):
     start, pose = hall.places[0], np.append(hall.places[0], 0.0)
     walls = TrustedWalls(hall.walls(pose))
-    field = DrivingField(hall.grid, start, hall.situation(pose, []).paths)
+    field = DrivingField(hall.grid, start, hall.situation(pose, []).following.paths)
     count = 0
     for border in unseen_borders(hall.grid, field):
         assert not walls.near(border, COAST_M).any(), "from beside the walls all floor near them was seen"
@@ -52,8 +53,8 @@ def test_the_places_have_walls_near_see_the_floor_and_can_be_driven_to(hall):
 
 def test_looks_from_the_coast_come_first_and_each_once_then_visits_and_then_an_end(hall):
     """Nothing of what is unseen becomes seen here: the worst case."""
-    sweep, pose = Sweep(SweepConfig(), is_on=True), np.append(hall.places[0], 0.0)
-    on_the_coast = []
+    ledger, pose = Ledger(0.3), np.append(hall.places[0], 0.0)
+    sweep, on_the_coast = Sweep(SweepConfig(), ledger, is_on=True), []
     while True:
         choice = sweep.choose(replace(hall.situation(pose, []), was_in_vain=sweep.was_in_vain))
         if choice is None:
@@ -65,7 +66,7 @@ def test_looks_from_the_coast_come_first_and_each_once_then_visits_and_then_an_e
     first_visit = on_the_coast.index(False)
     assert first_visit > 5
     assert not any(on_the_coast[first_visit:])
-    assert len(sweep.left) == len(on_the_coast) - first_visit, "a look from afar is no visit"
+    assert len(ledger.given_up.places) == len(on_the_coast) - first_visit, "a look from afar is no visit"
 
 
 @pytest.mark.long

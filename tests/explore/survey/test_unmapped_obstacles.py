@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from explore.goals.ledger import Ledger
 from explore.goals.sweep import Sweep, SweepConfig
 from explore.planning.driving_field import DrivingField
 from explore.survey.unmapped_obstacles import APART_M, LOOK_M, is_explained, look_outs, unexplained
@@ -42,7 +43,7 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
     some, _ = without_some(whole, np.random.default_rng(1))
     pose = np.append(whole.places[0], 0.0)
     situation = some.situation(pose, [])
-    field = DrivingField(some.grid, pose[:2], situation.paths)
+    field = DrivingField(some.grid, pose[:2], situation.following.paths)
     (thing, *_) = unexplained(some.grid, some.walls(pose))
     places = look_outs(thing, field)
     assert len(places)
@@ -53,7 +54,7 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
 
 def test_the_last_layer_goes_there_twice_at_most_and_only_when_it_is_on(scene_of):
     some, _ = without_some(scene_of(1), np.random.default_rng(1))
-    sweep = Sweep(SweepConfig(), is_on=True)
+    sweep = Sweep(SweepConfig(), Ledger(0.3), is_on=True)
     pose = np.append(some.places[0], 0.0)
     visits = 0
     while True:
@@ -64,4 +65,4 @@ def test_the_last_layer_goes_there_twice_at_most_and_only_when_it_is_on(scene_of
         visits += choice.target.kind == "unexplained"
         sweep.ended(choice.target, "")
     assert 0 < visits <= 2 * len(unexplained(some.grid, some.walls(pose)))
-    assert Sweep(SweepConfig(), is_on=False).choose(some.situation(pose, [])) is None
+    assert Sweep(SweepConfig(), Ledger(0.3), is_on=False).choose(some.situation(pose, [])) is None

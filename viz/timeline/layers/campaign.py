@@ -10,7 +10,7 @@ from jaxtyping import UInt32
 
 from ... import palette
 from ..colours import packed
-from ..recording import Moments, Recording
+from ..recording import Recording, Timestamps
 from .curves import curve_style
 from .map_layers import style
 
@@ -113,7 +113,7 @@ class Summary:
         values = np.array([row[name] for row in known], dtype=np.float64)
         if name in POWERS:
             values = np.log10(np.maximum(values, 1e-3))
-        self._out.values(entity, Moments(step, step.astype(np.float64)), values)
+        self._out.values(entity, Timestamps(step, step.astype(np.float64)), values)
 
 
 def _tints(backends: Sequence[str]) -> UInt32[np.ndarray, " k"]:

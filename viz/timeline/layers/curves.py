@@ -8,7 +8,7 @@ from slam.evaluation.consistency import chi2_band
 from ... import palette
 from ..block import Block
 from ..colours import packed
-from ..moment import Moment
+from ..drawn_step import DrawnStep
 from ..recording import Recording
 from .map_layers import goal_words
 
@@ -40,10 +40,10 @@ class Curves:
         curves = {
             TRACE: [float(np.trace(row.pose_cov)) for row in rows],
             PATH: [row.path_length_m for row in rows],
-            ENDS: [sum(len(chain.open_ends) for chain in row.chains) for row in rows],
-            LINES: [len(row.ids) for row in rows],
-            CHAINS: [len(row.chains) for row in rows],
-            CLOSED: [sum(chain.is_closed for chain in row.chains) for row in rows],
+            ENDS: [sum(len(chain.open_ends) for chain in row.walls.chains) for row in rows],
+            LINES: [len(row.walls.ids) for row in rows],
+            CHAINS: [len(row.walls.chains) for row in rows],
+            CLOSED: [sum(chain.is_closed for chain in row.walls.chains) for row in rows],
             STEP_MS: [1e3 * row.seconds for row in rows],
         }
         for plot, values in curves.items():
@@ -67,24 +67,25 @@ class Decisions:
             numbered = [f"{block.rows[k].index:4d}  {word}" for k, word in zip(at, words, strict=True)]
             self._out.words(self._entity, block.moments.take(list(at)), numbered, levels)
 
-    def _news(self, row: Moment) -> list[tuple[str, str]]:
+    def _news(self, row: DrawnStep) -> list[tuple[str, str]]:
         news = [
             (f"set aside: open end of wall {end.wall}: {end.reason}", "WARN")
             for end in row.set_aside
             if (end.wall, end.side) not in self._aside
         ]
         self._aside = {(end.wall, end.side) for end in row.set_aside}
-        goal = None if row.goal is None else (row.goal.kind, row.goal.wall, row.goal.side, row.goal.reason)
-        if row.goal is not None and goal != self._goal:
-            news.append((f"{goal_words(row.goal)}: {row.goal.reason}", "INFO"))
-            if row.follow:
-                news.append((f"follow walls {' '.join(map(str, row.follow))}", "INFO"))
-        self._goal = goal
+        decision, goal = row.decision, row.decision.goal
+        said = None if goal is None else (goal.kind, goal.wall, goal.side, goal.reason)
+        if goal is not None and said != self._goal:
+            news.append((f"{goal_words(goal)}: {goal.reason}", "INFO"))
+            if decision.walls_to_follow:
+                news.append((f"follow walls {' '.join(map(str, decision.walls_to_follow))}", "INFO"))
+        self._goal = said
         if row.ended is not None:
-            news.append((f"{row.ended}: {row.reason}", "INFO"))
-        elif row.reason and row.reason != self._doing:
+            news.append((f"{row.ended}: {decision.words}", "INFO"))
+        elif decision.words and decision.words != self._doing:
             # The reason of the goal stands in a line of its own.
-            why = "" if row.goal is None else f" ({row.goal.reason})"
-            news.append((row.reason.removesuffix(why), "DEBUG"))
-        self._doing = row.reason
+            why = "" if goal is None else f" ({goal.reason})"
+            news.append((decision.words.removesuffix(why), "DEBUG"))
+        self._doing = decision.words
         return news

@@ -49,7 +49,7 @@ class Walls:
 
     def send(self, block: Block) -> None:
         """Send each wall where it moved, changed its colour or went."""
-        self._each.send(block, [row.ids for row in block.rows], block.ends, block.colours)
+        self._each.send(block, [row.walls.ids for row in block.rows], block.ends, block.colours)
 
 
 class _Sparse:
@@ -81,9 +81,8 @@ class Corners:
 
     def send(self, block: Block) -> None:
         """Send the corners where they changed."""
-        tables = [
-            np.concatenate([np.zeros((0, 2)), *(chain.corners_world for chain in row.chains)]) for row in block.rows
-        ]
+        chains = [row.walls.chains for row in block.rows]
+        tables = [np.concatenate([np.zeros((0, 2)), *(chain.corners_world for chain in some)]) for some in chains]
         chosen = self._sparse.changed(tables)
         tables = [tables[at] for at in chosen]
         if tables:
@@ -103,7 +102,7 @@ class OpenEnds:
         tables = []
         for row in block.rows:
             aside = {(end.wall, end.side) for end in row.set_aside}
-            ends = [end for chain in row.chains for end in chain.open_ends]
+            ends = [end for chain in row.walls.chains for end in chain.open_ends]
             tables.append(
                 np.array([(*end.position_world, (end.wall, end.side) in aside) for end in ends]).reshape(-1, 3)
             )
@@ -134,7 +133,7 @@ class Plan:
 
     def send(self, block: Block) -> None:
         """Send goal and walls where they changed."""
-        goals = [None if row.ended else row.goal for row in block.rows]
+        goals = [None if row.ended else row.decision.goal for row in block.rows]
         tables = [
             np.zeros((0, 3)) if goal is None else np.array([[*goal.position_world, _number(goal.wall)]])
             for goal in goals
@@ -153,7 +152,8 @@ class Plan:
             counts = np.array([len(walls[at][0]) for at in chosen])
             ends = np.concatenate([walls[at][1] for at in chosen])
             # The goal's label names its own wall.
-            ends_at = [row.goal.wall if row.goal is not None else None for row in (block.rows[at] for at in chosen)]
+            about = [block.rows[at].decision.goal for at in chosen]
+            ends_at = [None if goal is None else goal.wall for goal in about]
             labels = [
                 "" if wall == end else f"wall {wall}"
                 for at, end in zip(chosen, ends_at, strict=True)
@@ -174,8 +174,8 @@ def _number(wall: int | None) -> int:
 def _to_follow(block: Block, at: int) -> tuple[Int[np.ndarray, " k"], Float[np.ndarray, "k 2 2"]]:
     """Return the walls to follow, moved a little to their free side so that the walls themselves stay to be seen."""
     row, here = block.rows[at], block.walls_at(at)
-    chosen = np.isin(row.ids, () if row.ended else row.follow)
-    return row.ids[chosen], block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]
+    chosen = np.isin(row.walls.ids, () if row.ended else row.decision.walls_to_follow)
+    return row.walls.ids[chosen], block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]
 
 
 class Swept:

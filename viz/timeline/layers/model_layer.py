@@ -10,7 +10,7 @@ from ... import palette
 from ...shapes import VAGUE_RAD, VERTICES, ellipses, hessian_cov
 from ..block import FUSED, REFUSED, Block
 from ..colours import packed, pale
-from ..moment import NO_ELLIPSES
+from ..drawn_step import NO_ELLIPSES
 from ..recording import Recording
 from .map_layers import style
 from .per_wall import PerWall
@@ -36,14 +36,14 @@ class ModelSpace:
         self._send_segments(block)
 
     def _send_walls(self, block: Block) -> None:
-        asked = [row.ellipses or NO_ELLIPSES for row in block.rows]
+        asked = [row.walls.ellipses or NO_ELLIPSES for row in block.rows]
         means, anchors, covs = (
             np.concatenate([getattr(e, name) for e in asked]) for name in ("means", "anchors", "covs")
         )
         r = means[:, 1] + np.sum(normals(means[:, 0]) * anchors, axis=-1)
         contours = ellipses(np.column_stack([means[:, 0], r]), hessian_cov(means[:, 0], anchors, covs), TIMES)
         colours = np.concatenate(
-            [row.colours[np.searchsorted(row.ids, e.ids)] for row, e in zip(block.rows, asked, strict=True)]
+            [row.walls.colours[np.searchsorted(row.walls.ids, e.ids)] for row, e in zip(block.rows, asked, strict=True)]
         )
         vague = np.sqrt(covs[:, 0, 0]) > VAGUE_RAD
         colours[vague] = pale(colours[vague])
@@ -77,9 +77,9 @@ def _matched_lines(block: Block) -> Float[np.ndarray, "s 2"]:
     first = 0
     for at, row in enumerate(block.rows):
         pairs = row.matches.pairs
-        if len(pairs) and len(row.ids):
-            rows = np.minimum(np.searchsorted(row.ids, pairs[:, 1]), len(row.ids) - 1)
-            known = row.ids[rows] == pairs[:, 1]
+        if len(pairs) and len(row.walls.ids):
+            rows = np.minimum(np.searchsorted(row.walls.ids, pairs[:, 1]), len(row.walls.ids) - 1)
+            known = row.walls.ids[rows] == pairs[:, 1]
             lines[first + pairs[known, 0]] = block.lines[block.walls_at(at)][rows[known]]
         first += len(row.segments)
     return lines

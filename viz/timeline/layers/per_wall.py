@@ -8,8 +8,8 @@ from jaxtyping import Float, Int, UInt32
 
 from ...shapes import Changes, rounded
 from ..block import Block
-from ..moment import Moment
-from ..recording import Moments, Recording
+from ..drawn_step import DrawnStep
+from ..recording import Recording, Timestamps
 
 
 class PerWall:
@@ -44,15 +44,15 @@ class PerWall:
         for wall, row in gone.items():
             self._send_one(wall, block.moments.take([row]), np.zeros(1, dtype=np.int64), strips[:0], colours[:0])
 
-    def _send_one(self, wall: int, moments: Moments, counts: Any, strips: Any, colours: Any) -> None:
+    def _send_one(self, wall: int, moments: Timestamps, counts: Any, strips: Any, colours: Any) -> None:
         self._out.strips(f"{self._folder}/{wall}", moments, counts, strips, colours)
 
-    def _gone(self, rows: Sequence[Moment]) -> dict[int, int]:
+    def _gone(self, rows: Sequence[DrawnStep]) -> dict[int, int]:
         """Return the walls that went, and at which row."""
         gone: dict[int, int] = {}
         for at, row in enumerate(rows):
-            if not np.array_equal(row.ids, self._present):
-                gone |= {int(wall): at for wall in np.setdiff1d(self._present, row.ids)}
-                self._present = row.ids
+            if not np.array_equal(row.walls.ids, self._present):
+                gone |= {int(wall): at for wall in np.setdiff1d(self._present, row.walls.ids)}
+                self._present = row.walls.ids
         self._changes.forget(np.array(list(gone), dtype=np.int64))
         return gone

@@ -10,7 +10,7 @@ from ... import palette
 from ...shapes import ellipses, spread
 from ..block import REFUSED, Block
 from ..colours import packed
-from ..recording import Moments, Recording
+from ..recording import Recording, Timestamps
 from .map_layers import style, words_only
 
 ROBOT_M = 0.2
@@ -54,7 +54,7 @@ def body(colour: str, radius: float = 1.6, order: float = 46.0) -> rr.LineStrips
 def send_path(
     out: Recording,
     entity: str,
-    moments: Moments,
+    moments: Timestamps,
     poses: Float[np.ndarray, "s 3"],
     before: Float[np.ndarray, "1 3"] | None,
 ) -> Float[np.ndarray, "1 3"]:

@@ -33,14 +33,14 @@ class SightsLayer:
             sights = row.sights
             assert sights is not None
             middles = block.ends[block.walls_at(at)].mean(axis=1)
-            known = np.isin(sights.edges, row.ids).all(axis=1)
-            pairs = np.searchsorted(row.ids, sights.edges[known])
+            known = np.isin(sights.edges, row.walls.ids).all(axis=1)
+            pairs = np.searchsorted(row.walls.ids, sights.edges[known])
             is_neighbour = sights.is_neighbour[known]
             lines["neighbours"].append(middles[pairs[is_neighbour]])
             lines["sights"].append(middles[pairs[~is_neighbour]])
-            present = np.isin(row.ids, sights.nodes)
-            names = [str(wall) for wall in row.ids[present]]
-            nodes.append((names, UNITS_PER_M * middles[present] * np.array([1.0, -1.0]), row.colours[present]))
+            present = np.isin(row.walls.ids, sights.nodes)
+            names = [str(wall) for wall in row.walls.ids[present]]
+            nodes.append((names, UNITS_PER_M * middles[present] * np.array([1.0, -1.0]), row.walls.colours[present]))
             edges.append([(str(a), str(b)) for a, b in sights.edges[known].tolist()])
         for name, pieces in lines.items():
             counts = np.array([len(piece) for piece in pieces])

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.goal import Goal, SetAside
+from explore.goal import SetAside
+from explore.goals.decider import Decision
 from explore.planning.visibility_graph import NEIGHBOUR
 from explore.step import Step
 from slam.association.matching import Matches
@@ -60,7 +61,21 @@ class Swept:
 
 
 @dataclass(frozen=True)
-class Moment:
+class DrawnWalls:
+    """The map at a step."""
+
+    ids: Int[np.ndarray, " n"]
+    means: Float[np.ndarray, "n 2"]
+    anchors: Float[np.ndarray, "n 2"]
+    extents: Float[np.ndarray, "n 2"]
+    colours: UInt32[np.ndarray, " n"]
+    """Of each wall, by its chain."""
+    ellipses: Ellipses | None
+    chains: tuple[Chain, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnStep:
     """One step, as much of it as is drawn."""
 
     index: int
@@ -72,18 +87,9 @@ class Moment:
     segments: Segments
     matches: Matches
     owners: Int[np.ndarray, " s"]
-    ids: Int[np.ndarray, " n"]
-    means: Float[np.ndarray, "n 2"]
-    anchors: Float[np.ndarray, "n 2"]
-    extents: Float[np.ndarray, "n 2"]
-    colours: UInt32[np.ndarray, " n"]
-    """Of each wall, by its chain."""
-    ellipses: Ellipses | None
-    chains: tuple[Chain, ...]
+    walls: DrawnWalls
+    decision: Decision
     set_aside: tuple[SetAside, ...]
-    goal: Goal | None
-    follow: tuple[int, ...]
-    reason: str
     ended: str | None
     sights: Sights | None
     swept: Swept | None
@@ -92,7 +98,7 @@ class Moment:
 
 
 class Keeper:
-    """Makes moments out of the steps of one back end."""
+    """Keeps of the steps of one back end what is drawn."""
 
     def __init__(self) -> None:
         self._own = FreeSpace(FreeSpaceConfig(cell_m=OWN_CELL_M))
@@ -100,18 +106,32 @@ class Keeper:
         self._colours = WallColours()
         self._coloured = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint32))
 
-    def moment(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> Moment:
+    def keep(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> DrawnStep:
         """Return what is drawn of a step; it asks the step's belief, so before the back end moves on."""
         belief, walls = step.map.belief, step.map
         last = step.ended is not None
         ids, colours = walls.ids.copy(), self._colours.of_walls(walls, step.chains)
-        return Moment(
-            step.index, step.time_s, belief.pose_world.copy(), belief.pose_cov.copy(), true_pose_world, step.scan,
-            step.segments, step.matches, step.walls_of_segments, ids, belief.means.copy(), belief.anchors.copy(),
-            walls.extents.copy(), colours, _ellipses(step, last, self._recoloured(ids, colours)), step.chains,
-            step.set_aside, step.goal, step.walls_to_follow, step.reason, step.ended,
-            self._sights(step.graph, step.index, last), self._swept(step, last), step.path_length_m, step.seconds,
-        )  # fmt: skip
+        ellipses = _ellipses(step, last, self._recoloured(ids, colours))
+        means, anchors = belief.means.copy(), belief.anchors.copy()
+        return DrawnStep(
+            index=step.index,
+            time_s=step.time_s,
+            pose=belief.pose_world.copy(),
+            pose_cov=belief.pose_cov.copy(),
+            true_pose=true_pose_world,
+            scan=step.scan,
+            segments=step.segments,
+            matches=step.matches,
+            owners=step.walls_of_segments,
+            walls=DrawnWalls(ids, means, anchors, walls.extents.copy(), colours, ellipses, step.chains),
+            decision=step.decision,
+            set_aside=step.set_aside,
+            ended=step.ended,
+            sights=self._sights(step.graph, step.index, last),
+            swept=self._swept(step, last),
+            path_length_m=step.path_length_m,
+            seconds=step.seconds,
+        )
 
     def _recoloured(self, ids: Int[np.ndarray, " n"], colours: UInt32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return which walls are new or have another colour than at the step before."""
