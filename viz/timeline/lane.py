@@ -9,12 +9,12 @@ from explore.step import Step
 
 from .block import Block
 from .drawn_step import DrawnStep, Keeper
-from .layers.curves import Curves, Decisions
-from .layers.map_layers import Corners, OpenEnds, Plan, Swept, Walls
-from .layers.model_layer import ModelSpace
-from .layers.robot_layers import Robot, Seen
+from .layers.curves import CurvesLayer, DecisionsLayer
+from .layers.map_layers import CornersLayer, GoalLayer, OpenEndsLayer, SweptLayer, WallsLayer
+from .layers.model_layer import ModelLayer
+from .layers.robot_layers import RobotLayer, ScanLayer
 from .layers.sights import SightsLayer
-from .layers.truth import Nees, NeesOf, Truth
+from .layers.truth import NeesLayer, NeesOf, TruthLayer
 from .recording import Recording
 
 
@@ -29,13 +29,25 @@ class Layer(Protocol):
 class Lane:
     """Gathers the steps of one back end."""
 
-    def __init__(self, recording: Recording, backend: str, truth: Truth, nees_of: NeesOf | None) -> None:
+    def __init__(self, recording: Recording, backend: str, truth: TruthLayer, nees_of: NeesOf | None) -> None:
         self._keeper = Keeper()
         self._kept: list[DrawnStep] = []
         self._r_span = (0.0, 0.0)
-        kinds = (Swept, Walls, Corners, OpenEnds, Plan, Robot, Seen, SightsLayer, ModelSpace, Curves, Decisions)
+        kinds = (
+            SweptLayer,
+            WallsLayer,
+            CornersLayer,
+            OpenEndsLayer,
+            GoalLayer,
+            RobotLayer,
+            ScanLayer,
+            SightsLayer,
+            ModelLayer,
+            CurvesLayer,
+            DecisionsLayer,
+        )
         self._layers: list[Layer] = [kind(recording, backend) for kind in kinds]
-        self._layers += [truth] if nees_of is None else [truth, Nees(recording, backend, nees_of)]
+        self._layers += [truth] if nees_of is None else [truth, NeesLayer(recording, backend, nees_of)]
 
     def __len__(self) -> int:
         return len(self._kept)

@@ -16,7 +16,7 @@ from .colours import packed
 from .lane import Lane
 from .layers.campaign import Row, Summary
 from .layers.model_plane import Plane
-from .layers.truth import NeesOf, Truth
+from .layers.truth import NeesOf, TruthLayer
 from .recording import Recording
 from .words import legend
 
@@ -43,7 +43,7 @@ class Timeline:
         self._out = Recording(title, viewer_url)
         self._is_live = viewer_url is not None
         self._rings = tuple(true_rings_world)
-        truth = Truth(self._out, self._rings)
+        truth = TruthLayer(self._out, self._rings)
         self._lanes = {backend: Lane(self._out, backend, truth, nees_of) for backend in backends}
         self._summary: Summary | None = None
         self._fixtures(title)

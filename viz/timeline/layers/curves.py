@@ -25,7 +25,7 @@ def curve_style(backend: str, of: str = "", width: float = 1.6) -> rr.SeriesLine
     return rr.SeriesLines(colors=packed(palette.of_backend(backend)), names=backend + of, widths=width)
 
 
-class Curves:
+class CurvesLayer:
     """One value at each step."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -50,7 +50,7 @@ class Curves:
             self._out.values(f"/plots/{plot}/{self._backend}", block.moments, np.array(values, dtype=np.float64))
 
 
-class Decisions:
+class DecisionsLayer:
     """What was chosen and why, what was given up and why, what the robot is about."""
 
     def __init__(self, out: Recording, backend: str) -> None:

@@ -41,7 +41,7 @@ def words_only() -> rr.Points2D:
     )
 
 
-class Walls:
+class WallsLayer:
     """The walls, each an entity of its own, coloured by chain."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -69,7 +69,7 @@ class _Sparse:
         return rows
 
 
-class Corners:
+class CornersLayer:
     """Where two walls of a chain meet."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -90,7 +90,7 @@ class Corners:
             self._out.points(self._entity, block.moments.take(chosen), counts, np.concatenate(tables))
 
 
-class OpenEnds:
+class OpenEndsLayer:
     """Circles at open ends; grey where exploration gave one up."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -118,7 +118,7 @@ class OpenEnds:
         )  # fmt: skip
 
 
-class Plan:
+class GoalLayer:
     """The goal and the walls to follow towards it."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -178,7 +178,7 @@ def _to_follow(block: Block, at: int) -> tuple[Int[np.ndarray, " k"], Float[np.n
     return row.walls.ids[chosen], block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]
 
 
-class Swept:
+class SweptLayer:
     """The floor that the scans have seen free, as a picture under everything."""
 
     def __init__(self, out: Recording, backend: str) -> None:

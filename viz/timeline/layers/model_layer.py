@@ -21,7 +21,7 @@ QUANTUM = 0.02
 """An enlarged ellipse is drawn again when it has changed by about this, rad or m."""
 
 
-class ModelSpace:
+class ModelLayer:
     """Walls as ellipses of three standard deviations, the segments just seen, and which belong together."""
 
     def __init__(self, out: Recording, backend: str) -> None:

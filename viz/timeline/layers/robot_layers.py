@@ -20,7 +20,7 @@ LABEL_M = 0.5
 """How far apart labels of one step stand at least, m."""
 
 
-class Robot:
+class RobotLayer:
     """The estimated path, the body, and the ellipse of three standard deviations."""
 
     def __init__(self, out: Recording, backend: str) -> None:
@@ -64,7 +64,7 @@ def send_path(
     return poses[-1:]
 
 
-class Seen:
+class ScanLayer:
     """What one scan showed, in the robot's frame: points, segments, and what matching made of each.
 
     Why a segment was refused is written beside it, in the world's frame, so that the words do not lie on each other.

@@ -23,7 +23,7 @@ NeesOf = Callable[
 BAND_WORDS = {"high": "above: overconfident", "low": "below: too cautious"}
 
 
-class Truth:
+class TruthLayer:
     """The true walls, and the true path as far as it is known; the same for all back ends, so sent once."""
 
     def __init__(self, out: Recording, rings_world: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
@@ -52,7 +52,7 @@ class Truth:
         self._next = int(moments.step[-1]) + 1
 
 
-class Nees:
+class NeesLayer:
     """The pose's NEES, plain and as a power of ten, with its band over the same steps."""
 
     def __init__(self, out: Recording, backend: str, nees_of: NeesOf) -> None:
