@@ -28,7 +28,7 @@ LEAST_AREA_M2 = 1e-4
 
 
 @dataclass(frozen=True)
-class Contour:
+class ClosedContour:
     """A closed chain as an area."""
 
     chain: int
@@ -74,7 +74,7 @@ class Certificate:
     """The end of a mission, with its reasons."""
 
     outcome: Outcome
-    contours: tuple[Contour, ...]
+    contours: tuple[ClosedContour, ...]
     open_ends: tuple[LeftOpen, ...]
     unseen: tuple[LeftUnseen, ...] | None
     """None where nobody kept the free space (a recorded robot)."""
@@ -112,7 +112,7 @@ def certify(
     )
 
 
-def contours(walls: StochasticMap, chains: tuple[Chain, ...]) -> tuple[Contour, ...]:
+def contours(walls: StochasticMap, chains: tuple[Chain, ...]) -> tuple[ClosedContour, ...]:
     """Return the closed chains as areas; free side on the left, so a room is run through counter-clockwise."""
     found = []
     for index, chain in enumerate(chains):
@@ -123,7 +123,7 @@ def contours(walls: StochasticMap, chains: tuple[Chain, ...]) -> tuple[Contour, 
         for ring in (chain.corners_world, ends):
             polygon = _valid(ring)
             if polygon is not None:
-                found.append(Contour(index, chain.walls, _turns_right(ring), polygon))
+                found.append(ClosedContour(index, chain.walls, _turns_right(ring), polygon))
                 break
     return tuple(found)
 
@@ -143,7 +143,7 @@ def _valid(ring: Float[np.ndarray, "n 2"]) -> shapely.Polygon | None:
     return orient(shapely.Polygon(max(areas, key=lambda part: part.area).exterior), 1.0) if areas else None
 
 
-def floor_of(found: tuple[Contour, ...]) -> shapely.Polygon | shapely.MultiPolygon:
+def floor_of(found: tuple[ClosedContour, ...]) -> shapely.Polygon | shapely.MultiPolygon:
     """Return the inside of the closed rooms without their islands."""
     rooms = shapely.union_all([contour.polygon for contour in found if not contour.is_island])
     islands = shapely.union_all([contour.polygon for contour in found if contour.is_island])

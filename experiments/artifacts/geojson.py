@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
+from explore.certificate import Certificate, ClosedContour, LeftOpen, LeftUnexplained, LeftUnseen
 from explore.step import Step
 from slam.estimation.backend import Joint
 from slam.map.chains import Chain
@@ -92,7 +92,7 @@ def _corner_feature(index: int, corner: Corner, joint: Joint | None) -> dict[str
     )
 
 
-def _contour_feature(contour: Contour) -> dict[str, Any]:
+def _contour_feature(contour: ClosedContour) -> dict[str, Any]:
     """Return a closed chain; the corners of the polygon are those of the chain."""
     ring = shapely.get_coordinates(contour.polygon)
     return _feature("Polygon", [ring], kind="chain", closed=True, **contour_record(contour))

@@ -4,7 +4,7 @@ from typing import Any
 
 import shapely
 
-from explore.certificate import Certificate, Contour, LeftOpen, LeftUnexplained, LeftUnseen
+from explore.certificate import Certificate, ClosedContour, LeftOpen, LeftUnexplained, LeftUnseen
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def contour_record(contour: Contour) -> dict[str, Any]:
+def contour_record(contour: ClosedContour) -> dict[str, Any]:
     """Return what is said of one contour besides its polygon."""
     return {
         "chain": contour.chain,
