@@ -14,7 +14,7 @@ from ..scoring.summary import TIMED
 from ..usage import UsageError
 from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
-from .scores.score import Record
+from .scores.score import TrialScores
 from .store import MERGED, Store, opened_anew, outdated, read_campaigns, read_config
 
 SHARED = ("driver", "p0", "max_steps", "settings")
@@ -89,13 +89,13 @@ def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
     found.setdefault(trial, store)
 
 
-def same(first: Record, second: Record) -> bool:
+def same(first: TrialScores, second: TrialScores) -> bool:
     """Return whether two results are the same, times apart."""
     keys = [record.summary.keys() - TIMED for record in (first, second)]
     return keys[0] == keys[1] and first.arrays.keys() == second.arrays.keys() and agree(first, second)
 
 
-def agree(first: Record, second: Record) -> bool:
+def agree(first: TrialScores, second: TrialScores) -> bool:
     """Return whether two results are the same in all that both hold, times apart: a later version may keep more."""
     keys, names = first.summary.keys() & second.summary.keys() - TIMED, first.arrays.keys() & second.arrays.keys()
     return all(first.summary[key] == second.summary[key] for key in keys) and all(

@@ -18,7 +18,7 @@ from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held,
 from ..artifacts.settings import plain
 from ..usage import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
-from .scores.score import Record
+from .scores.score import TrialScores
 from .work import Done, unpack
 
 REMEDY = "name the folder of a campaign, what `compare --out` made"
@@ -62,7 +62,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             write(path, done.record)
 
-    def record(self, trial: Trial) -> Record:
+    def record(self, trial: Trial) -> TrialScores:
         """Return what a trial left; raises UsageError where its file is none."""
         path = self.path(trial)
         with told(path, "delete it and run `compare` again"):

@@ -29,7 +29,7 @@ from ..trial import TrialResult, default_mission, run_scenario
 from .plan import Trial, world_key
 from .scores.innovation import InnovationEar
 from .scores.observer import Observer
-from .scores.score import Record, record_of
+from .scores.score import TrialScores, record_of
 
 SUMMARY = "summary_json"
 """The name under which a trial's file holds its summary."""
@@ -112,7 +112,7 @@ def perform(job: Job) -> Done:
     return Done(job.trial, pack(record), log, process_time() - began)
 
 
-def failed(job: Job, reason: str, trace: str = "") -> Record:
+def failed(job: Job, reason: str, trace: str = "") -> TrialScores:
     """Return the record of a trial that left nothing but a reason."""
     config = job.config
     summary = {
@@ -123,15 +123,15 @@ def failed(job: Job, reason: str, trace: str = "") -> Record:
         "reason": reason,
         "traceback": trace,
     }
-    return Record(_named(job.trial, summary), {})
+    return TrialScores(_named(job.trial, summary), {})
 
 
-def pack(record: Record) -> bytes:
+def pack(record: TrialScores) -> bytes:
     """Return a record as the bytes of an archive without pickles."""
     return npz_bytes({SUMMARY: json_bytes(stamp(RECORD) | record.summary).decode(), **record.arrays})
 
 
-def unpack(content: bytes, trial: Trial) -> Record:
+def unpack(content: bytes, trial: Trial) -> TrialScores:
     """Return the record in the bytes of a trial's file; raises ArchiveError or UnfitError for anything else."""
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
     summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), RECORD, SHAPE)
@@ -141,7 +141,7 @@ def unpack(content: bytes, trial: Trial) -> Record:
             raise UnfitError(f"the result of another {name}")
     if summary["seed"] != trial.seed:
         raise UnfitError("the result of another seed")
-    return Record({key: value for key, value in summary.items() if key != "format"}, arrays)
+    return TrialScores({key: value for key, value in summary.items() if key != "format"}, arrays)
 
 
 def _named(trial: Trial, summary: dict[str, Any]) -> dict[str, Any]:
@@ -196,7 +196,7 @@ def remembered(log: bytes) -> Extractor:
     return extracted
 
 
-def _drive(job: Job) -> tuple[Record, bytes | None]:
+def _drive(job: Job) -> tuple[TrialScores, bytes | None]:
     scenario = build(job.config, _world(job.config.world))
     walls = truth_of(scenario.world, job.config.robot).walls
     observer = Observer(walls, lambda index: scenario.robot.record.faces_of_beams[index])
@@ -206,7 +206,7 @@ def _drive(job: Job) -> tuple[Record, bytes | None]:
     return record, npz_bytes(log_arrays(result, log)) if job.keep_log and log is not None else None
 
 
-def _replay(job: Job) -> Record:
+def _replay(job: Job) -> TrialScores:
     assert job.log is not None, "expected a recording to replay"
     run = _recording(job.log, job.config)
     world = _world(job.config.world)
@@ -221,9 +221,9 @@ def _replay(job: Job) -> Record:
     return _finish(job, result, observer, ear)
 
 
-def _finish(job: Job, result: TrialResult, observer: Observer, ear: InnovationEar | None) -> Record:
+def _finish(job: Job, result: TrialResult, observer: Observer, ear: InnovationEar | None) -> TrialScores:
     if result.ending.exit_status == 130:
         raise KeyboardInterrupt
     record = record_of(result, observer, ear)
     summary = record.summary | ({"traceback": result.ending.traceback} if result.ending.traceback else {})
-    return Record(_named(job.trial, summary), record.arrays)
+    return TrialScores(_named(job.trial, summary), record.arrays)

@@ -20,7 +20,7 @@ from ...artifacts.formats import stamp
 from ...artifacts.reading import UnfitError, told
 from ...scoring.measurements import Z_95
 from ..plan import Campaign, Trial, gate_of
-from ..scores.score import END, Record
+from ..scores.score import END, TrialScores
 from .comparison import compare
 from .findings import findings
 from .hypothesis import hypothesis
@@ -42,7 +42,7 @@ PLAIN = (str, int, float, bool)
 Row = dict[str, Any]
 
 
-def trial_row(record: Record, gate: float = GATE) -> Row:
+def trial_row(record: TrialScores, gate: float = GATE) -> Row:
     """Return the plain values of a trial's summary, and how its intervals of distances fared."""
     summary = record.summary
     row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
@@ -76,14 +76,14 @@ def doubles(summary: Row, gate: float = GATE) -> Row:
     }
 
 
-def distance_errors(record: Record) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+def distance_errors(record: TrialScores) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
     """Return mapped less true distance, and its standard deviation, for all pairs of known corners of a trial, m."""
     names = ("distance_m", "distance_true_m", "distance_sigma_m")
     mapped, true, sigma = (record.arrays.get(name, np.zeros(0)) for name in names)
     return mapped - true, sigma
 
 
-def mark_rows(record: Record) -> list[Row]:
+def mark_rows(record: TrialScores) -> list[Row]:
     """Return the scores of a trial at equal metres driven.
 
     `state` tells what the robot was doing then: `driving`, `finished` (complete before; its last state counts) or
@@ -104,7 +104,7 @@ def mark_rows(record: Record) -> list[Row]:
     return rows
 
 
-def step_rows(records: Sequence[Record]) -> list[Row]:
+def step_rows(records: Sequence[TrialScores]) -> list[Row]:
     """Return the statistics of one cell over its trials, step by step, as long as a trial goes on."""
     longest = max((len(r.arrays.get("pose_nees", ())) for r in records), default=0)
     names = ("path_length_m", "pose_nees", "pose_trace", "pose_error_m", "heading_error_rad", "heading_sigma_rad")
@@ -174,7 +174,7 @@ def read_rows(path: Path, columns: Sequence[str] = ()) -> list[Row]:
     return rows
 
 
-def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
+def band_scores(records: Sequence[TrialScores], steps: Sequence[Row]) -> Row:
     """Return what the steps of one cell say: how many lie outside their band, and the band of all steps together."""
     outside = [row["pose_anees"] < row["band_low"] or row["pose_anees"] > row["band_high"]
                for row in steps if row["pose_anees"] is not None]  # fmt: skip
@@ -189,7 +189,7 @@ def band_scores(records: Sequence[Record], steps: Sequence[Row]) -> Row:
 
 
 def write_tables(
-    folder: Path, campaign: Campaign, trials: Sequence[Trial], record_of: Callable[[Trial], Record]
+    folder: Path, campaign: Campaign, trials: Sequence[Trial], record_of: Callable[[Trial], TrialScores]
 ) -> Row:
     """Write every table of some trials, which stand cell by cell, and return what they say: `comparison.json`.
 

@@ -32,7 +32,7 @@ RPE_STEPS = 10
 
 
 @dataclass(frozen=True)
-class Record:
+class TrialScores:
     """What is kept of one trial."""
 
     summary: dict[str, Any]
@@ -41,12 +41,12 @@ class Record:
     """Empty where the trial ended before its first step."""
 
 
-def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None) -> Record:
+def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None) -> TrialScores:
     """Score a trial that was observed."""
     summary = dict(result.summary)
     log, last = result.log, result.last
     if log is None or last is None:
-        return Record(summary, {})
+        return TrialScores(summary, {})
     to_true = alignment(result.scenario.start_estimate, log.true_world[0])
     samples = sample(result.votes.truth)
     # The truth's frame is that of the true start: what nothing can observe is undone, as in all scores of places.
@@ -86,7 +86,7 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
         arrays |= {"nis": np.array(ear.values), "nis_dof": np.array(ear.dofs)}
         summary["nis_mean"] = float(np.sum(ear.values) / np.sum(ear.dofs))
         summary["nis_whiteness"] = ear.whiteness()
-    return Record(summary, arrays)
+    return TrialScores(summary, arrays)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from experiments.campaign.comparison.tables import (
     write_tables,
 )
 from experiments.campaign.plan import Campaign, Trial
-from experiments.campaign.scores.score import Record
+from experiments.campaign.scores.score import TrialScores
 from experiments.scoring.measurements import Z_95
 
 NAMES = {
@@ -35,7 +35,9 @@ SERIES = ("path_length_m", "pose_nees", "pose_trace", "pose_error_m", "heading_e
 
 
 def record(summary=None, **arrays):
-    return Record(NAMES | (summary or {}), {name: np.array(values, dtype=float) for name, values in arrays.items()})
+    return TrialScores(
+        NAMES | (summary or {}), {name: np.array(values, dtype=float) for name, values in arrays.items()}
+    )
 
 
 def run(nees, **changes):
@@ -190,7 +192,7 @@ def test_the_tables_of_a_campaign_hold_each_trial_once_cell_by_cell(tmp_path):
     def of(trial):
         made = run(nees[trial.backend, trial.seed])
         names = {"backend": trial.backend, "seed": trial.seed, "reason": "done", "pose_anees": 1.0}
-        return Record(made.summary | names, made.arrays)
+        return TrialScores(made.summary | names, made.arrays)
 
     write_tables(tmp_path, Campaign(("w",), backends, ("nearest-robot",), 2, arms=("closed",)), trials, of)
     names = ("trials", "marks", "steps")
