@@ -15,7 +15,7 @@ from .layers.model_layer import ModelLayer
 from .layers.robot_layers import RobotLayer, ScanLayer
 from .layers.sights import SightsLayer
 from .layers.truth import NeesLayer, NeesOf, TruthLayer
-from .recording import Recording
+from .recording import RerunRecording
 
 
 class Layer(Protocol):
@@ -29,7 +29,7 @@ class Layer(Protocol):
 class Lane:
     """Gathers the steps of one back end."""
 
-    def __init__(self, recording: Recording, backend: str, truth: TruthLayer, nees_of: NeesOf | None) -> None:
+    def __init__(self, recording: RerunRecording, backend: str, truth: TruthLayer, nees_of: NeesOf | None) -> None:
         self._keeper = Keeper()
         self._kept: list[DrawnStep] = []
         self._r_span = (0.0, 0.0)

@@ -38,7 +38,7 @@ class Timestamps:
         return Timestamps(self.step[index], self.seconds[index])
 
 
-class Recording:
+class RerunRecording:
     """One Rerun recording in memory, or in a viewer as it goes on."""
 
     def __init__(self, name: str, viewer_url: str | None = None) -> None:

@@ -17,7 +17,7 @@ from .lane import Lane
 from .layers.campaign import Row, Summary
 from .layers.model_plane import Plane
 from .layers.truth import NeesOf, TruthLayer
-from .recording import Recording
+from .recording import RerunRecording
 from .words import legend
 
 BLOCK = 500
@@ -40,7 +40,7 @@ class Timeline:
 
         `nees_of` judges estimated poses with their covariances against the true poses.
         """
-        self._out = Recording(title, viewer_url)
+        self._out = RerunRecording(title, viewer_url)
         self._is_live = viewer_url is not None
         self._rings = tuple(true_rings_world)
         truth = TruthLayer(self._out, self._rings)

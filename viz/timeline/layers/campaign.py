@@ -10,7 +10,7 @@ from jaxtyping import UInt32
 
 from ... import palette
 from ..colours import packed
-from ..recording import Recording, Timestamps
+from ..recording import RerunRecording, Timestamps
 from .curves import curve_style
 from .map_layers import style
 
@@ -35,7 +35,7 @@ class Summary:
     end in each cell (step, pose_anees, band_low, band_high, pose_error_rms_m over its trials).
     """
 
-    def __init__(self, out: Recording, trials: Sequence[Row], steps: Sequence[Row]) -> None:
+    def __init__(self, out: RerunRecording, trials: Sequence[Row], steps: Sequence[Row]) -> None:
         self._out = out
         self._cells = list(dict.fromkeys(_cell(row) for row in trials))
         self._counts: list[int] = []

@@ -9,7 +9,7 @@ from ... import palette
 from ..block import Block
 from ..colours import packed
 from ..drawn_step import DrawnStep
-from ..recording import Recording
+from ..recording import RerunRecording
 from .map_layers import goal_words
 
 NEES, LOG_NEES, TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS = (
@@ -28,7 +28,7 @@ def curve_style(backend: str, of: str = "", width: float = 1.6) -> rr.SeriesLine
 class CurvesLayer:
     """One value at each step."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._backend = out, backend
         for plot in (TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS):
             more = (", closed", 4.0) if plot == CLOSED else ()
@@ -53,7 +53,7 @@ class CurvesLayer:
 class DecisionsLayer:
     """What was chosen and why, what was given up and why, what the robot is about."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity = out, f"/decisions/{backend}"
         self._goal: object = None
         self._doing = ""

@@ -13,7 +13,7 @@ from slam.geometry.lines import normals
 from ... import palette
 from ..block import Block
 from ..colours import packed
-from ..recording import Recording
+from ..recording import RerunRecording
 from .per_wall import PerWall
 
 END_M = 0.16
@@ -44,7 +44,7 @@ def words_only() -> rr.Points2D:
 class WallsLayer:
     """The walls, each an entity of its own, coloured by chain."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._each = PerWall(out, f"/world/{backend}/walls", 2, QUANTUM_M)
 
     def send(self, block: Block) -> None:
@@ -72,7 +72,7 @@ class _Sparse:
 class CornersLayer:
     """Where two walls of a chain meet."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity, self._sparse = out, f"/world/{backend}/corners", _Sparse()
         out.fixed(
             self._entity,
@@ -93,7 +93,7 @@ class CornersLayer:
 class OpenEndsLayer:
     """Circles at open ends; grey where exploration gave one up."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity, self._sparse = out, f"/world/{backend}/open_ends", _Sparse()
         out.fixed(self._entity, rr.Ellipses2D.from_fields(line_radii=rr.Radius.ui_points(1.6), draw_order=28))
 
@@ -121,7 +121,7 @@ class OpenEndsLayer:
 class GoalLayer:
     """The goal and the walls to follow towards it."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._world = out, f"/world/{backend}"
         self._goal, self._follow = _Sparse(), _Sparse()
         colour = packed(palette.GOAL)
@@ -181,7 +181,7 @@ def _to_follow(block: Block, at: int) -> tuple[Int[np.ndarray, " k"], Float[np.n
 class SweptLayer:
     """The floor that the scans have seen free, as a picture under everything."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity = out, f"/world/{backend}/swept"
         out.fixed(self._entity, rr.SegmentationImage.from_fields(draw_order=-10.0))
 

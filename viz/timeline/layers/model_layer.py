@@ -11,7 +11,7 @@ from ...shapes import VAGUE_RAD, VERTICES, ellipses, hessian_cov
 from ..block import FUSED, REFUSED, Block
 from ..colours import packed, pale
 from ..drawn_step import NO_ELLIPSES
-from ..recording import Recording
+from ..recording import RerunRecording
 from .map_layers import style
 from .per_wall import PerWall
 
@@ -24,7 +24,7 @@ QUANTUM = 0.02
 class ModelLayer:
     """Walls as ellipses of three standard deviations, the segments just seen, and which belong together."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity = out, f"/model/{backend}"
         self._walls = PerWall(out, f"{self._entity}/walls", VERTICES, QUANTUM)
         out.fixed(f"{self._entity}/seen", style(0.8, 30.0))

@@ -9,13 +9,13 @@ from jaxtyping import Float, Int, UInt32
 from ...shapes import Changes, rounded
 from ..block import Block
 from ..drawn_step import DrawnStep
-from ..recording import Recording, Timestamps
+from ..recording import RerunRecording, Timestamps
 
 
 class PerWall:
     """One strip of v points for each wall, under a folder; the view says how broad they are."""
 
-    def __init__(self, out: Recording, folder: str, vertices: int, quantum: float) -> None:
+    def __init__(self, out: RerunRecording, folder: str, vertices: int, quantum: float) -> None:
         self._out, self._folder, self._quantum = out, folder, quantum
         self._changes = Changes(2 * vertices + 1)
         self._present = np.zeros(0, dtype=np.int64)

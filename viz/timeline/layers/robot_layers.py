@@ -10,7 +10,7 @@ from ... import palette
 from ...shapes import ellipses, spread
 from ..block import REFUSED, Block
 from ..colours import packed
-from ..recording import Recording, Timestamps
+from ..recording import RerunRecording, Timestamps
 from .map_layers import style, words_only
 
 ROBOT_M = 0.2
@@ -23,7 +23,7 @@ LABEL_M = 0.5
 class RobotLayer:
     """The estimated path, the body, and the ellipse of three standard deviations."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity = out, f"/world/{backend}"
         self._colour = palette.of_backend(backend)
         self._before: Float[np.ndarray, "1 3"] | None = None
@@ -52,7 +52,7 @@ def body(colour: str, radius: float = 1.6, order: float = 46.0) -> rr.LineStrips
 
 
 def send_path(
-    out: Recording,
+    out: RerunRecording,
     entity: str,
     moments: Timestamps,
     poses: Float[np.ndarray, "s 3"],
@@ -70,7 +70,7 @@ class ScanLayer:
     Why a segment was refused is written beside it, in the world's frame, so that the words do not lie on each other.
     """
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity, self._why = out, f"/world/{backend}/robot", f"/world/{backend}/why_refused"
         out.fixed(
             f"{self._entity}/scan",

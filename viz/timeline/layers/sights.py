@@ -6,7 +6,7 @@ from jaxtyping import Float
 from ... import palette
 from ..block import Block
 from ..colours import packed
-from ..recording import Recording
+from ..recording import RerunRecording
 from .map_layers import style
 
 UNITS_PER_M = 45.0
@@ -16,7 +16,7 @@ UNITS_PER_M = 45.0
 class SightsLayer:
     """Walls as nodes at their middles; neighbours in a chain, and what was seen from where."""
 
-    def __init__(self, out: Recording, backend: str) -> None:
+    def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._world, self._graph = out, f"/world/{backend}/visibility", f"/graph/{backend}"
         out.fixed(f"{self._world}/sights", style(0.5, 12.0, colors=packed(palette.SIGHT)))
         out.fixed(f"{self._world}/neighbours", style(1.0, 13.0, colors=packed(palette.NEIGHBOUR)))

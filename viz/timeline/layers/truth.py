@@ -9,7 +9,7 @@ from jaxtyping import Float
 from ... import palette
 from ..block import Block
 from ..colours import packed
-from ..recording import Recording
+from ..recording import RerunRecording
 from .curves import LOG_NEES, NEES, POSE_BAND, curve_style
 from .map_layers import style
 from .robot_layers import body, send_path
@@ -26,7 +26,7 @@ BAND_WORDS = {"high": "above: overconfident", "low": "below: too cautious"}
 class TruthLayer:
     """The true walls, and the true path as far as it is known; the same for all back ends, so sent once."""
 
-    def __init__(self, out: Recording, rings_world: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
+    def __init__(self, out: RerunRecording, rings_world: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
         self._out = out
         self._next = 0
         self._before: Float[np.ndarray, "1 3"] | None = None
@@ -55,7 +55,7 @@ class TruthLayer:
 class NeesLayer:
     """The pose's NEES, plain and as a power of ten, with its band over the same steps."""
 
-    def __init__(self, out: Recording, backend: str, nees_of: NeesOf) -> None:
+    def __init__(self, out: RerunRecording, backend: str, nees_of: NeesOf) -> None:
         self._out, self._backend, self._of = out, backend, nees_of
         self._band_drawn = False
         for plot in (NEES, LOG_NEES):
