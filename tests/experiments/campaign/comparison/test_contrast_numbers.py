@@ -9,7 +9,7 @@ import pytest
 from experiments.campaign.comparison.comparison import MEASURES
 from experiments.campaign.contrast import COMPARED, NAMES, contrast, read_contrast
 from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.scores.score import Record
+from experiments.campaign.scores.score import TrialScores
 from experiments.campaign.store import opened
 from experiments.campaign.work import Done, pack
 from experiments.scoring import statistics
@@ -43,7 +43,7 @@ def made(folder, times, campaign=CAMPAIGN, without=()):
                 "matches_true": 5, "matches_missed": 1, "matches_false": 0, "duplicate_lines": trial.seed, "merges": 1,
                 "false_merges": 0, "step_ms": {"mean": 3.0 + error},
             }  # fmt: skip
-            store.save(Done(trial, pack(Record(summary, {}))))
+            store.save(Done(trial, pack(TrialScores(summary, {}))))
     return folder
 
 
