@@ -20,7 +20,7 @@ from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import print_summary, progress
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError
-from ..views.timelines import Recording
+from ..views.timelines import TimelineOutput
 from .echo import echo_world
 
 MAX_STEPS = TrialConfig.max_steps
@@ -176,7 +176,7 @@ class Explore:
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
         log = RunningLog(folder, config, saved.kept if saved is not None else None)
-        recording = Recording(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
+        recording = TimelineOutput(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
         try:
             with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
 

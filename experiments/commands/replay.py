@@ -20,7 +20,7 @@ from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.progress import print_comparison, progress
 from ..trial import TrialResult
 from ..usage import UsageError, choose
-from ..views.timelines import Recording
+from ..views.timelines import TimelineOutput
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Replay:
                     )
                 refuse_others(folder, configs[name], self.force)
             title = f"{world.name}, seed {trial.seed}, replayed with {self.association} association"
-            recording = Recording(title, self.backend, world, trial.errorless, self.rrd)
+            recording = TimelineOutput(title, self.backend, world, trial.errorless, self.rrd)
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
                 result = self._one(run, name, options, world, recording)
@@ -89,7 +89,7 @@ class Replay:
         return status or (1 if problems else 0)
 
     def _one(
-        self, run: RecordedRun, name: str, options: ReplayOptions, world: World, recording: Recording
+        self, run: RecordedRun, name: str, options: ReplayOptions, world: World, recording: TimelineOutput
     ) -> TrialResult:
         """Replay through one back end, and stop between two steps where that is asked for."""
         with progress(f"replaying with {name}") as show, first_interrupt_waits() as stop_if_asked:

@@ -18,7 +18,7 @@ from ..campaign.store import read_campaigns
 from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
 from ..scenario import load_world
 from ..usage import UsageError
-from ..views.timelines import Recording
+from ..views.timelines import TimelineOutput
 
 TRIALS = "trials.csv"
 """A folder that holds it is that of a campaign."""
@@ -90,7 +90,7 @@ def _record(runs: list[RecordedRun], options: ReplayOptions, target: Path) -> li
     trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
     world = load_world(trial.world, trial.start, trial.scale)
     title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, {options.association} association"
-    recording = Recording(title, backends, world, trial.errorless, target)
+    recording = TimelineOutput(title, backends, world, trial.errorless, target)
     for backend in backends:
         if recording.is_on:
             watch = recording.watch(backend, lambda step: run.true_poses_world[step.index])

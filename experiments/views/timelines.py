@@ -26,7 +26,7 @@ TruePose = Callable[[Step], Float[np.ndarray, "3"]]
 Watch = Callable[[Step], None]
 
 
-class Recording:
+class TimelineOutput:
     """A timeline of one or several back ends on its way to a file or a viewer; its troubles are told at the end."""
 
     def __init__(
@@ -137,11 +137,11 @@ def record_comparison(
     `trials` and `steps` are the campaign's tables, a mapping a row. Returns, in words, what could not be written.
     """
     if run is None:
-        recording = Recording(title, (), None, False, rrd)
+        recording = TimelineOutput(title, (), None, False, rrd)
     else:
         trial = run.trial
         world = load_world(trial.world, trial.start, trial.scale)
-        recording = Recording(title, backends, world, trial.errorless, rrd)
+        recording = TimelineOutput(title, backends, world, trial.errorless, rrd)
         for backend in backends:
             if recording.is_on:
                 replay(run, backend, options, recording.watch(backend, lambda step: run.true_poses_world[step.index]))

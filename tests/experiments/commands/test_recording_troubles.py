@@ -14,7 +14,7 @@ import rerun as rr
 from experiments.commands.cli import main
 from experiments.scenario import TrialConfig, build
 from experiments.trial import default_mission, run_scenario
-from experiments.views.timelines import Recording
+from experiments.views.timelines import TimelineOutput
 
 WORLD = "paper-fig4"
 
@@ -43,7 +43,7 @@ def test_a_trouble_while_recording_is_told_and_the_run_goes_on(tmp_path, monkeyp
 
     monkeypatch.setattr(Timeline, "add", fail)
     scenario = build(TrialConfig(WORLD, max_steps=2))
-    recording = Recording("title", ["full-ekf"], scenario.world, False, tmp_path / "x.rrd")
+    recording = TimelineOutput("title", ["full-ekf"], scenario.world, False, tmp_path / "x.rrd")
     seen = []
     watch = recording.watch("full-ekf", lambda step: np.zeros(3), seen.append)
     assert len(run_scenario(scenario, watch, default_mission).log) == len(seen) == 2
@@ -99,8 +99,8 @@ def test_a_recording_needs_no_pandas_and_leaves_it_as_it_was(tmp_path):
 import io, sys
 from pathlib import Path
 from experiments.scenario import load_world
-from experiments.views.timelines import Recording
-assert Recording("t", ["graph"], load_world({WORLD!r}), False, Path({str(tmp_path / "x.rrd")!r})).close() == []
+from experiments.views.timelines import TimelineOutput
+assert TimelineOutput("t", ["graph"], load_world({WORLD!r}), False, Path({str(tmp_path / "x.rrd")!r})).close() == []
 assert "rerun" in sys.modules and "pandas" not in sys.modules
 import pandas, pyarrow
 table = pandas.DataFrame({{"a": [1.0, None], "b": ["x", None]}})

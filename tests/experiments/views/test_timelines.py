@@ -10,7 +10,7 @@ from experiments.commands.cli import main
 from experiments.replays.replay import ReplayOptions, read_run, replay
 from experiments.scenario import load_world
 from experiments.scoring.summary import TIMED
-from experiments.views.timelines import Recording, record_comparison
+from experiments.views.timelines import TimelineOutput, record_comparison
 from viz.timeline.colours import pale
 
 WORLD, STEPS = "paper-fig4", 70
@@ -174,7 +174,7 @@ def test_refused_segments_say_why_and_the_goal_says_what_it_is(runs):
 def test_several_back_ends_stand_in_one_recording_on_one_time_axis(runs, tmp_path):
     run = read_run(runs.recorded / "log.npz")
     world, backends = load_world(run.trial.world), ["block-ekf", "full-ekf", "graph"]
-    recording = Recording("three", backends, world, False, tmp_path / "three.rrd")
+    recording = TimelineOutput("three", backends, world, False, tmp_path / "three.rrd")
     finals = {}
     for backend in backends:
         watch = recording.watch(backend, lambda step: run.true_poses_world[step.index])
