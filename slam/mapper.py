@@ -17,10 +17,11 @@ from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
 from .map.candidates import FaintConfig, FaintLines
 from .map.chains import Chain, ChainConfig, connect
-from .map.change_points import Kink, Kinks, KinksConfig
-from .map.extents import Walls, WallsConfig
+from .map.change_points import Kink, KinksConfig
+from .map.extents import WallsConfig
+from .map.landmarks import Landmarks
 from .map.merging import DuplicatesConfig, duplicate_of
-from .map.openings import Gaps, GapsConfig
+from .map.openings import GapsConfig
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
 from .map.vertices import BendsConfig, bends_within, laid_across, meetings, mistaken
@@ -88,10 +89,8 @@ class Mapper:
         self.config = config
         self._extract = extractor
         self._match = matcher
-        self._walls = Walls(config.walls)
-        self._faint = FaintLines(config.faint)
-        self._gaps = Gaps(config.gaps, config.chains)
-        self._kinks = Kinks(config.kinks)
+        self._landmarks = Landmarks(config.walls, config.kinks, config.gaps, config.chains)
+        self._candidates = FaintLines(config.faint)
 
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by the odometry."""
@@ -100,7 +99,7 @@ class Mapper:
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
-        walls = self._walls.map(self.backend.belief)
+        walls = self._landmarks.map(self.backend.belief)
         segments = self._segments(scan, walls)
         walls = self._without(mistaken(segments, walls, self.config.bends), walls)
         # 2. Match observed features to the best fitting equivalents in the map.
@@ -119,15 +118,16 @@ class Mapper:
         if not len(firm.ids):
             firm = self._may_move(segments, *observed_either_way(matches, segments, near.ids, joint, self.config.torn))
         self.backend.update(first, firm)
-        kink = self._kinks.see(self.backend.belief, scan, segments, matches.pairs)
+        kink = self._landmarks.change_points.see(self.backend.belief, scan, segments, matches.pairs)
         sides = NONE
         if kink is not None:
             segments, matches, sides = self._cut(kink, scan, segments, matches)
         owners = self._store(scan, segments, matches, sides)
         walls, merged = self._merge(owners, self._ended(scan))
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
-        self._gaps.see(walls, scan)
-        chains = connect(walls, set_aside, self._gaps.passed, self._gaps.cut_off, self.config.chains)
+        self._landmarks.openings.see(walls, scan)
+        openings = self._landmarks.openings
+        chains = connect(walls, set_aside, openings.passed, openings.cut_off, self.config.chains)
         return MapUpdate(segments, matches, owners, walls, chains, merged)
 
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
@@ -141,7 +141,7 @@ class Mapper:
         return sure_pieces(self._extract(scan, config, bends_rad=bends_rad), scan, config)
 
     def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
-        return bends_within(segments, walls, self.config.bends, self._kinks.cut)
+        return bends_within(segments, walls, self.config.bends, self._landmarks.change_points.cut)
 
     def _cut(
         self, kink: Kink, scan: Scan, segments: Segments, matches: Matches
@@ -151,11 +151,11 @@ class Mapper:
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
         """
-        walls = self._walls.map(self.backend.belief)
+        walls = self._landmarks.map(self.backend.belief)
         bends = self._bends(segments, walls)
         pieces = self._pieces(scan, np.append(bends, kink.bearing_rad))
         clear = np.flatnonzero(are_clear(pieces, self.config.walls.firmness))
-        sides = self._kinks.sides_of(kink, segments, pieces.take(clear), scan)
+        sides = self._landmarks.change_points.sides_of(kink, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
         bent = np.union1d(laid_across(walls, kink.wall, kink.along_m, self.config.bends), [kink.wall])
@@ -168,9 +168,8 @@ class Mapper:
         if not len(mistaken):
             return walls
         self.backend.remove(mistaken.tolist())
-        self._walls.drop(mistaken)
-        self._kinks.forget(mistaken.tolist())
-        return self._walls.map(self.backend.belief)
+        self._landmarks.remove(mistaken)
+        return self._landmarks.map(self.backend.belief)
 
     def _firm(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
@@ -178,7 +177,7 @@ class Mapper:
 
     def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
         """Return those of the observations, made by the segments of these rows, that may move the estimate."""
-        firm = self._walls.may_move(segments.take(rows), observed.ids)
+        firm = self._landmarks.reliability.may_move(segments.take(rows), observed.ids)
         cov = as_told(observed.cov[firm], segments.is_tentative[rows[firm]], self.config.walls.firmness)
         return Observations(observed.ids[firm], observed.lines[firm], cov)
 
@@ -200,29 +199,28 @@ class Mapper:
         owners[segments.is_tentative] = -1
         fresh = np.setdiff1d(matches.unmatched, matches.doubtful, assume_unique=True)
         faint, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
-        believed = faint[self._faint.see(self.backend.belief.pose_world, segments.take(faint))]
+        believed = faint[self._candidates.see(self.backend.belief.pose_world, segments.take(faint))]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = seen_centres(segments, fresh)
             owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
         known = np.unique(owners[sides][owners[sides] >= 0])
         if len(known) == 2:
-            self._kinks.keep_apart(*known.tolist())
+            self._landmarks.change_points.keep_apart(*known.tolist())
         believed_ids = np.union1d(owners[believed], known)
-        forgotten = self._walls.see(self.backend.belief, scan, segments, owners, believed_ids)
-        if len(forgotten):
-            self.backend.remove(forgotten.tolist())
-            self._kinks.forget(forgotten.tolist())
-        return owners
+        observed = self._landmarks.observe(self.backend.belief, scan, segments, owners, believed_ids)
+        if len(observed.forgotten):
+            self.backend.remove(observed.forgotten.tolist())
+        return observed.owners
 
     def _ended(self, scan: Scan) -> StochasticMap:
         """Return the map, in which the sides of a bend end where they meet."""
-        walls = self._walls.map(self.backend.belief)
-        pairs, along = meetings(walls, scan.range_max_m, self.config.bends, self._kinks.cut)
+        walls = self._landmarks.map(self.backend.belief)
+        pairs, along = meetings(walls, scan.range_max_m, self.config.bends, self._landmarks.change_points.cut)
         if not len(pairs):
             return walls
-        self._walls.meet(pairs, along)
-        return self._walls.map(self.backend.belief)
+        self._landmarks.extents.meet(pairs, along)
+        return self._landmarks.map(self.backend.belief)
 
     def _merge(
         self, owners: Int[np.ndarray, " s"], walls: StochasticMap
@@ -235,14 +233,14 @@ class Mapper:
             return walls, ()
         merged: list[tuple[int, int]] = []
         touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
-        while twice := duplicate_of(walls, touched, one_wall, self.config.duplicates, self._kinks.cut):
+        sides = self._landmarks.change_points
+        while twice := duplicate_of(walls, touched, one_wall, self.config.duplicates, sides.cut):
             keep, drop = twice
-            self._walls.merge(self.backend.belief, keep, drop)
+            self._landmarks.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)
-            self._kinks.merge(keep, drop)
             owners[owners == drop] = keep
             merged.append(twice)
-            walls = self._walls.map(self.backend.belief)
+            walls = self._landmarks.map(self.backend.belief)
         return walls, tuple(merged)
 
 

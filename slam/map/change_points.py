@@ -6,7 +6,7 @@ the robot by it. Where the residuals of a fit turn along the wall says nothing a
 tells the turn at a place to a degree, and what the scans tell adds up.
 """
 
-from collections.abc import Collection, Set
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..extraction.visible_extent import beam_step, beams_of
 from ..geometry.lines import directions, normals
 from ..geometry.poses import to_world, wrap
 from ..robot import Scan
+from .records import Merger, Records
 
 Sums = Float[np.ndarray, "2 p"]
 """At each place, information about by how much more the wall leads away beyond it, and that times so much."""
@@ -71,17 +72,18 @@ class Kink:
 
 
 class Kinks:
-    """What the sightings of each wall say of a turn, at places along it; ids are those of the map and only grow."""
+    """What the sightings of each wall say of a turn, at places along it."""
 
-    def __init__(self, config: KinksConfig = KinksConfig()) -> None:
+    def __init__(self, config: KinksConfig = KinksConfig(), records: Records | None = None) -> None:
         self._config = config
-        self._sums: dict[int, tuple[int, Sums]] = {}
-        self._cut: set[tuple[int, int]] = set()
+        self._records = Records() if records is None else records
+        self._records.declare(self._merge, turns=None)
+        self._records.relate("cut")
 
     @property
     def cut(self) -> Set[tuple[int, int]]:
         """Pairs of ids, the lower first, made of one bent wall: they are two, whatever their lines look like."""
-        return self._cut
+        return {(min(pair), max(pair)) for pair in self._records.pairs["cut"]}
 
     def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> Kink | None:
         """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
@@ -142,37 +144,34 @@ class Kinks:
         """Add to the sums of walls at some places, which are given wall by wall; return what they are there now."""
         bounds = np.searchsorted(place_of, np.arange(len(walls) + 1))
         now = np.empty_like(terms)
-        for wall, start, stop in zip(walls.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        rows = self._records.rows(walls)
+        for row, start, stop in zip(rows.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
             if start < stop:
-                now[:, start:stop] = self._add_to(wall, int(place[start]), terms[:, start:stop])
+                now[:, start:stop] = self._add_to(row, int(place[start]), terms[:, start:stop])
         return now
 
-    def _add_to(self, wall: int, first: int, terms: Sums) -> Sums:
+    def _add_to(self, row: int, first: int, terms: Sums) -> Sums:
         """Add to a wall's sums from its place `first` on; return what they are there now."""
-        begin, sums = self._sums.get(wall, (first, terms[:, :0]))
+        turns = self._records.columns["turns"]
+        begin, sums = turns[row] or (first, terms[:, :0])
         before, after = max(begin - first, 0), max(first + terms.shape[1] - begin - sums.shape[1], 0)
         if before or after:
             begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
-            self._sums[wall] = begin, sums
+            turns[row] = begin, sums
         now = sums[:, first - begin : first - begin + terms.shape[1]]
         now += terms
         return now
 
-    def forget(self, walls: Collection[int]) -> None:
-        """Take note that walls are no longer in the map."""
-        for wall in walls:
-            self._sums.pop(wall, None)
-        self._cut = {pair for pair in self._cut if not set(pair) & set(walls)}
-
     def keep_apart(self, one: int, other: int) -> None:
         """Take note that two walls are the sides of a bend."""
-        self._cut.add((min(one, other), max(one, other)))
+        self._records.pairs["cut"].add((min(one, other), max(one, other)))
 
-    def merge(self, keep: int, drop: int) -> None:
-        """Take note that two entries were one wall; what was said of `drop`, at places of its own, is forgotten."""
-        self._sums.pop(drop, None)
-        renamed = ([keep if wall == drop else wall for wall in pair] for pair in self._cut)
-        self._cut = {(min(pair), max(pair)) for pair in renamed if pair[0] != pair[1]}
+    def _merge(self, merger: Merger) -> None:
+        """Add the sums of the dropped wall at the nearest places of the kept one: half a pitch off at most."""
+        turns = self._records.columns["turns"]
+        if turns[merger.drop] is not None:
+            first, sums = turns[merger.drop]
+            self._add_to(merger.keep, first + round(merger.shift_m / self._config.pitch_m), sums)
 
 
 def _along(

@@ -12,6 +12,7 @@ from ..geometry.lines import intersect
 from ..geometry.poses import J
 from ..robot import Scan
 from .chains import ChainConfig
+from .records import Records
 from .stochastic_map import StochasticMap
 
 
@@ -35,11 +36,20 @@ class GapsConfig:
 class Gaps:
     """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through."""
 
-    def __init__(self, config: GapsConfig, chains: ChainConfig) -> None:
+    def __init__(self, config: GapsConfig, chains: ChainConfig, records: Records | None = None) -> None:
         self._config, self._chains = config, chains
-        self.passed: set[tuple[int, int]] = set()
-        self.cut_off: set[tuple[int, int]] = set()
+        self._records = Records() if records is None else records
+        self._records.relate("passed", "cut_off")
+
+    @property
+    def passed(self) -> set[tuple[int, int]]:
+        """Pairs (wall whose head, wall whose tail) that bound a gap through which beams went."""
+        return self._records.pairs["passed"]
+
+    @property
+    def cut_off(self) -> set[tuple[int, int]]:
         """Pairs that make no corner where their lines cross: beams went through one of the two supposed pieces."""
+        return self._records.pairs["cut_off"]
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Hold one scan, taken at the map's pose, against gaps and corners of all firm walls within its range."""

@@ -15,6 +15,7 @@ from scipy.special import gammaincc
 from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..geometry.poses import to_world, wrap
+from .records import Merger, Records
 
 
 @dataclass(frozen=True)
@@ -61,16 +62,20 @@ def as_told(
 
 
 class Firmness:
-    """Sums over the sightings of each wall; ids are those of the map and only grow."""
+    """Sums over the sightings of each wall."""
 
-    def __init__(self, config: FirmnessConfig = FirmnessConfig()) -> None:
+    def __init__(self, config: FirmnessConfig = FirmnessConfig(), records: Records | None = None) -> None:
         self._config = config
-        self._fits = np.zeros((0, 2))
-        self._first = np.full((0, 3), np.nan)
-        self._directions = np.zeros((0, 2, 2))
-        # Of the clear ones: information times how far along the wall, and that times the same, and times direction.
-        self._along = np.zeros((0, 3))
-        self._crooked = np.zeros(0, dtype=bool)
+        self._records = Records() if records is None else records
+        self._records.declare(
+            self._merge,
+            fits=np.zeros(2),
+            first=np.full(3, np.nan),
+            directions=np.zeros((2, 2)),
+            # Of the clear ones: information times how far along the wall, that times the same, and times direction.
+            along=np.zeros(3),
+            crooked=False,
+        )
 
     def see(self, segments: Segments, owners: Int[np.ndarray, " s"], pose_world: Float[np.ndarray, "3"]) -> None:
         """Add one scan, taken at a pose in the world; `owners` holds the wall of each segment, -1 for none."""
@@ -78,16 +83,46 @@ class Firmness:
         ids, seen = owners[used], segments.take(used)
         alpha, information = wrap(seen.lines[:, 0] + pose_world[2]), 1.0 / seen.cov[:, 0, 0]
         middle = to_world(seen.ends.mean(axis=1), pose_world)
-        self._make_room(int(ids.max(initial=-1)) + 1)
-        new = np.isnan(self._first[ids, 0])
-        self._first[ids[new]] = np.column_stack([alpha, middle])[new]
-        np.add.at(self._fits, ids, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
-        off = wrap(alpha - self._first[ids, 0])
-        along = np.vecdot(middle - self._first[ids, 1:], directions(self._first[ids, 0]))
+        rows = self._records.rows(ids)
+        columns = self._records.columns
+        first = columns["first"]
+        new = np.isnan(first[rows, 0])
+        first[rows[new]] = np.column_stack([alpha, middle])[new]
+        np.add.at(columns["fits"], rows, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
+        off = wrap(alpha - first[rows, 0])
+        along = np.vecdot(middle - first[rows, 1:], directions(first[rows, 0]))
         clear = are_clear(seen, self._config)
-        np.add.at(self._directions, (ids, clear.astype(int)), np.stack([information, information * off], axis=-1))
-        np.add.at(self._along, ids, (information * clear * along * np.stack([np.ones_like(off), along, off])).T)
-        self._crooked[ids] = self._misfit(ids) | self._in_conflict(ids) | self._bends(ids)
+        np.add.at(columns["directions"], (rows, clear.astype(int)), np.stack([information, information * off], axis=-1))
+        np.add.at(columns["along"], rows, (information * clear * along * np.stack([np.ones_like(off), along, off])).T)
+        self._judge(rows)
+
+    def _judge(self, rows: Int[np.ndarray, " n"]) -> None:
+        """Take note of which walls are surely not straight."""
+        crooked = self._misfit(rows) | self._in_conflict(rows) | self._bends(rows)
+        self._records.columns["crooked"][rows] = crooked
+
+    def _merge(self, merger: Merger) -> None:
+        """Add the sums of the dropped wall, taken about its own first observation, to those about the kept one's."""
+        columns, keep, drop = self._records.columns, merger.keep, merger.drop
+        first, fits, sums, along = (columns[name] for name in ("first", "fits", "directions", "along"))
+        fits[keep] += fits[drop]
+        if np.isnan(first[drop, 0]):
+            return
+        if np.isnan(first[keep, 0]):
+            first[keep] = first[drop]
+        turn = wrap(first[drop, 0] - first[keep, 0])
+        shift = (first[drop, 1:] - first[keep, 1:]) @ directions(first[keep, 0])
+        information, off = sums[drop].T
+        off = off + turn * information
+        x, xx, x_off = along[drop]
+        sums[keep] += np.column_stack([information, off])
+        # With x + shift in place of x, and off + turn in place of off.
+        along[keep] += [
+            x + shift * information[1],
+            xx + 2.0 * shift * x + shift**2 * information[1],
+            x_off + turn * x + shift * off[1],
+        ]
+        self._judge(np.array([keep]))
 
     def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
         """Return which segments of one scan, each on the wall of that id, may move the estimate.
@@ -100,7 +135,8 @@ class Firmness:
         """
         few = segments.is_tentative & (segments.cov[:, 0, 0] < self._config.few_heading_rad**2)
         crooked = self.are_crooked(ids)
-        few &= self._directions[ids, 1, 0] * segments.cov[:, 0, 0] > 1.0
+        rows = self._records.rows(ids)
+        few &= self._records.columns["directions"][rows, 1, 0] * segments.cov[:, 0, 0] > 1.0
         told = are_clear(segments, self._config) | few
         if (told & ~crooked).any():
             return told & ~crooked
@@ -108,41 +144,32 @@ class Firmness:
 
     def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return which walls are surely not straight: by their fits, or by what vague and clear sightings say."""
-        self._make_room(int(ids.max(initial=-1)) + 1)
-        return self._crooked[ids]
+        rows = self._records.rows(ids)
+        crooked: Bool[np.ndarray, " n"] = self._records.columns["crooked"][rows]
+        return crooked
 
-    def _misfit(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        chi2, dof = self._fits[ids].T
+    def _misfit(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        chi2, dof = self._records.columns["fits"][rows].T
         misfit = chi2 > self._config.excess * dof
         misfit[misfit] = gammaincc(0.5 * dof[misfit], 0.5 * chi2[misfit]) < self._config.chance
         return misfit
 
-    def _in_conflict(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        information, sums = np.moveaxis(self._directions[ids], -1, 0)
+    def _in_conflict(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+        information, sums = np.moveaxis(self._records.columns["directions"][rows], -1, 0)
         both = (information > 0.0).all(axis=1)
         information, sums = information[both], sums[both]
         apart = np.diff(sums / information, axis=1)[:, 0] ** 2 / np.sum(1.0 / information, axis=1)
-        conflict = np.zeros(len(ids), dtype=bool)
+        conflict = np.zeros(len(rows), dtype=bool)
         conflict[both] = gammaincc(0.5, 0.5 * apart) < self._config.chance
         return conflict
 
-    def _bends(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    def _bends(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return where the clear directions change along the wall: by a line through them, weighted."""
-        information, sums = self._directions[ids, 1].T
-        first, second, mixed = self._along[ids].T
+        information, sums = self._records.columns["directions"][rows, 1].T
+        first, second, mixed = self._records.columns["along"][rows].T
         middle = first / np.maximum(information, 1e-9)
         spread, trend = second - middle * first, mixed - middle * sums
         gain = trend**2 / np.maximum(spread, 1e-9)
         bends = gain > self._config.bend_rad**2 * information
         bends[bends] = gammaincc(0.5, 0.5 * gain[bends]) < self._config.chance
         return bends
-
-    def _make_room(self, count: int) -> None:
-        missing = count - len(self._first)
-        if missing <= 0:
-            return
-        self._fits = np.concatenate([self._fits, np.zeros((missing, 2))])
-        self._first = np.concatenate([self._first, np.full((missing, 3), np.nan)])
-        self._directions = np.concatenate([self._directions, np.zeros((missing, 2, 2))])
-        self._along = np.concatenate([self._along, np.zeros((missing, 3))])
-        self._crooked = np.concatenate([self._crooked, np.zeros(missing, dtype=bool)])

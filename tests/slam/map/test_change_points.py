@@ -11,6 +11,7 @@ from slam.estimation.backend import Belief
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
 from slam.map.change_points import Kink, Kinks, KinksConfig, _places, _turns
+from slam.map.records import Records
 from slam.mapper import Mapper, MapperConfig
 from slam.robot import Odometry, Scan
 
@@ -153,16 +154,34 @@ def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg
 
 
 def test_pairs_are_renamed_when_entries_are_merged():
-    kinks = Kinks()
+    records = Records()
+    kinks = Kinks(records=records)
     kinks.keep_apart(9, 4)
     assert kinks.cut == {(4, 9)}
-    kinks.merge(2, 9)
+    records.merge(2, 9, 0.0)
     assert kinks.cut == {(2, 4)}
-    kinks.forget([4])
+    records.remove(np.array([4]))
     assert not kinks.cut
     kinks.keep_apart(1, 2)
-    kinks.merge(1, 2)
+    records.merge(1, 2, 0.0)
     assert not kinks.cut
+
+
+def test_turns_of_a_merged_wall_are_added_at_the_nearest_places_of_the_kept_one():
+    """Exact turns of one bent wall that stands in the map twice, told about two anchors 0.6 m apart."""
+    records, rng = Records(), np.random.default_rng(3)
+    kinks = Kinks(records=records)
+    kept, dropped = records.rows(np.array([4, 8])).tolist()
+    mine, theirs = rng.uniform(size=(2, 5)), rng.uniform(size=(2, 3))
+    kinks._add_to(kept, -2, mine)
+    kinks._add_to(dropped, 0, theirs)
+    records.merge(4, 8, 0.6)
+    first, sums = records.columns["turns"][0]
+    expected = np.zeros((2, 7))
+    expected[:, :5] += mine
+    expected[:, 4:] += theirs  # 0.6 m are 2.4 pitches
+    assert first == -2
+    np.testing.assert_allclose(sums, expected)
 
 
 def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, away_m=1.0):
@@ -223,17 +242,18 @@ def test_a_straight_wall_stays_one_and_no_number_is_changed():
 
 def test_sums_of_what_exact_lines_say_do_not_depend_on_how_a_wall_was_grown_along():
     """Sightings at places before and after those known before are added where they belong."""
-    kinks, rng = Kinks(), np.random.default_rng(2)
+    records, rng = Records(), np.random.default_rng(2)
+    kinks, row = Kinks(records=records), int(records.rows(np.array([WALL]))[0])
     for first, count in ((3, 4), (-2, 3), (0, 12), (-4, 1)):
         terms = rng.uniform(size=(2, count))
-        before = {place: kinks_at(kinks, place) for place in range(first, first + count)}
-        now = kinks._add_to(WALL, first, terms)
+        before = {place: turns_at(records, place) for place in range(first, first + count)}
+        now = kinks._add_to(row, first, terms)
         for k, place in enumerate(range(first, first + count)):
             np.testing.assert_allclose(now[:, k], before[place] + terms[:, k])
-            np.testing.assert_allclose(kinks_at(kinks, place), before[place] + terms[:, k])
+            np.testing.assert_allclose(turns_at(records, place), before[place] + terms[:, k])
 
 
-def kinks_at(kinks, place):
+def turns_at(records, place):
     """Return the sums of the wall at one place."""
-    begin, sums = kinks._sums.get(WALL, (0, np.zeros((2, 0))))
+    begin, sums = records.columns["turns"][0] or (0, np.zeros((2, 0)))
     return sums[:, place - begin].copy() if begin <= place < begin + sums.shape[1] else np.zeros(2)

@@ -7,9 +7,14 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
 from slam.geometry.lines import normals, through
-from slam.map.extents import Walls, WallsConfig
+from slam.map.chains import ChainConfig
+from slam.map.change_points import KinksConfig
+from slam.map.extents import WallsConfig
+from slam.map.landmarks import Landmarks
+from slam.map.openings import GapsConfig
 from slam.robot import Scan
 
+SETTINGS = (WallsConfig(), KinksConfig(), GapsConfig(), ChainConfig())
 CONFIG = WallsConfig()
 
 
@@ -35,10 +40,10 @@ def see(walls, known, shown, owners, pose):
     scan = scan_of(shown, pose)
     segments = extract(scan)
     assert len(segments) == len(owners)
-    forgotten = walls.see(
+    observed = walls.observe(
         belief_of(known, pose), scan, segments, np.array(owners, dtype=np.int64), np.zeros(0, dtype=np.int64)
     )
-    return forgotten.tolist()
+    return observed.forgotten.tolist()
 
 
 BEFORE_BEND = [[0.0, 0.0], [2.0, 0.0]]
@@ -59,10 +64,10 @@ def test_an_end_past_a_corner_moves_back_once_two_scans_in_turn_show_the_next_wa
     side, outward = (0, -1.0) if mirrored else (1, 1.0)
 
     def reaches_past(walls):
-        end = walls.map(belief_of([before, beyond][: len(walls._ids)], pose)).ends_world[0, side]
+        end = walls.map(belief_of([before, beyond][: len(walls.records)], pose)).ends_world[0, side]
         return outward * (end - before[side])[0]
 
-    walls = Walls()
+    walls = Landmarks(*SETTINGS)
     see(walls, [before], [straight], [0], pose)
     assert reaches_past(walls) > 0.4
     see(walls, [before, beyond], both, owners, pose)
@@ -80,7 +85,7 @@ WALL, BEHIND = [[2.0, -1.0], [2.0, 1.0]], [[2.05, -1.0], [2.05, 1.0]]
 
 @pytest.mark.parametrize(("sightings", "claimed_after"), [(1, CONFIG.claims), (5, CONFIG.claims), (10, None)])
 def test_a_wall_all_of_whose_beams_another_takes_is_forgotten_unless_it_was_seen_often(sightings, claimed_after):
-    pose, walls = [0.0, 0.0, 0.0], Walls()
+    pose, walls = [0.0, 0.0, 0.0], Landmarks(*SETTINGS)
     for _ in range(CONFIG.established_sightings):
         see(walls, [WALL], [WALL], [0], pose)
     for _ in range(sightings):
@@ -91,7 +96,7 @@ def test_a_wall_all_of_whose_beams_another_takes_is_forgotten_unless_it_was_seen
 
 
 def test_a_wall_seen_in_between_is_not_claimed():
-    pose, walls = [0.0, 0.0, 0.0], Walls()
+    pose, walls = [0.0, 0.0, 0.0], Landmarks(*SETTINGS)
     see(walls, [WALL], [WALL], [0], pose)
     for _ in range(4):
         assert see(walls, [WALL, BEHIND], [BEHIND], [1], pose) == []
@@ -113,7 +118,7 @@ def extent_of(walls, known, pose=ORIGIN):
 
 @pytest.mark.parametrize("sightings", [1, 2])
 def test_a_wall_seen_once_is_tentative_and_forgotten_when_it_is_not_seen_again(sightings):
-    walls = Walls()
+    walls = Landmarks(*SETTINGS)
     for _ in range(sightings):
         see(walls, [FRONT], [FRONT], [0], ORIGIN)
     assert walls.map(belief_of([FRONT], ORIGIN)).tentative.tolist() == [sightings < 2]
@@ -127,7 +132,7 @@ def with_a_hole(low, high):
 
 
 def test_a_wall_is_cut_back_to_its_last_hit_once_two_scans_in_turn_show_beams_behind_it():
-    walls = Walls()
+    walls = Landmarks(*SETTINGS)
     see(walls, [FRONT], [FRONT], [0], ORIGIN)
     whole = extent_of(walls, [FRONT])
     for _ in range(2):  # what one scan shows, and the next does not, is a fault of it
@@ -146,7 +151,7 @@ def test_a_wall_is_cut_back_to_its_last_hit_once_two_scans_in_turn_show_beams_be
 )
 def test_a_lone_beam_or_some_beside_its_end_cut_no_wall(shown):
     """Two beams pass within 0.1 m of the end: ends and corners are known no better."""
-    walls, pose = Walls(), [0.0, 0.8, 0.0]
+    walls, pose = Landmarks(*SETTINGS), [0.0, 0.8, 0.0]
     see(walls, [FRONT], [FRONT], [0], pose)
     whole = extent_of(walls, [FRONT], pose)
     for _ in range(4):
@@ -156,7 +161,7 @@ def test_a_lone_beam_or_some_beside_its_end_cut_no_wall(shown):
 
 def test_a_corner_seen_more_sharply_moves_the_end_back():
     """From 2 m, at a grazing angle, beams stand 0.2 m apart on the wall: its corner is known no better."""
-    walls, far, near = Walls(), [0.1, 0.5, 0.0], [1.6, 0.5, 0.0]
+    walls, far, near = Landmarks(*SETTINGS), [0.1, 0.5, 0.0], [1.6, 0.5, 0.0]
     side = [[2.0, 0.0], [2.0, 1.5]]
     see(walls, [BEFORE_BEND], [[[0.0, 0.0], [2.05, 0.0]], [[2.05, 0.0], [2.05, 1.5]]], [0, -1], far)
     assert walls.map(belief_of([BEFORE_BEND], far)).ends_world[0, 1, 0] == pytest.approx(2.05, abs=1e-3)
@@ -168,11 +173,11 @@ def test_a_corner_seen_more_sharply_moves_the_end_back():
 
 @pytest.mark.parametrize(("length_m", "is_kept"), [(0.04, False), (0.06, True)])
 def test_a_wall_shorter_than_its_ends_are_known_is_none(length_m, is_kept):
-    walls, pose, face = Walls(), [0.8, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
+    walls, pose, face = Landmarks(*SETTINGS), [0.8, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
     scan = scan_of([face], pose)
     segments = extract(scan)
     assert len(segments) == 1
     segments.ends[0, :, 1] = [-0.5 * length_m, 0.5 * length_m]
     nothing = np.zeros(0, dtype=np.int64)
-    forgotten = walls.see(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64), nothing)
+    forgotten = walls.observe(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64), nothing).forgotten
     assert forgotten.tolist() == ([] if is_kept else [0])

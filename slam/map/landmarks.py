@@ -1,0 +1,71 @@
+"""All that is known of the walls of one map beside their lines: observed, merged and removed in one place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from ..estimation.backend import Belief
+from ..extraction.segments import Segments
+from ..geometry.lines import directions
+from ..robot import Scan
+from .chains import ChainConfig
+from .change_points import Kinks, KinksConfig
+from .extents import Extents, WallsConfig
+from .openings import Gaps, GapsConfig
+from .records import Records
+from .reliability import Firmness
+from .stochastic_map import StochasticMap
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What one scan says of the walls."""
+
+    owners: Int[np.ndarray, " s"]
+    """For each segment the id of its wall, -1 for none."""
+    forgotten: Int[np.ndarray, " f"]
+    """Ids of walls that are not worth keeping; their records have ended."""
+
+
+class Landmarks:
+    """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
+
+    def __init__(self, walls: WallsConfig, kinks: KinksConfig, gaps: GapsConfig, chains: ChainConfig) -> None:
+        self.records = Records()
+        self.extents = Extents(walls, self.records)
+        self.reliability = Firmness(walls.firmness, self.records)
+        self.change_points = Kinks(kinks, self.records)
+        self.openings = Gaps(gaps, chains, self.records)
+
+    def map(self, belief: Belief) -> StochasticMap:
+        """Return the belief together with what is known of its walls."""
+        return self.extents.map(belief, self.reliability.are_crooked(self.records.ids))
+
+    def observe(
+        self,
+        belief: Belief,
+        scan: Scan,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        believed: Int[np.ndarray, " b"],
+    ) -> Observed:
+        """Take in one scan, of which `owners` holds the wall of each segment, those of new walls among them.
+
+        `believed` are ids of walls that were seen often before they became walls.
+        """
+        self.records.rows(belief.ids)
+        self.reliability.see(segments, owners, belief.pose_world)
+        forgotten = self.extents.see(belief, scan, segments, owners, believed)
+        self.records.remove(forgotten)
+        return Observed(np.where(np.isin(owners, forgotten), -1, owners), forgotten)
+
+    def merge(self, belief: Belief, keep: int, drop: int) -> None:
+        """Make one record of two walls that are one; call it before the back end merges them."""
+        row, other = belief.rows([keep, drop])
+        shift = directions(belief.means[row, 0]) @ (belief.anchors[other] - belief.anchors[row])
+        self.records.merge(keep, drop, float(shift))
+
+    def remove(self, ids: Int[np.ndarray, " n"]) -> None:
+        """End the records of walls that are none."""
+        self.records.remove(ids)

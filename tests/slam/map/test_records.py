@@ -1,0 +1,159 @@
+"""One record of a wall: begun, merged and removed at random, no evidence is lost and none is left behind."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slam.estimation.backend import Belief, Joint
+from slam.extraction.segments import EndKind, Segments
+from slam.geometry.lines import directions, normals
+from slam.map.chains import ChainConfig
+from slam.map.change_points import KinksConfig
+from slam.map.extents import WallsConfig
+from slam.map.landmarks import Landmarks
+from slam.map.openings import GapsConfig
+from slam.map.records import Records
+from slam.map.reliability import Firmness
+
+SETTINGS = (WallsConfig(), KinksConfig(), GapsConfig(), ChainConfig())
+SUMS = ("sightings", "fits")
+"""Columns that add up over mergers, whatever walls were merged."""
+
+
+def observed(landmarks, ids, rng):
+    """Give each of these walls evidence of every kind, as observations would."""
+    columns, rows = landmarks.records.columns, landmarks.records.rows(np.asarray(ids))
+    columns["sightings"][rows] += rng.integers(1, 5, len(rows))
+    columns["fits"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2))
+    columns["directions"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2, 2))
+    columns["first"][rows] = rng.uniform(-1.0, 1.0, (len(rows), 3))
+    middle = rng.uniform(-2.0, 2.0, len(rows))
+    columns["extents"][rows] = np.column_stack([middle - 0.5, middle + 0.5])
+    for row in rows.tolist():
+        landmarks.change_points._add_to(row, int(rng.integers(-9, 9)), rng.uniform(size=(2, int(rng.integers(1, 6)))))
+
+
+def totals(landmarks):
+    """What must not change when walls are merged."""
+    columns = landmarks.records.columns
+    turns = [turn[1].sum(axis=1) for turn in columns["turns"] if turn is not None]
+    return np.concatenate(
+        [
+            *(np.atleast_1d(columns[name].sum(axis=0)) for name in SUMS),
+            columns["directions"][..., 0].sum(axis=0),
+            np.sum(turns, axis=0) if turns else np.zeros(2),
+        ]
+    )
+
+
+def mentioned(landmarks):
+    """All ids that any pair names."""
+    return {one for pairs in landmarks.records.pairs.values() for pair in pairs for one in pair}
+
+
+DOINGS = ("begin", "merge", "remove", "observe", "relate")
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    doings=st.lists(st.sampled_from(["begin", "merge", "remove", "observe", "relate"]), max_size=40),
+)
+def test_no_evidence_is_lost_or_left_behind(seed, doings):
+    landmarks, rng = Landmarks(*SETTINGS), np.random.default_rng(seed)
+    alive, newest, ended = [], 0, set()
+    for doing in doings:
+        before = totals(landmarks)
+        if doing == "begin":
+            fresh = [newest + 1, newest + 3]
+            newest += 3
+            observed(landmarks, fresh, rng)
+            alive += fresh
+        elif doing == "observe" and alive:
+            observed(landmarks, rng.choice(alive, min(2, len(alive)), replace=False), rng)
+        elif doing == "relate" and len(alive) > 1:
+            one, other = map(int, rng.choice(alive, 2, replace=False))
+            landmarks.change_points.keep_apart(one, other)
+            landmarks.openings.passed.add((one, other))
+            landmarks.openings.cut_off.add((other, one))
+        elif doing == "merge" and len(alive) > 1:
+            keep, drop = map(int, rng.choice(alive, 2, replace=False))
+            related = {other for pair in landmarks.openings.passed for other in pair if drop in pair} - {keep, drop}
+            landmarks.records.merge(keep, drop, float(rng.uniform(-2.0, 2.0)))
+            alive.remove(drop)
+            ended.add(drop)
+            np.testing.assert_allclose(totals(landmarks), before)
+            assert all({(keep, one), (one, keep)} & landmarks.openings.passed for one in related)
+        elif doing == "remove" and alive:
+            gone = int(rng.choice(alive))
+            landmarks.remove(np.array([gone]))
+            alive.remove(gone)
+            ended.add(gone)
+        assert landmarks.records.ids.tolist() == sorted(alive)
+        assert all(len(column) == len(alive) for column in landmarks.records.columns.values())
+        assert not mentioned(landmarks) & ended
+    for one in ended:
+        # An id is never used again, but if it were its record would be that of a new wall.
+        row = landmarks.records.rows(np.array([one]))[0]
+        assert landmarks.records.columns["sightings"][row] == 0
+        assert landmarks.records.columns["turns"][row] is None
+
+
+def test_a_wall_merged_has_the_extent_of_both_along_the_kept_one():
+    landmarks = Landmarks(*SETTINGS)
+    landmarks.records.rows(np.array([3, 5]))
+    landmarks.records.columns["extents"][:] = [[-1.0, 0.5], [-0.2, 2.0]]
+    anchors, means = np.array([[1.0, 4.0], [1.0, 3.0]]), np.zeros((2, 2))
+    belief = Belief(
+        np.zeros(3), np.eye(3), np.array([3, 5]), anchors, means, lambda ids: Joint(np.zeros(7), np.eye(7), anchors)
+    )
+    landmarks.merge(belief, 3, 5)
+    # The second anchor lies a metre behind the first: t = J n(0) = (0, 1).
+    assert landmarks.records.columns["extents"].tolist() == [[-1.2, 1.0]]
+
+
+def observations(rng, count, turn_rad=0.0):
+    """Clear observations of pieces of one wall, 2 m ahead of the origin, told to a milliradian."""
+    alpha, along = turn_rad + rng.normal(0.0, 1e-3, count), rng.uniform(-2.0, 2.0, count)
+    foot, t = 2.0 * normals(alpha), directions(alpha)
+    ends = foot[:, None] + (along[:, None] + [-0.2, 0.2])[..., None] * t[:, None]
+    return Segments(
+        lines=np.column_stack([alpha, np.full(count, 2.0)]),
+        cov=np.tile(1e-6 * np.eye(2), (count, 1, 1)),
+        ends=ends,
+        beams=np.column_stack([np.arange(count), np.arange(count) + 8]),
+        beam_counts=np.full(count, 9),
+        end_kinds=np.full((count, 2), EndKind.CORNER, dtype=np.int64),
+        chi2=rng.chisquare(7, count),
+        is_tentative=np.zeros(count, dtype=bool),
+    )
+
+
+def test_the_reliability_of_a_merged_wall_is_that_of_one_that_made_all_observations():
+    rng = np.random.default_rng(5)
+    first, second = observations(rng, 12), observations(rng, 15)
+    apart, together = Records(), Records()
+    split, whole = Firmness(records=apart), Firmness(records=together)
+    for segments, owner in ((first, 0), (second, 1)):
+        for k in range(len(segments)):
+            split.see(segments.take(np.array([k])), np.array([owner]), np.zeros(3))
+            whole.see(segments.take(np.array([k])), np.array([0]), np.zeros(3))
+    apart.merge(0, 1, 0.0)
+    for name in ("fits", "directions", "along"):
+        scale = np.abs(together.columns[name]).max()
+        # To second order in the milliradians between the first observations of the two.
+        np.testing.assert_allclose(apart.columns[name], together.columns[name], atol=1e-5 * scale)
+    assert apart.columns["crooked"].tolist() == together.columns["crooked"].tolist()
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.05])
+def test_two_straight_walls_merged_are_one_crooked_wall_only_if_they_turn(turn_rad):
+    rng, records = np.random.default_rng(6), Records()
+    firmness = Firmness(records=records)
+    for wall, turn in ((0, 0.0), (1, turn_rad)):
+        firmness.see(observations(rng, 30, turn), np.full(30, wall), np.zeros(3))
+    assert not firmness.are_crooked(np.array([0, 1])).any()
+    records.columns["first"][1, 1:] += [0.0, 8.0]  # the second lies 8 m on
+    records.merge(0, 1, 0.0)
+    assert firmness.are_crooked(np.array([0])).tolist() == [turn_rad > 0.0]
