@@ -17,8 +17,8 @@ from .outcome import Outcome
 from .planning.driving_field import DrivingField
 from .planning.paths import PathConfig
 from .step import Step
-from .survey.frontiers import unseen_borders
-from .survey.unmapped_obstacles import unexplained
+from .survey.frontiers import frontiers
+from .survey.unmapped_obstacles import unmapped_obstacles
 
 WALL_FRINGE_M = 0.1
 """Floor this near to a closed contour counts as seen: two cells, into which walls and their errors reach."""
@@ -51,7 +51,7 @@ class LeftOpen:
 
 
 @dataclass(frozen=True)
-class LeftUnseen:
+class LeftFrontier:
     """A border between floor that can be driven to and floor that was never seen."""
 
     cells_world: Float[np.ndarray, "n 2"]
@@ -61,7 +61,7 @@ class LeftUnseen:
 
 
 @dataclass(frozen=True)
-class LeftUnexplained:
+class LeftObstacle:
     """Something that stopped beams and is no wall of the map."""
 
     cells_world: Float[np.ndarray, "n 2"]
@@ -76,16 +76,16 @@ class Certificate:
     outcome: Outcome
     contours: tuple[ClosedContour, ...]
     open_ends: tuple[LeftOpen, ...]
-    unseen: tuple[LeftUnseen, ...] | None
+    frontiers: tuple[LeftFrontier, ...] | None
     """None where nobody kept the free space (a recorded robot)."""
-    unexplained: tuple[LeftUnexplained, ...] | None
-    """None as `unseen`."""
+    obstacles: tuple[LeftObstacle, ...] | None
+    """None as `frontiers`."""
     floor_m2: float
     """Area inside the closed rooms, without their islands; 0 where no room is closed."""
     unseen_m2: float | None
-    """What of it no scan has seen, the fringe of the walls left out; None where no room is closed, or as `unseen`."""
+    """What of it no scan has seen, the fringe of the walls left out; None without a closed room, or as `frontiers`."""
     reachable_way: float | None
-    """Share of the places where the robot believes to have been that it could drive to again; None as `unseen`. Well
+    """Share of the places where the robot believes to have been that it could drive to again; None as `frontiers`. Well
     below 1 it has locked itself in, or its map has come to contradict the way that it took."""
 
 
@@ -104,8 +104,8 @@ def certify(
         outcome,
         found,
         left_open(step, outcome),
-        left_unseen(step, paths, sweep) if kept else None,
-        left_unexplained(step, sweep) if kept else None,
+        left_frontiers(step, paths, sweep) if kept else None,
+        left_obstacles(step, sweep) if kept else None,
         float(floor.area),
         unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
         reachable_way(step, paths, way_world) if kept else None,
@@ -162,13 +162,13 @@ def left_open(step: Step, outcome: Outcome) -> tuple[LeftOpen, ...]:
     )
 
 
-def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen, ...]:
+def left_frontiers(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftFrontier, ...]:
     """Return the borders of unseen floor that the robot can drive to, each with the reason why it is left."""
     field = DrivingField(step.free_space, step.pose_world[:2], paths)
-    borders = unseen_borders(step.free_space, field)
+    borders = frontiers(step.free_space, field)
     cell = step.free_space.config.cell_m
     return tuple(
-        LeftUnseen(
+        LeftFrontier(
             border,
             len(border) * cell,
             _why_left(border, step.decision.given_up, "what lies behind was not all seen from there")
@@ -179,16 +179,16 @@ def left_unseen(step: Step, paths: PathConfig, sweep: bool) -> tuple[LeftUnseen,
     )
 
 
-def left_unexplained(step: Step, sweep: bool) -> tuple[LeftUnexplained, ...]:
+def left_obstacles(step: Step, sweep: bool) -> tuple[LeftObstacle, ...]:
     """Return what stopped beams and is no wall of the map, each with the reason why it is left."""
     return tuple(
-        LeftUnexplained(
+        LeftObstacle(
             thing,
             _why_left(thing, step.decision.given_up, "no scan from there shows a wall")
             if sweep
             else "what is no wall of the map was not to be looked at",
         )
-        for thing in unexplained(step.free_space, step.map)
+        for thing in unmapped_obstacles(step.free_space, step.map)
     )
 
 

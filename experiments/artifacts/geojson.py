@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import shapely
 
-from explore.certificate import Certificate, ClosedContour, LeftOpen, LeftUnexplained, LeftUnseen
+from explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
 from explore.step import Step
 from slam.estimation.backend import Joint
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
-from ..scoring.certificate import contour_record, open_end_record, unexplained_record, unseen_record
+from ..scoring.certificate import contour_record, frontier_record, obstacle_record, open_end_record
 from ..scoring.corners import Corner, corners
 from ..scoring.records import Log
 from .formats import stamp
@@ -40,8 +40,8 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
             *_wall_features(walls, chains, joint),
             *(_corner_feature(k, corner, joint) for k, corner in enumerate(found)),
             *(_open_end_feature(end) for end in certificate.open_ends),
-            *(_unseen_feature(border) for border in certificate.unseen or ()),
-            *(_unexplained_feature(thing) for thing in certificate.unexplained or ()),
+            *(_frontier_feature(border) for border in certificate.frontiers or ()),
+            *(_obstacle_feature(thing) for thing in certificate.obstacles or ()),
             _trajectory_feature(log),
             _start_feature(log),
         ],
@@ -109,12 +109,12 @@ def _open_end_feature(end: LeftOpen) -> dict[str, Any]:
     return _feature("Point", end.position_world, kind="open-end", **open_end_record(end))
 
 
-def _unseen_feature(border: LeftUnseen) -> dict[str, Any]:
-    return _feature("MultiPoint", border.cells_world, kind="unseen", **unseen_record(border))
+def _frontier_feature(border: LeftFrontier) -> dict[str, Any]:
+    return _feature("MultiPoint", border.cells_world, kind="unseen", **frontier_record(border))
 
 
-def _unexplained_feature(thing: LeftUnexplained) -> dict[str, Any]:
-    return _feature("MultiPoint", thing.cells_world, kind="unexplained", **unexplained_record(thing))
+def _obstacle_feature(thing: LeftObstacle) -> dict[str, Any]:
+    return _feature("MultiPoint", thing.cells_world, kind="unexplained", **obstacle_record(thing))
 
 
 def _trajectory_feature(log: Log) -> dict[str, Any]:

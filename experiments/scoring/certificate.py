@@ -4,12 +4,12 @@ from typing import Any
 
 import shapely
 
-from explore.certificate import Certificate, ClosedContour, LeftOpen, LeftUnexplained, LeftUnseen
+from explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
     """Return a certificate as it stands in summary.json; areas in m^2, null where no free space was kept."""
-    unseen = certificate.unseen
+    unseen = certificate.frontiers
     return {
         "outcome": str(certificate.outcome),
         "contours": [
@@ -21,12 +21,12 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         ],
         "unseen_borders": None
         if unseen is None
-        else [{**unseen_record(border), "position_m": border.cells_world.mean(axis=0).tolist()} for border in unseen],
+        else [{**frontier_record(border), "position_m": border.cells_world.mean(axis=0).tolist()} for border in unseen],
         "unexplained": None
-        if certificate.unexplained is None
+        if certificate.obstacles is None
         else [
-            {**unexplained_record(thing), "position_m": thing.cells_world.mean(axis=0).tolist()}
-            for thing in certificate.unexplained
+            {**obstacle_record(thing), "position_m": thing.cells_world.mean(axis=0).tolist()}
+            for thing in certificate.obstacles
         ],
         "floor_m2": certificate.floor_m2,
         "unseen_m2": certificate.unseen_m2,
@@ -49,11 +49,11 @@ def open_end_record(end: LeftOpen) -> dict[str, Any]:
     return {"wall": end.wall, "side": end.side, "why": end.why}
 
 
-def unseen_record(border: LeftUnseen) -> dict[str, Any]:
+def frontier_record(border: LeftFrontier) -> dict[str, Any]:
     """Return what is said of one border of unseen floor besides its place."""
     return {"length_m": border.length_m, "why": border.why}
 
 
-def unexplained_record(thing: LeftUnexplained) -> dict[str, Any]:
+def obstacle_record(thing: LeftObstacle) -> dict[str, Any]:
     """Return what is said of something that is no wall of the map besides its place."""
     return {"cells": len(thing.cells_world), "why": thing.why}

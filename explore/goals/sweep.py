@@ -8,8 +8,8 @@ from numpy import ndarray
 
 from ..planning.driving_field import NEAR_M
 from ..strategies import Choice, Place, Situation
-from ..strategies.nearest import nearest_seen_from, nearest_unexplained, nearest_unseen
-from ..survey.coastal_viewpoints import look_outs_on_coast
+from ..strategies.nearest import nearest_frontier, nearest_unmapped_obstacle, nearest_viewpoint
+from ..survey.coastal_viewpoints import coastal_viewpoints
 from ..survey.frontiers import pieces
 from ..survey.trusted_walls import TrustedWalls
 from .ledger import Event, Ledger
@@ -49,23 +49,24 @@ class Sweep:
         Floor out of sight of the walls is looked at from where there are some in sight first.
         """
         if not len(situation.map):
-            return nearest_unseen(situation, "no wall is in sight yet")
+            return nearest_frontier(situation, "no wall is in sight yet")
         if not self._is_on:
             return None
         why = "every chain is done, unseen floor is left"
-        unseen = (
-            nearest_seen_from(situation, self._beside_walls(situation, only_near=True), why, NEAR_M)
-            or nearest_seen_from(situation, self._beside_walls(situation, only_near=False), why)
-            or nearest_unseen(situation, why)
+        frontier = (
+            nearest_viewpoint(situation, self._beside_walls(situation, only_near=True), why, NEAR_M)
+            or nearest_viewpoint(situation, self._beside_walls(situation, only_near=False), why)
+            or nearest_frontier(situation, why)
         )
-        return unseen or nearest_unexplained(situation, "every chain is done, things stand that are no wall of the map")
+        things = "every chain is done, things stand that are no wall of the map"
+        return frontier or nearest_unmapped_obstacle(situation, things)
 
     def _beside_walls(self, situation: Situation, *, only_near: bool) -> dict[Place, Place]:
         """Return where to go with walls in sight, each with the unseen floor that is seen from there."""
         floor, coast_m = situation.around.free_space, situation.following.paths.coast_m
         reach_m = self._config.reach * situation.around.scan.range_max_m
         walls, found = TrustedWalls(situation.map), {}
-        for place in situation.unseen_near if only_near else situation.unseen:
+        for place in situation.frontiers_near if only_near else situation.frontiers:
             if np.all(walls.near(place.points_world, coast_m)):
                 found[place] = place
                 continue
@@ -73,7 +74,7 @@ class Sweep:
                 middle = tile.mean(axis=0)
                 if self._ledger.count(Event.VIEWED, middle):
                     continue
-                spots = look_outs_on_coast(middle, walls, coast_m, reach_m, floor, situation.field, only_near=only_near)
+                spots = coastal_viewpoints(middle, walls, coast_m, reach_m, floor, situation.field, only_near=only_near)
                 if len(spots):
                     found[Place(spots, place.what, place.kind, middle)] = Place(tile, place.what)
         return found

@@ -1,6 +1,6 @@
 """The classical baseline: borders between seen and unseen floor instead of open ends of walls (paper, section 1)."""
 
-from .nearest import nearest_unseen
+from .nearest import nearest_frontier
 from .nearest_robot import NearestRobot
 from .strategy import Choice, Situation
 
@@ -13,7 +13,7 @@ class Frontier:
 
     def choose(self, situation: Situation) -> Choice | None:
         """Return the nearest border by driving distance, else the nearest open end."""
-        choice = nearest_unseen(situation, "frontier")
+        choice = nearest_frontier(situation, "frontier")
         if choice is not None:
             return choice
         end = self._ends.choose(situation)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from ..following.wall_following import Surroundings
 from ..survey.frontiers import borders_on_unseen
-from ..survey.unmapped_obstacles import is_explained
+from ..survey.unmapped_obstacles import is_mapped
 from .strategy import Choice, Place, Situation
 
 
@@ -41,22 +41,22 @@ def nearest_place(
     return (places[best], float(nearest[best])) if is_there else None
 
 
-def nearest_unseen(situation: Situation, what: str) -> Choice | None:
+def nearest_frontier(situation: Situation, what: str) -> Choice | None:
     """Return the nearest border of seen floor, as a goal for as long as half of it still borders on unseen floor."""
-    return _nearest(situation, situation.unseen, f"{what}: nearest of {{}} borders of seen floor", _still_unseen)
+    return _nearest(situation, situation.frontiers, f"{what}: nearest of {{}} borders of seen floor", _still_frontier)
 
 
-def nearest_seen_from(
+def nearest_viewpoint(
     situation: Situation, seen: Mapping[Place, Place], what: str, within_m: float = np.inf
 ) -> Choice | None:
     """Return the nearest place from which another is seen, as a goal while half of that borders on unseen floor."""
     words = f"{what}: in sight of walls, nearest of {{}}"
-    return _nearest(situation, list(seen), words, lambda stand: _still_unseen(seen[stand]), within_m)
+    return _nearest(situation, list(seen), words, lambda stand: _still_frontier(seen[stand]), within_m)
 
 
-def nearest_unexplained(situation: Situation, what: str) -> Choice | None:
+def nearest_unmapped_obstacle(situation: Situation, what: str) -> Choice | None:
     """Return the nearest thing that is no wall of the map, as a goal until a wall stands there."""
-    return _nearest(situation, situation.unexplained, f"{what}: nearest of {{}}", _still_unexplained)
+    return _nearest(situation, situation.unmapped_obstacles, f"{what}: nearest of {{}}", _still_unmapped)
 
 
 def _nearest(
@@ -74,9 +74,9 @@ def _nearest(
     return Choice(place, f"{words.format(len(places))}, {metres:.1f} m to drive", holds(place))
 
 
-def _still_unexplained(place: Place) -> Callable[[Surroundings], bool]:
-    return lambda around: not is_explained(around.walls, place.centre_world)
+def _still_unmapped(place: Place) -> Callable[[Surroundings], bool]:
+    return lambda around: not is_mapped(around.walls, place.centre_world)
 
 
-def _still_unseen(place: Place) -> Callable[[Surroundings], bool]:
+def _still_frontier(place: Place) -> Callable[[Surroundings], bool]:
     return lambda around: bool(np.mean(borders_on_unseen(around.free_space, place.points_world)) >= 0.5)

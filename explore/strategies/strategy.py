@@ -17,8 +17,8 @@ from slam.map.stochastic_map import StochasticMap
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..planning.driving_field import DrivingField
 from ..planning.visibility_graph import followed_wall
-from ..survey.frontiers import LEAST_CELLS, pieces, unseen_borders
-from ..survey.unmapped_obstacles import look_outs, unexplained
+from ..survey.frontiers import LEAST_CELLS, frontiers, pieces
+from ..survey.unmapped_obstacles import obstacle_viewpoints, unmapped_obstacles
 from ..survey.viewpoints import ideal_places
 
 
@@ -93,14 +93,14 @@ class Situation:
         return metres.reshape(-1, 2).min(axis=1)
 
     @cached_property
-    def unseen(self) -> tuple[Place, ...]:
-        """The borders between floor that can be driven to and floor that was never seen, the useless ones left out."""
-        return self._places(unseen_borders(self.around.free_space, self.field))
+    def frontiers(self) -> tuple[Place, ...]:
+        """The frontiers between floor that can be driven to and floor never seen, the useless ones left out."""
+        return self._places(frontiers(self.around.free_space, self.field))
 
     @cached_property
-    def unseen_near(self) -> tuple[Place, ...]:
-        """Pieces of those borders that lie near to the robot: a fraction of the cost in a large building."""
-        borders = unseen_borders(self.around.free_space, self.field, only_near=True)
+    def frontiers_near(self) -> tuple[Place, ...]:
+        """Pieces of those frontiers that lie near to the robot: a fraction of the cost in a large building."""
+        borders = frontiers(self.around.free_space, self.field, only_near=True)
         return self._places([piece for border in borders for piece in pieces(border) if len(piece) >= LEAST_CELLS])
 
     def _places(self, borders: list[np.ndarray]) -> tuple[Place, ...]:
@@ -108,11 +108,11 @@ class Situation:
         return tuple(place for place in places if not self.was_in_vain(place.centre_world))
 
     @cached_property
-    def unexplained(self) -> tuple[Place, ...]:
+    def unmapped_obstacles(self) -> tuple[Place, ...]:
         """Where to stand before each thing that stopped beams and is no wall of the map, the useless ones left out."""
         floor = self.around.free_space
-        things = [thing for thing in unexplained(floor, self.map) if not self.was_in_vain(thing.mean(axis=0))]
-        places = [(look_outs(thing, self.field), thing) for thing in things]
+        things = [thing for thing in unmapped_obstacles(floor, self.map) if not self.was_in_vain(thing.mean(axis=0))]
+        places = [(obstacle_viewpoints(thing, self.field), thing) for thing in things]
         what = "something stands that is no wall of the map"
         return tuple(Place(spots, what, "unexplained", thing.mean(axis=0)) for spots, thing in places if len(spots))
 

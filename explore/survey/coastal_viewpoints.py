@@ -14,7 +14,7 @@ NEARLY_M = 0.3
 """Of the places that see a piece of border, those not farther from it than the nearest and this much."""
 
 
-def look_outs_on_coast(
+def coastal_viewpoints(
     place_world: Float[np.ndarray, "2"],
     walls: TrustedWalls,
     coast_m: float,

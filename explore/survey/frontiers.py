@@ -16,9 +16,7 @@ PIECE_M = 1.5
 """Side of the squares that cut a border into pieces."""
 
 
-def unseen_borders(
-    free_space: FreeSpace, field: DrivingField, *, only_near: bool = False
-) -> list[Float[np.ndarray, "n 2"]]:
+def frontiers(free_space: FreeSpace, field: DrivingField, *, only_near: bool = False) -> list[Float[np.ndarray, "n 2"]]:
     """Return the borders between reachable floor and unseen floor, each as the reachable cells' centres, m.
 
     Borders of fewer than `LEAST_CELLS` cells are left out. With `only_near`, what of them lies near to the start of the

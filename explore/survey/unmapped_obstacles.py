@@ -20,19 +20,19 @@ LOOK_M = (0.6, 0.9)
 """From so far away, faces of a decimetre show beams enough."""
 
 
-def unexplained(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
+def unmapped_obstacles(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
     """Return what was hit and belongs to no wall of the map that is trusted, each as the cells' centres, m."""
     cells = np.argwhere(free_space.evidence > 0)
     things = connected(cells[~TrustedWalls(walls).near(free_space.points(cells), APART_M)], TOGETHER_CELLS)
     return [free_space.points(thing) for thing in things if len(thing) >= LEAST_CELLS]
 
 
-def look_outs(thing_world: Float[np.ndarray, "n 2"], field: DrivingField) -> Float[np.ndarray, "m 2"]:
+def obstacle_viewpoints(thing_world: Float[np.ndarray, "n 2"], field: DrivingField) -> Float[np.ndarray, "m 2"]:
     """Return where the robot can stand to look at a thing from nearby, m; the thing is given as points of it."""
     places = field.stands_around(thing_world, np.array(LOOK_M))
     return places[cKDTree(thing_world).query(places)[0] > LOOK_M[0] - 1e-6]
 
 
-def is_explained(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:
+def is_mapped(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:
     """Return whether a trusted wall of the map stands at a place."""
     return bool(TrustedWalls(walls).near(place_world[None], APART_M)[0])

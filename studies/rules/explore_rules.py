@@ -99,8 +99,7 @@ EXPLORER = (
     Switch("sweep.coast", "explore.goals.sweep", "if «np.all(walls.near(place.points_world, coast_m))»:",
            "True", "unseen floor far from walls is looked at from beside walls"),
     Switch("sweep.unexplained", "explore.goals.sweep",
-           "return unseen or «nearest_unexplained("
-           "situation, \"every chain is done, things stand that are no wall of the map\")»",
+           "return frontier or «nearest_unmapped_obstacle(situation, things)»",
            "None", "what is no wall of the map is looked at"),
     Switch("floor_memory.redrawn", "explore.floor.floor_memory",
            "if not np.any(«moved > self._config.moved_m»):",

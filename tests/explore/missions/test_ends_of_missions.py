@@ -98,8 +98,8 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
     assert all(contour.polygon.is_valid for contour in certificate.contours)
     assert certificate.floor_m2 == pytest.approx(ROOM.area, abs=0.05)
     assert certificate.open_ends == ()
-    assert certificate.unseen == ()
-    assert certificate.unexplained == ()
+    assert certificate.frontiers == ()
+    assert certificate.obstacles == ()
     assert certificate.unseen_m2 == pytest.approx(0.0, abs=0.02)
 
 
@@ -130,16 +130,16 @@ def test_what_a_stopped_mission_has_not_seen_yet_is_told():
     certificate = certify(last, last.outcome, PathConfig(), True, WAY)
     assert {end.why for end in certificate.open_ends} == {"not explored yet"}
     assert len(certificate.open_ends) == sum(len(chain.open_ends) for chain in last.chains) > 0
-    assert certificate.unseen
-    assert {border.why for border in certificate.unseen} == {"not visited yet"}
-    assert all(border.length_m >= 0.2 for border in certificate.unseen)
+    assert certificate.frontiers
+    assert {border.why for border in certificate.frontiers} == {"not visited yet"}
+    assert all(border.length_m >= 0.2 for border in certificate.frontiers)
 
 
 @pytest.mark.usefixtures("_unchecked")
 def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
     mission, _ = steps()
     *_, last = limited(mission, Limits(steps=2))
-    borders = certify(last, last.outcome, PathConfig(), True, WAY).unseen
+    borders = certify(last, last.outcome, PathConfig(), True, WAY).frontiers
     assert borders
     near, far = borders[0].cells_world.mean(axis=0), borders[0].cells_world.mean(axis=0) + 5.0
     for troubles, words in (
@@ -149,9 +149,9 @@ def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
     ):
         left = tuple(LeftPlace(place, trouble) for place, trouble in troubles)
         certificate = certify(leaving(last, left), last.outcome, PathConfig(), True, WAY)
-        assert words in certificate.unseen[0].why
+        assert words in certificate.frontiers[0].why
     without = certify(leaving(last, left), last.outcome, PathConfig(), False, WAY)
-    assert {border.why for border in without.unseen} == {"unseen floor was not to be visited"}
+    assert {border.why for border in without.frontiers} == {"unseen floor was not to be visited"}
 
 
 @pytest.mark.usefixtures("_unchecked")
@@ -170,7 +170,7 @@ def test_what_stands_and_is_no_wall_of_the_map_is_told():
         ([""], False, "was not to be looked at"),
     ):
         left = tuple(LeftPlace(lonely, trouble) for trouble in troubles)
-        (thing,) = certify(leaving(last, left), last.outcome, PathConfig(), sweep, WAY).unexplained
+        (thing,) = certify(leaving(last, left), last.outcome, PathConfig(), sweep, WAY).obstacles
         assert len(thing.cells_world) == 3
         assert words in thing.why
 

@@ -25,10 +25,10 @@ def test_borders_are_where_floor_that_can_be_driven_to_meets_unseen_floor(scene_
     """Brute force by dilation of the unknown floor; borders of fewer than four cells are left out."""
     scene, situation = glimpsed(scene_of, look, seed)
     beside = np.argwhere(binary_dilation(scene.grid.evidence == 0))
-    cells = {tuple(c) for place in situation.unseen for c in scene.grid.cells(place.points_world).tolist()}
+    cells = {tuple(c) for place in situation.frontiers for c in scene.grid.cells(place.points_world).tolist()}
     every = {tuple(c) for c in beside[situation.field.can_stay(beside)].tolist()}
     assert cells <= every
-    assert len(every - cells) < 4 * max(len(situation.unseen), 1)
+    assert len(every - cells) < 4 * max(len(situation.frontiers), 1)
     assert cells
 
 
@@ -38,7 +38,7 @@ def test_a_frontier_is_chosen_before_any_open_end_and_holds_until_it_is_seen(sce
     choice = Frontier().choose(situation)
     assert isinstance(choice.target, Place)
     assert choice.holds(situation.around)
-    metres = [situation.field.metres(place.points_world).min() for place in situation.unseen]
+    metres = [situation.field.metres(place.points_world).min() for place in situation.frontiers]
     assert situation.field.metres(choice.target.points_world).min() == min(metres)
     look(scene, scene.places)
     assert not choice.holds(situation.around)
@@ -48,7 +48,7 @@ def test_a_frontier_is_chosen_before_any_open_end_and_holds_until_it_is_seen(sce
 def test_when_no_frontier_is_left_the_open_ends_follow_nearest_first(scene_of, seed):
     scene = scene_of(seed)
     situation = scene.situation(np.append(scene.places[0], 0.0), [(0, 1), (2,)])
-    situation.__dict__["unseen"] = ()
+    situation.__dict__["frontiers"] = ()
     choice, nearest = Frontier().choose(situation), NearestRobot().choose(situation)
     assert (choice is None) == (nearest is None) == (not np.isfinite(situation.end_metres).any())
     if choice is None:
@@ -59,5 +59,5 @@ def test_when_no_frontier_is_left_the_open_ends_follow_nearest_first(scene_of, s
 
 def test_borders_that_were_visited_in_vain_are_no_goals(scene_of, look):
     _, situation = glimpsed(scene_of, look, 0)
-    assert situation.unseen
-    assert replace(situation, was_in_vain=lambda place: True).unseen == ()
+    assert situation.frontiers
+    assert replace(situation, was_in_vain=lambda place: True).frontiers == ()

@@ -12,8 +12,8 @@ from explore.limits import Limits, limited
 from explore.mission import explore_mission
 from explore.planning.driving_field import DrivingField
 from explore.strategies import STRATEGIES
-from explore.survey.coastal_viewpoints import look_outs_on_coast
-from explore.survey.frontiers import PIECE_M, pieces, unseen_borders
+from explore.survey.coastal_viewpoints import coastal_viewpoints
+from explore.survey.frontiers import PIECE_M, frontiers, pieces
 from explore.survey.trusted_walls import TrustedWalls
 from sim.robot import SimulatedRobot
 from sim.worlds import World
@@ -37,10 +37,10 @@ def test_the_places_have_walls_near_see_the_floor_and_can_be_driven_to(hall):
     walls = TrustedWalls(hall.walls(pose))
     field = DrivingField(hall.grid, start, hall.situation(pose, []).following.paths)
     count = 0
-    for border in unseen_borders(hall.grid, field):
+    for border in frontiers(hall.grid, field):
         assert not walls.near(border, COAST_M).any(), "from beside the walls all floor near them was seen"
         for tile in pieces(border):
-            places = look_outs_on_coast(tile.mean(axis=0), walls, COAST_M, REACH_M, hall.grid, field)
+            places = coastal_viewpoints(tile.mean(axis=0), walls, COAST_M, REACH_M, hall.grid, field)
             count += len(places)
             assert len(places), "every piece of this border shows from the coast"
             assert np.all(distance_to_segments(places, hall.faces).min(axis=1) <= COAST_M)

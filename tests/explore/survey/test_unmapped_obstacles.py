@@ -8,7 +8,7 @@ import pytest
 from explore.goals.ledger import Ledger
 from explore.goals.sweep import Sweep, SweepConfig
 from explore.planning.driving_field import DrivingField
-from explore.survey.unmapped_obstacles import APART_M, LOOK_M, is_explained, look_outs, unexplained
+from explore.survey.unmapped_obstacles import APART_M, LOOK_M, is_mapped, obstacle_viewpoints, unmapped_obstacles
 from slam.geometry.lines import distance_to_segments
 
 
@@ -25,14 +25,14 @@ def without_some(scene, rng):
 def test_what_is_found_was_hit_and_is_no_wall_of_the_map(scene_of, seed):
     whole, rng = scene_of(seed), np.random.default_rng(seed)
     pose = np.append(whole.places[0], 0.0)
-    assert not unexplained(whole.grid, whole.walls(pose)), "all that was hit is a wall of the map"
+    assert not unmapped_obstacles(whole.grid, whole.walls(pose)), "all that was hit is a wall of the map"
     some, gone = without_some(whole, rng)
-    things = unexplained(some.grid, some.walls(pose))
+    things = unmapped_obstacles(some.grid, some.walls(pose))
     for thing in things:
         assert np.all(distance_to_segments(thing, some.faces).min(axis=1) > APART_M - 0.06)
         assert np.all(distance_to_segments(thing, gone).min(axis=1) < 0.1)
-        assert not is_explained(some.walls(pose), thing[0])
-        assert is_explained(whole.walls(pose), thing[0])
+        assert not is_mapped(some.walls(pose), thing[0])
+        assert is_mapped(whole.walls(pose), thing[0])
     hit = some.grid.points(np.argwhere(some.grid.evidence > 0))
     alone = distance_to_segments(hit, some.faces).min(axis=1) > APART_M + 0.1
     assert bool(things) or np.count_nonzero(alone) < 3
@@ -44,8 +44,8 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
     pose = np.append(whole.places[0], 0.0)
     situation = some.situation(pose, [])
     field = DrivingField(some.grid, pose[:2], situation.following.paths)
-    (thing, *_) = unexplained(some.grid, some.walls(pose))
-    places = look_outs(thing, field)
+    (thing, *_) = unmapped_obstacles(some.grid, some.walls(pose))
+    places = obstacle_viewpoints(thing, field)
     assert len(places)
     assert np.all(np.isfinite(field.metres(places)))
     nearest = np.hypot(*np.moveaxis(places[:, None] - thing, -1, 0)).min(axis=1)
@@ -64,5 +64,5 @@ def test_the_last_layer_goes_there_twice_at_most_and_only_when_it_is_on(scene_of
             break
         visits += choice.target.kind == "unexplained"
         sweep.ended(choice.target, "")
-    assert 0 < visits <= 2 * len(unexplained(some.grid, some.walls(pose)))
+    assert 0 < visits <= 2 * len(unmapped_obstacles(some.grid, some.walls(pose)))
     assert Sweep(SweepConfig(), Ledger(0.3), is_on=False).choose(some.situation(pose, [])) is None
