@@ -9,7 +9,7 @@ from slam.geometry.poses import to_robot, wrap
 from slam.robot import Odometry, Scan
 
 SCANS = 4
-"""So many scans before the present one are remembered; over so few steps the wheels slip by millimetres."""
+"""So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
 NEAR_M = 0.6
 """Returns farther off than this matter to no step from here."""
 SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
@@ -17,7 +17,7 @@ SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
 
 
 class AccumulatedReturns:
-    """Returns near the robot, kept in its frame by what the wheels report."""
+    """Returns near the robot, kept in its frame by what the odometry reports."""
 
     def __init__(self) -> None:
         self._scans: deque[Float[np.ndarray, "n 2"]] = deque(maxlen=SCANS)

@@ -94,7 +94,7 @@ class FloorMemory:
             self._last[k] = compose(back, pose), scan
 
     def last_way_world(self, pose_world: Float[np.ndarray, "3"], length_m: float) -> Float[np.ndarray, "w 2"]:
-        """Return where the wheels say that the robot drove last, m, if it now is at a pose: the last place first."""
+        """Return where the odometry says that the robot drove last, m, if it now is at a pose: the last place first."""
         way = to_world(np.array([pose[:2] for pose, _ in reversed(self._last)]).reshape(-1, 2), pose_world)
         along = np.cumsum(np.hypot(*np.diff(way, axis=0, prepend=pose_world[None, :2]).T))
         return way[along <= length_m]
@@ -112,7 +112,7 @@ class FloorMemory:
         self._take_in(walls, walls.distances_m, pose, scan)
 
     def _has_jumped(self, pose_world: Float[np.ndarray, "3"]) -> bool:
-        """Return whether the robot is not where the wheels have led it: the walls may have moved with it."""
+        """Return whether the robot is not where the odometry has led it: the walls may have moved with it."""
         if self._expected_world is None:
             return False
         moved = np.hypot(*(pose_world - self._expected_world)[:2])
@@ -134,7 +134,7 @@ class FloorMemory:
         return np.concatenate([to_world(view.way_robot, view.pose_world) for view in self._kept.values()])
 
     def begin_anew(self, walls: StochasticMap) -> None:
-        """Forget all but the last scans, and draw those where the wheels say that they were taken, seen from now."""
+        """Forget all but the last scans, and draw those where the odometry says that they were taken, seen from now."""
         self.free_space.clear()
         self._kept.clear()
         self._before_world, self._rested = None, 0

@@ -1,4 +1,4 @@
-"""What the body touched, kept in the robot's frame by what the wheels report: an obstacle whatever the scans show."""
+"""What the body touched, kept in the robot's frame by what the odometry reports: an obstacle, whatever scans show."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,8 +6,6 @@ from jaxtyping import Float
 from slam.geometry.poses import to_robot
 from slam.robot import MotionCommand, Odometry
 
-RADIUS_M = 0.2
-"""Of the body."""
 REACH_M = 0.04
 """A return this near to the body, on the side to which it moved, may be what it met."""
 KEPT_M = 1.0
@@ -17,7 +15,9 @@ KEPT_M = 1.0
 class Touches:
     """Places that the body met."""
 
-    def __init__(self) -> None:
+    def __init__(self, radius_m: float) -> None:
+        """`radius_m` is that of the body."""
+        self._radius_m = radius_m
         self._points: Float[np.ndarray, "n 2"] = np.zeros((0, 2))
         self._ahead = np.array([1.0, 0.0])
         self.is_new = False
@@ -41,11 +41,11 @@ class Touches:
         That is its front, whatever the scans show, and the nearest return on that side.
         """
         gap = np.hypot(near_robot[:, 0], near_robot[:, 1])
-        met = [RADIUS_M * self._ahead]
-        on_side = (near_robot @ self._ahead > -0.25 * gap) & (gap < RADIUS_M + REACH_M)
+        met = [self._radius_m * self._ahead]
+        on_side = (near_robot @ self._ahead > -0.25 * gap) & (gap < self._radius_m + REACH_M)
         if on_side.any():
             nearest = near_robot[on_side][int(np.argmin(gap[on_side]))]
-            met.append(RADIUS_M * nearest / max(float(np.hypot(*nearest)), 1e-9))
+            met.append(self._radius_m * nearest / max(float(np.hypot(*nearest)), 1e-9))
         self._points = np.vstack([self._points, *met])
         self.is_new = False
         return np.array(met)

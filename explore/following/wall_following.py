@@ -37,6 +37,12 @@ class FollowingConfig:
     """A gap hardly wider than the body is tried this often."""
     stall_steps: int = 60
     """An errand ends when the way to its place grew no shorter for so many steps."""
+    shorter_m: float = 0.02
+    """Shorter by less than this is no shorter: a path over cells of 0.05 m differs so much from step to step."""
+    wider_m: float = 0.01
+    """So much farther from walls the way is sought after each failure."""
+    apart_m: float = 0.12
+    """No look is made from a place this near to an earlier one."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,7 @@ class Errand(ABC):
 
     def _is_stalled(self, remaining_m: float) -> bool:
         """Take note of the way left; once it has not become shorter for long, there is no hope."""
-        if remaining_m < self._shortest_m - 0.02:
+        if remaining_m < self._shortest_m - self._config.shorter_m:
             self._shortest_m, self._stalled = remaining_m, 0
         self._stalled += 1
         self._hopeless = self._stalled > self._config.stall_steps
@@ -133,7 +139,7 @@ class Errand(ABC):
     def _planner(self, around: Surroundings, window_m: float | None) -> Planner:
         """Return a planner that keeps farther from walls after each failure."""
         paths = self._config.paths
-        margin = paths.margin_m + 0.01 * self._failures
+        margin = paths.margin_m + self._config.wider_m * self._failures
         squeeze = paths.squeeze_m if self._failures < self._config.squeezes else paths.radius_m + margin
         wider = replace(paths, margin_m=margin, squeeze_m=squeeze)
         return Planner(around.free_space, around.pose_world[:2], wider, window_m)
@@ -196,7 +202,7 @@ class EndErrand(Errand):
     def _fresh(self, places: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Keep the places that are not where an earlier look was made."""
         for visited in self._visited:
-            places = places[np.hypot(*(places - visited).T) > 0.12]
+            places = places[np.hypot(*(places - visited).T) > self._config.apart_m]
         return places
 
     def _note(self) -> bool:

@@ -46,7 +46,7 @@ class Retreat:
     def __init__(self, inner: Decider, floor: FloorMemory, config: RetreatConfig, following: FollowingConfig) -> None:
         self._inner, self._floor, self._config, self._following = inner, floor, config, following
         self._driven: list[MotionCommand] = []
-        self._touches = Touches()
+        self._touches = Touches(following.paths.radius_m)
         self._back_m, self._why = 0.0, ""
         self._step, self._rounds, self._since_m = -1, 0, np.inf
         self._was_back = False

@@ -1,4 +1,4 @@
-"""From where unseen floor amid a hall is looked at with walls in sight: beyond these only the wheels tell the way."""
+"""From where unseen floor amid a hall is seen with walls in sight: beyond these only the odometry tells the way."""
 
 import numpy as np
 from jaxtyping import Float

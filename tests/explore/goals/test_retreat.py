@@ -151,7 +151,7 @@ def test_a_robot_far_off_all_bounds_is_told_in_one_line():
 
 
 def test_the_body_met_something_in_front_and_perhaps_what_is_nearest_on_the_side_to_which_it_moved():
-    touches, near = Touches(), np.array([[0.15, 0.14], [-0.19, 0.0], [0.5, 0.0]])
+    touches, near = Touches(0.2), np.array([[0.15, 0.14], [-0.19, 0.0], [0.5, 0.0]])
     touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
     assert touches.is_new
     aside = 0.2 * near[0] / np.hypot(*near[0])

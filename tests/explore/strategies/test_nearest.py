@@ -79,5 +79,5 @@ def test_same_chain_knows_its_chain_by_the_wall_it_follows_when_its_own_wall_is_
 def test_without_open_ends_and_unseen_floor_there_is_nothing_to_choose(scene_of, name):
     scene = scene_of(2)
     situation = scene.situation(np.append(scene.places[0], 0.0), [])
-    situation.__dict__["unseen"] = ()
+    situation.__dict__["frontiers"] = ()
     assert STRATEGIES[name].make().choose(situation) is None
