@@ -18,7 +18,7 @@ POSE = 3
 SIGHTING_SIGMAS = np.array([0.005, 0.004])
 """What one look at a wall leaves open: its direction rad, its distance m."""
 DRIFT_SIGMAS = np.array([0.02, 0.02, 0.07])
-"""What each root metre of the way adds to the pose (m, m, rad): wheels that slip while walls hold the heading."""
+"""What each root metre of the way adds to the pose (m, m, rad): odometry that slips while walls hold the heading."""
 
 
 @dataclass(frozen=True)
