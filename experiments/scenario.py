@@ -14,8 +14,8 @@ from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, load
 from slam.backends import BACKENDS, BackendOptions
+from slam.config import MapperConfig
 from slam.estimation.backend import Backend
-from slam.mapper import MapperConfig
 from slam.robot import Robot
 
 from .usage import UsageError, choose

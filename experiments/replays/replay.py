@@ -24,9 +24,11 @@ from sim.logs.recorded_robot import (
 from sim.robot import TrueRecord
 from sim.worlds import World
 from slam.association.matching import match
+from slam.association.view import Matcher
 from slam.backends import BACKENDS
+from slam.config import MapperConfig
 from slam.extraction.extract import extract
-from slam.mapper import Extractor, Mapper, MapperConfig, Matcher
+from slam.mapper import Extractor, Mapper
 from slam.robot import MotionCommand, Odometry, Scan
 
 from ..artifacts.reading import fit, told

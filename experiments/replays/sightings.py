@@ -16,7 +16,7 @@ from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.extraction.visible_extent import sure_pieces
 from slam.map.reliability import Firmness, as_told
-from slam.mapper import seen_centres
+from slam.map_keeper import seen_centres
 from slam.robot import Odometry, Scan
 
 from ..scenario import P0_SIGMAS, load_world

@@ -94,6 +94,9 @@ class Observations:
     """(alpha rad, r m), alpha pointing into the wall."""
     cov: Float[np.ndarray, "m 2 2"]
 
+    def __len__(self) -> int:
+        return len(self.ids)
+
 
 @runtime_checkable
 class Backend(Protocol):

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.association.matching import KnownWalls, Matches, MatchingConfig
+from slam.association.view import Matcher
 from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
 from slam.evaluation.consistency import nis
 from slam.extraction.segments import Segments
 from slam.map.reliability import FirmnessConfig, are_clear
-from slam.mapper import Matcher
 
 
 @dataclass

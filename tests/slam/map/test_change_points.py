@@ -7,12 +7,13 @@ import pytest
 
 from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
+from slam.config import MapperConfig
 from slam.estimation.backend import Belief
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
 from slam.map.change_points import Kink, Kinks, KinksConfig, _places, _turns
 from slam.map.records import Records
-from slam.mapper import Mapper, MapperConfig
+from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 
 SIGMA_M = 0.01

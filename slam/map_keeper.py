@@ -1,0 +1,119 @@
+"""A back end's lines and the records of their walls, changed together: a wall begins, merges and ends in both."""
+
+from collections.abc import Collection
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from .association.matching import Matches
+from .config import MapperConfig
+from .estimation.backend import Backend
+from .extraction.segments import Segments
+from .map.candidates import FaintLines
+from .map.chains import Chain, connect
+from .map.landmarks import Landmarks
+from .map.merging import duplicate_of
+from .map.stochastic_map import StochasticMap
+from .map.vertices import meetings
+from .robot import Scan
+
+
+class MapKeeper:
+    """Keeps the stochastic map of one back end."""
+
+    def __init__(self, backend: Backend, config: MapperConfig) -> None:
+        self.backend = backend
+        self.config = config
+        self.landmarks = Landmarks(config.walls, config.kinks, config.gaps, config.chains)
+        self._candidates = FaintLines(config.faint)
+
+    def map(self) -> StochasticMap:
+        """Return the map as it is now."""
+        return self.landmarks.map(self.backend.belief)
+
+    def without(self, ids: Int[np.ndarray, " n"], walls: StochasticMap) -> StochasticMap:
+        """Forget walls of the map that are none, and return what is left of it."""
+        if not len(ids):
+            return walls
+        self.backend.remove(ids.tolist())
+        self.landmarks.remove(ids)
+        return self.map()
+
+    def store(
+        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+    ) -> tuple[StochasticMap, Int[np.ndarray, " s"], tuple[tuple[int, int], ...]]:
+        """Take in a scan: initialise landmarks, note what was seen of each wall, and merge what is one.
+
+        `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
+        the wall of each segment (-1 for none), and the ids (kept, dropped) of entries that were one wall.
+        """
+        owners = self._observed(scan, segments, *self._initialised(segments, matches, sides))
+        walls, merged = self._merged(owners, self._ended(scan))
+        for keep, drop in merged:
+            owners = np.where(owners == drop, keep, owners)
+        return walls, owners, merged
+
+    def connect(self, walls: StochasticMap, scan: Scan, set_aside: Collection[tuple[int, int]]) -> tuple[Chain, ...]:
+        """Return the chains of the walls, by what this scan and those before saw between them."""
+        openings = self.landmarks.openings
+        openings.see(walls, scan)
+        return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.chains)
+
+    def _initialised(
+        self, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+    ) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " b"]]:
+        """Grow the map by the segments that belong to no wall; return the wall of each segment, and those believed."""
+        owners = np.full(len(segments), -1, dtype=np.int64)
+        owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
+        owners[segments.is_tentative] = -1
+        fresh = np.setdiff1d(matches.unmatched, matches.doubtful, assume_unique=True)
+        faint, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
+        believed = faint[self._candidates.see(self.backend.belief.pose_world, segments.take(faint))]
+        fresh = np.sort(np.concatenate([fresh, believed]))
+        if len(fresh):
+            centres = seen_centres(segments, fresh)
+            owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
+        known = np.unique(owners[sides][owners[sides] >= 0])
+        if len(known) == 2:
+            self.landmarks.change_points.keep_apart(*known.tolist())
+        return owners, np.union1d(owners[believed], known)
+
+    def _observed(
+        self, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"], believed: Int[np.ndarray, " b"]
+    ) -> Int[np.ndarray, " s"]:
+        """Note what was seen of each wall, and forget those that are none; return the wall of each segment."""
+        observed = self.landmarks.observe(self.backend.belief, scan, segments, owners, believed)
+        if len(observed.forgotten):
+            self.backend.remove(observed.forgotten.tolist())
+        return observed.owners
+
+    def _ended(self, scan: Scan) -> StochasticMap:
+        """Return the map, in which the sides of a bend end where they meet."""
+        walls = self.map()
+        pairs, along = meetings(walls, scan.range_max_m, self.config.bends, self.landmarks.change_points.cut)
+        if not len(pairs):
+            return walls
+        self.landmarks.extents.meet(pairs, along)
+        return self.map()
+
+    def _merged(
+        self, owners: Int[np.ndarray, " s"], walls: StochasticMap
+    ) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
+        """Make one of two walls that lie along each other, if their joint covariance agrees; return them, too."""
+        if self.config.duplicates is None:
+            return walls, ()
+        merged: list[tuple[int, int]] = []
+        touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
+        sides = self.landmarks.change_points
+        while twice := duplicate_of(walls, touched, one_wall, self.config.duplicates, sides.cut):
+            keep, drop = twice
+            self.landmarks.merge(self.backend.belief, keep, drop)
+            self.backend.merge(keep, drop)
+            merged.append(twice)
+            walls = self.map()
+        return walls, tuple(merged)
+
+
+def seen_centres(segments: Segments, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
+    """Return the middle of each seen piece, robot frame, m."""
+    return 0.5 * (segments.ends[rows, 0] + segments.ends[rows, 1])
