@@ -21,8 +21,8 @@ from ..scoring.summary import odometry_path, pose_nees
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
-from .geojson import map_geojson
-from .occupancy import occupancy_files
+from .maps.geojson import map_geojson
+from .maps.occupancy import occupancy_files
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"

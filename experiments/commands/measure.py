@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from rich.table import Table
 
-from ..artifacts.mapped import MappedCorners, read_corners
+from ..artifacts.maps.mapped import MappedCorners, read_corners
 from ..artifacts.saved import read_config
 from ..scoring.measurements import Measured
 from ..terminal.console import plain_console

@@ -24,7 +24,7 @@ from viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, dr
 from viz.shapes import hessian_cov
 
 from ..artifacts.files import write
-from ..artifacts.map_files import read_map
+from ..artifacts.maps.map_files import read_map
 from ..artifacts.reading import UnfitError, told
 from ..artifacts.results import LOG
 from ..artifacts.run_folder import prepare

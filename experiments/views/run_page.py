@@ -9,7 +9,7 @@ import numpy as np
 from viz.figures.maps import png
 from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
-from ..artifacts.mapped import read_corners
+from ..artifacts.maps.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
 from ..artifacts.settings import differing, options_of
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options

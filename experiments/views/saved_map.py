@@ -13,7 +13,7 @@ from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
 from slam.map.stochastic_map import StochasticMap
 from viz.figures.maps import Picture
 
-from ..artifacts.map_files import read_features
+from ..artifacts.maps.map_files import read_features
 from ..artifacts.picture import over_truth
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import REMEDY, read_summary

@@ -9,7 +9,7 @@ import shapely
 import yaml
 from PIL import Image
 
-from experiments.artifacts.occupancy import occupancy_files
+from experiments.artifacts.maps.occupancy import occupancy_files
 from experiments.artifacts.results import write_results
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial

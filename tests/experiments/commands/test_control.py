@@ -19,12 +19,11 @@ from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.commands.cli import main
-from experiments.scenario import TrialConfig
+from experiments.scenario import MappingMissionConfig, TrialConfig
 from experiments.scoring.summary import TIMED
 from experiments.terminal.interrupts import first_interrupt_waits, nothing_half_built_speaks
 from experiments.usage import UsageError
 from explore.goals.explorer import ExplorerConfig
-from explore.mission import MissionConfig
 
 ROOT = Path(__file__).parents[3]
 
@@ -99,7 +98,7 @@ def test_bad_limits_and_bad_resumes_end_in_two_and_one_line(arguments, tmp_path,
 def test_settings_are_read_as_they_were_written(tmp_path):
     config = TrialConfig(
         "map.svg", "graph", seed=2**63, start=(1.0, 2.0), max_path_m=3.0,
-        mission=MissionConfig(explorer=ExplorerConfig(sweep=False), return_to_start=True),
+        mission=MappingMissionConfig(explorer=ExplorerConfig(sweep=False), return_to_start=True),
     )  # fmt: skip
     path = tmp_path / "config.json"
     said = config_record(config)

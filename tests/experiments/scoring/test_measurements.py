@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.artifacts.mapped import read_corners
+from experiments.artifacts.maps.mapped import read_corners
 from experiments.artifacts.results import write_results
 from experiments.commands.cli import main
 from experiments.scenario import TrialConfig

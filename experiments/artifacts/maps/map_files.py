@@ -8,7 +8,7 @@ import numpy as np
 from sim.logs.archive import ArchiveError
 from sim.logs.recorded_robot import MOST_M, are_covariances, within
 
-from .reading import UnfitError, fit, read_arrays, read_json, told
+from ..reading import UnfitError, fit, read_arrays, read_json, told
 
 LAYOUT = {
     "pose": "float 3",
