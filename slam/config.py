@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass, field
 
-from .association.ambiguity import TornConfig
+from .association.ambiguity import AmbiguityConfig
 from .association.matching import MatchingConfig
 from .extraction.config import ExtractionConfig
-from .map.candidates import FaintConfig
+from .map.candidates import CandidatesConfig
 from .map.chains import ChainConfig
-from .map.change_points import KinksConfig
+from .map.change_points import ChangePointsConfig
 from .map.extents import WallsConfig
-from .map.merging import DuplicatesConfig
-from .map.openings import GapsConfig
-from .map.vertices import BendsConfig
+from .map.merging import MergingConfig
+from .map.openings import OpeningsConfig
+from .map.vertices import VerticesConfig
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,12 @@ class MapperConfig:
 
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
-    bends: BendsConfig = field(default_factory=BendsConfig)
+    vertices: VerticesConfig = field(default_factory=VerticesConfig)
     chains: ChainConfig = field(default_factory=ChainConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
-    faint: FaintConfig = field(default_factory=FaintConfig)
-    gaps: GapsConfig = field(default_factory=GapsConfig)
-    torn: TornConfig = field(default_factory=TornConfig)
-    kinks: KinksConfig = field(default_factory=KinksConfig)
-    duplicates: DuplicatesConfig | None = field(default_factory=DuplicatesConfig)
+    candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
+    openings: OpeningsConfig = field(default_factory=OpeningsConfig)
+    ambiguity: AmbiguityConfig = field(default_factory=AmbiguityConfig)
+    change_points: ChangePointsConfig = field(default_factory=ChangePointsConfig)
+    merging: MergingConfig | None = field(default_factory=MergingConfig)
     """None where one wall may stand in the map twice."""

@@ -9,7 +9,7 @@ from .association.matching import Matches
 from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
-from .map.candidates import FaintLines
+from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
@@ -24,8 +24,8 @@ class MapKeeper:
     def __init__(self, backend: Backend, config: MapperConfig) -> None:
         self.backend = backend
         self.config = config
-        self.landmarks = Landmarks(config.walls, config.kinks, config.gaps, config.chains)
-        self._candidates = FaintLines(config.faint)
+        self.landmarks = Landmarks(config.walls, config.change_points, config.openings, config.chains)
+        self._candidates = LandmarkCandidates(config.candidates)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""
@@ -45,7 +45,7 @@ class MapKeeper:
         """Take in a scan: initialise landmarks, note what was seen of each wall, and merge what is one.
 
         `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
-        the wall of each segment (-1 for none), and the ids (kept, dropped) of entries that were one wall.
+        the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one wall.
         """
         owners = self._observed(scan, segments, *self._initialised(segments, matches, sides))
         walls, merged = self._merged(owners, self._ended(scan))
@@ -67,8 +67,8 @@ class MapKeeper:
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
         fresh = np.setdiff1d(matches.unmatched, matches.doubtful, assume_unique=True)
-        faint, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
-        believed = faint[self._candidates.see(self.backend.belief.pose_world, segments.take(faint))]
+        few, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
+        believed = few[self._candidates.see(self.backend.belief.pose_world, segments.take(few))]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = seen_centres(segments, fresh)
@@ -90,7 +90,7 @@ class MapKeeper:
     def _ended(self, scan: Scan) -> StochasticMap:
         """Return the map, in which the sides of a bend end where they meet."""
         walls = self.map()
-        pairs, along = meetings(walls, scan.range_max_m, self.config.bends, self.landmarks.change_points.cut)
+        pairs, along = meetings(walls, scan.range_max_m, self.config.vertices, self.landmarks.change_points.cut)
         if not len(pairs):
             return walls
         self.landmarks.extents.meet(pairs, along)
@@ -100,12 +100,12 @@ class MapKeeper:
         self, owners: Int[np.ndarray, " s"], walls: StochasticMap
     ) -> tuple[StochasticMap, tuple[tuple[int, int], ...]]:
         """Make one of two walls that lie along each other, if their joint covariance agrees; return them, too."""
-        if self.config.duplicates is None:
+        if self.config.merging is None:
             return walls, ()
         merged: list[tuple[int, int]] = []
         touched, one_wall = set(owners[owners >= 0].tolist()), self.config.matching.one_wall
         sides = self.landmarks.change_points
-        while twice := duplicate_of(walls, touched, one_wall, self.config.duplicates, sides.cut):
+        while twice := duplicate_of(walls, touched, one_wall, self.config.merging, sides.cut):
             keep, drop = twice
             self.landmarks.merge(self.backend.belief, keep, drop)
             self.backend.merge(keep, drop)

@@ -13,13 +13,13 @@ from .association.view import Matcher, View
 from .config import MapperConfig
 from .estimation.backend import Backend, Observations
 from .extraction.config import ExtractionConfig
-from .extraction.extract import NO_BENDS, extract
+from .extraction.extract import NO_VERTICES, extract
 from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map.vertices import bends_within, laid_across, mistaken
+from .map.vertices import laid_across, mistaken, vertices_within
 from .map_keeper import MapKeeper
 from .robot import Odometry, Scan
 
@@ -38,7 +38,7 @@ class MapUpdate:
     map: StochasticMap
     chains: tuple[Chain, ...]
     merged: tuple[tuple[int, int], ...]
-    """Ids (kept, dropped) of the entries that were found to be one wall."""
+    """Ids (kept, dropped) of the landmarks that were found to be one wall."""
 
 
 @runtime_checkable
@@ -46,9 +46,9 @@ class Extractor(Protocol):
     """Finds the straight segments of a scan."""
 
     def __call__(
-        self, scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS
+        self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
     ) -> Segments:
-        """Return the segments; at the bearings `bends_rad` the map knows a bend, which an oracle may know better."""
+        """Return the segments; at the bearings `vertices_rad` the map knows a bend, which an oracle may know better."""
         ...
 
 
@@ -96,7 +96,7 @@ class Mapper:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
         walls = self._keeper.map()
         segments = self._segments(scan, walls)
-        return segments, self._keeper.without(mistaken(segments, walls, self.config.bends), walls)
+        return segments, self._keeper.without(mistaken(segments, walls, self.config.vertices), walls)
 
     def _view(self, scan: Scan, segments: Segments, walls: StochasticMap) -> View:
         """Return the scan beside the walls that it can show."""
@@ -111,14 +111,14 @@ class Mapper:
 
     def _ambiguous(self, view: View, matches: Matches) -> Observations:
         """Return what can be said of segments that may be of either of two walls, where nothing else is left."""
-        found = observed_either_way(matches, view.segments, view.walls.ids, view.joint, self.config.torn)
+        found = observed_either_way(matches, view.segments, view.walls.ids, view.joint, self.config.ambiguity)
         return self._may_move(view.segments, *found)
 
     def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
         """Return those of the observations, made by the segments of these rows, that may move the estimate."""
-        firm = self._keeper.landmarks.reliability.may_move(segments.take(rows), observed.ids)
-        cov = as_told(observed.cov[firm], segments.is_tentative[rows[firm]], self.config.walls.firmness)
-        return Observations(observed.ids[firm], observed.lines[firm], cov)
+        reliable = self._keeper.landmarks.reliability.may_move(segments.take(rows), observed.ids)
+        cov = as_told(observed.cov[reliable], segments.is_tentative[rows[reliable]], self.config.walls.reliability)
+        return Observations(observed.ids[reliable], observed.lines[reliable], cov)
 
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
@@ -126,12 +126,12 @@ class Mapper:
         bends = self._bends(segments, walls)
         return self._pieces(scan, bends) if len(bends) else segments
 
-    def _pieces(self, scan: Scan, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+    def _pieces(self, scan: Scan, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES) -> Segments:
         config = self.config.extraction
-        return sure_pieces(self._extract(scan, config, bends_rad=bends_rad), scan, config)
+        return sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
 
     def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
-        return bends_within(segments, walls, self.config.bends, self._keeper.landmarks.change_points.cut)
+        return vertices_within(segments, walls, self.config.vertices, self._keeper.landmarks.change_points.cut)
 
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
@@ -142,15 +142,15 @@ class Mapper:
         beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
         """
         change_points = self._keeper.landmarks.change_points
-        kink = change_points.see(self.backend.belief, scan, segments, matches.pairs)
-        if kink is None:
+        change_point = change_points.see(self.backend.belief, scan, segments, matches.pairs)
+        if change_point is None:
             return segments, matches, NONE
         walls = self._keeper.map()
-        pieces = self._pieces(scan, np.append(self._bends(segments, walls), kink.bearing_rad))
-        clear = np.flatnonzero(are_clear(pieces, self.config.walls.firmness))
-        sides = change_points.sides_of(kink, segments, pieces.take(clear), scan)
+        pieces = self._pieces(scan, np.append(self._bends(segments, walls), change_point.bearing_rad))
+        clear = np.flatnonzero(are_clear(pieces, self.config.walls.reliability))
+        sides = change_points.sides_of(change_point, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
-        bent = np.union1d(laid_across(walls, kink.wall, kink.along_m, self.config.bends), [kink.wall])
-        view = self._view(scan, pieces, self._keeper.without(bent, walls))
+        across = laid_across(walls, change_point.wall, change_point.along_m, self.config.vertices)
+        view = self._view(scan, pieces, self._keeper.without(np.union1d(across, change_point.wall), walls))
         return pieces, view.match_all(), clear[list(sides)]

@@ -28,7 +28,7 @@ from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import to_robot, wrap
-from slam.map.reliability import FirmnessConfig
+from slam.map.reliability import ReliabilityConfig
 from slam.robot import Scan
 
 PLANS = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans"
@@ -221,7 +221,7 @@ def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
     rows["all of 5 beams or more"] = clean & long
     rows["lines of 4 beams"] = clean & (lines.beams == 4)
     rows["lines of 3 beams"] = clean & (lines.beams == 3)
-    is_known = np.sqrt(lines.cov[:, 0, 0]) < FirmnessConfig().few_heading_rad
+    is_known = np.sqrt(lines.cov[:, 0, 0]) < ReliabilityConfig().few_heading_rad
     rows["lines of 3 or 4 beams that may move the estimate"] = clean & ~long & is_known
     return rows
 

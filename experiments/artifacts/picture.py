@@ -61,7 +61,7 @@ def over_truth(
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
         f"coverage {100 * summary['coverage_own_frame']:.1f} %{laid_over}",
-        f"pose error rms {off_cm:.1f} cm (wheels alone {wheels_cm:.0f} cm)",
+        f"pose error rms {off_cm:.1f} cm (odometry alone {wheels_cm:.0f} cm)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"
     how = "replayed" if config.strategy == STRATEGY_OF_REPLAYS else config.strategy

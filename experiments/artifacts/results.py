@@ -172,7 +172,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
         "lines_world": walls.belief.lines_world,
         "anchors": walls.belief.anchors,
         "extents": walls.extents,
-        "sightings": walls.sightings,
+        "sightings": walls.observations,
         "tentative": walls.tentative,
         "crooked": walls.crooked,
         "cov": np.full((size, size), np.nan) if joint is None else joint.cov,

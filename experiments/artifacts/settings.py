@@ -43,17 +43,35 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
     "mission.max_steps": None,
     "mission.explorer.sweeping.near_m": "mission.explorer.near_m",
-    "mission.explorer.following.looks.standoff_m": "mission.explorer.following.viewpoints.standoff_m",
-    "mission.explorer.following.looks.close_m": "mission.explorer.following.viewpoints.close_m",
-    "mission.explorer.following.looks.slack_m": "mission.explorer.following.viewpoints.slack_m",
-    "mission.explorer.following.looks.near_m": "mission.explorer.following.viewpoints.near_m",
-    "mission.explorer.following.looks.far_m": "mission.explorer.following.viewpoints.far_m",
-    "mission.explorer.following.looks.short_m": "mission.explorer.following.viewpoints.short_m",
+    "mission.explorer.following.looks": "mission.explorer.following.viewpoints",
+    "mission.mapper.bends": "mission.mapper.vertices",
+    "mission.mapper.bends.young_sightings": "mission.mapper.vertices.young_observations",
+    "mission.mapper.chains.bend_sightings": "mission.mapper.chains.vertex_observations",
+    "mission.mapper.duplicates": "mission.mapper.merging",
+    "mission.mapper.duplicates.gate": None,
+    "mission.mapper.faint": "mission.mapper.candidates",
+    "mission.mapper.gaps": "mission.mapper.openings",
     "mission.mapper.gaps.widest_m": None,
     "mission.mapper.gaps.corner_m": None,
-    "mission.mapper.duplicates.gate": None,
+    "mission.mapper.kinks": "mission.mapper.change_points",
+    "mission.mapper.torn": "mission.mapper.ambiguity",
+    "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
+    "mission.mapper.walls.trusted_sightings": "mission.mapper.walls.trusted_observations",
+    "mission.mapper.walls.established_sightings": "mission.mapper.walls.established_observations",
 }
-"""Settings of a trial that had other names in format 1 of `config.json`; None where they said nothing of their own."""
+"""Settings of a trial, or groups of them, that had other names in format 1 of `config.json`; the longest name counts.
+None stands where a setting said nothing of its own."""
+
+
+def renamed(key: str) -> str | None:
+    """Return today's key of a setting of format 1; None where there is none."""
+    parts = key.split(".")
+    for count in range(len(parts), 0, -1):
+        group = ".".join(parts[:count])
+        if group in RENAMED:
+            now = RENAMED[group]
+            return None if now is None else now + key[len(group) :]
+    return key
 
 
 def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:
@@ -63,7 +81,7 @@ def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:
     """
     record, unknown = defaults(), []
     for key, value in leaves(said):
-        now = RENAMED.get(key, key)
+        now = renamed(key)
         if now is None:
             continue
         try:

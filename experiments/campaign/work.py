@@ -13,7 +13,7 @@ from sim.logs.archive import read_archive
 from sim.logs.recorded_robot import read_log
 from sim.worlds import World
 from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import NO_BENDS, extract
+from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
 from slam.mapper import Extractor
 from slam.robot import Scan
@@ -182,9 +182,11 @@ def remembered(log: bytes) -> Extractor:
     """
     known: dict[tuple[float, ExtractionConfig], Segments] = {}
 
-    def extracted(scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
-        if len(bends_rad):
-            return extract(scan, config, bends_rad=bends_rad)
+    def extracted(
+        scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
+    ) -> Segments:
+        if len(vertices_rad):
+            return extract(scan, config, vertices_rad=vertices_rad)
         key = scan.time_s, config
         if key not in known:
             known[key] = extract(scan, config)
@@ -213,7 +215,7 @@ def _replay(job: Job) -> TrialScores:
     association = job.trial.association
     assert association is not None, "expected the arm of a replay"
     observer = Observer(truth_of(world, job.config.robot).walls, lambda index: run.true_face_of_beam[index])
-    ear = InnovationEar(job.config.mission.mapper.walls.firmness) if association == "true" else None
+    ear = InnovationEar(job.config.mission.mapper.walls.reliability) if association == "true" else None
     result = replay(
         run, job.trial.backend, ReplayOptions(association), observer, world,
         ear.around if ear is not None else lambda matcher: matcher, remembered(job.log),

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import compose, inverse, to_world, wrap
 
+from .observations import DriveObservations, ScanObservations
 from .oracles import as_stated
-from .sightings import Looks, Sightings
 
 HALF_WIDTH_M = 1.2
 NICHE_M = 0.6
@@ -53,7 +53,7 @@ class Loop:
         return int(np.argmax(self.way_m >= self.length_m))
 
 
-def drive(loop: Loop, seed: int) -> Sightings:
+def drive(loop: Loop, seed: int) -> DriveObservations:
     """Return a drive round a ring whose niches are drawn with `seed`, all noise being the stated one."""
     rng = np.random.default_rng([seed, 0])
     walls = ring(loop.length_m, rng)
@@ -73,7 +73,7 @@ def drive(loop: Loop, seed: int) -> Sightings:
         again.append(looks.take(old))
         first.append(looks.take(~old))
         known[looks.walls] = True
-    return Sightings(motions, covs, tuple(again), tuple(first), poses, dict(enumerate(lines)))
+    return DriveObservations(motions, covs, tuple(again), tuple(first), poses, dict(enumerate(lines)))
 
 
 def on_ring(way_m: Float[np.ndarray, " s"], length_m: float) -> Float[np.ndarray, "s 3"]:
@@ -132,7 +132,7 @@ def look(
     lines: Float[np.ndarray, "n 2"],
     pose: Float[np.ndarray, "3"],
     standard_normals: Float[np.ndarray, "n 2"],
-) -> Looks:
+) -> ScanObservations:
     """Return the walls within range whose free side the robot is on, each with the noise of the beams that it takes."""
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
     r = lines[:, 1] - n @ pose[:2]
@@ -150,4 +150,4 @@ def look(
     true = np.stack([lines[rows, 0] - pose[2], r[rows]], axis=-1)
     drawn = as_stated(true, cov[rows], standard_normals[rows])
     centres = r[rows, None] * normals(true[:, 0]) + t0[rows, None] * directions(true[:, 0])
-    return Looks(rows, drawn, cov[rows], centres)
+    return ScanObservations(rows, drawn, cov[rows], centres)

@@ -11,7 +11,7 @@ from sim.chance import Channel, standard_normals
 from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
 from slam.estimation.backend import Joint
 from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import NO_BENDS, extract
+from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
 from slam.geometry.poses import compose, inverse
 from slam.robot import Scan
@@ -20,7 +20,7 @@ from ..scoring.association import ONE_FACE_SHARE
 from ..scoring.truth import Truth
 
 MOST_TURN_RAD = 1.0
-"""No sighting is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
+"""No observation is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
 
 
 @dataclass
@@ -111,7 +111,7 @@ class PerfectExtraction:
         self._witness, self._seed = witness, seed
 
     def __call__(
-        self, scan: Scan, config: ExtractionConfig, *, bends_rad: Float[np.ndarray, " b"] = NO_BENDS
+        self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
     ) -> Segments:
         """Extract the segments of one scan; those of several walls are left out, so that the map need not say where."""
         segments = extract(scan, config)
@@ -129,7 +129,7 @@ class PerfectExtraction:
 def as_stated(
     lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], standard_normals: Float[np.ndarray, "m 2"]
 ) -> Float[np.ndarray, "m 2"]:
-    """Return sightings of true lines (alpha, r), robot frame, with the error that `slam.estimation.models` states.
+    """Return observations of true lines (alpha, r), robot frame, with the error that `slam.estimation.models` states.
 
     There (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_true) has independent parts of variance C_alpha_alpha and
     (C_r_r - C_alpha_r t0) (cos(epsilon) - t0 sin(epsilon) / r)^2, t0 = C_alpha_r / C_alpha_alpha: to first order the

@@ -195,4 +195,4 @@ def replay(
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
     """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
     walls = replace(config.walls, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0, claims=_NEVER)
-    return replace(config, walls=walls, duplicates=None)
+    return replace(config, walls=walls, merging=None)

@@ -60,7 +60,7 @@ def reproduce(seed: int) -> Reproduction:
             "Anchor `origin` is the paper's line (alpha, r), `wall` attaches r to the wall. One wall is seen once from"
             " a pose with P0 small, along the way from the origin, and predicted for the same pose.",
             f"{RINGS} rings of {RING_M:g} m with P0 large, seeds {seed} to {seed + RINGS - 1}, ridden with the same"
-            " sightings here and there; a dash is a ride that broke down.",
+            " observations here and there; a dash is a ride that broke down.",
         ),
     )
 

@@ -67,11 +67,11 @@ def nees_of_poses(
 
 
 def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
-    """Return where the wheels alone, from the true start on, say the robot was."""
-    return wheels_path(log.true_world[0], log.odometry)
+    """Return where the odometry alone, from the true start on, say the robot was."""
+    return odometry_poses(log.true_world[0], log.odometry)
 
 
-def wheels_path(start_world: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
+def odometry_poses(start_world: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
     """Return the poses from a start on by the wheels' motions alone; the first motion led to the start."""
     poses = [start_world]
     for motion in odometry[1:]:
@@ -154,27 +154,27 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
     samples = sample(truth)
     aligned = to_world(walls.ends_world, to_true)
     labels = votes.walls_of(walls.ids)
-    firm = ~walls.tentative
+    established = ~walls.tentative
     return {
         "lines": len(walls),
-        "lines_tentative": int(np.count_nonzero(~firm)),
+        "lines_tentative": int(np.count_nonzero(~established)),
         "lines_crooked": int(np.count_nonzero(walls.crooked)),
-        "lines_unlabelled": int(np.count_nonzero(firm & (labels < 0))),
+        "lines_unlabelled": int(np.count_nonzero(established & (labels < 0))),
         "contours_closed": len(closed_contours(samples, walls, step.chains, votes, own, near)),
         "contours_reachable": truth.contour.contours,
         "chains_closed": int(log.closed_chains[-1]),
         "chains_open": len(step.chains) - int(log.closed_chains[-1]),
-        "coverage": coverage(samples, aligned[firm], near),
-        "coverage_own_frame": coverage(samples, to_world(walls.ends_world[firm], own), near),
+        "coverage": coverage(samples, aligned[established], near),
+        "coverage_own_frame": coverage(samples, to_world(walls.ends_world[established], own), near),
         "map_began_step": began_at,
         "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
         "map_anees": None
         if errorless
-        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & (labels >= 0)),
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], established & (labels >= 0)),
         "map_anees_straight": None
         if errorless
-        else map_anees(votes, walls.ids, joint, log.true_world[-1], firm & ~walls.crooked & (labels >= 0)),
-        "duplicate_lines": duplicate_lines(walls, labels, firm),
+        else map_anees(votes, walls.ids, joint, log.true_world[-1], established & ~walls.crooked & (labels >= 0)),
+        "duplicate_lines": duplicate_lines(walls, labels, established),
         "false_matches": votes.false_matches(),
         "merges": votes.merges,
         "false_merges": votes.false_merges,

@@ -71,7 +71,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("lines (tentative, duplicate)", _counts(summary)),
         ("false matches", str(summary["false_matches"])),
         ("pose error, rms", f"{100 * summary['pose_rmse_m']:.2f} cm, {57.29578 * summary['heading_rmse_rad']:.3f} deg"),
-        ("wheels alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
+        ("odometry alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
         ("pose ANEES (1 is ideal)", _number(summary["pose_anees"])),
         ("pose NEES in the 95 % band", _number(summary["pose_nees_in_band"])),
         ("map ANEES (1 is ideal)", _number(summary["map_anees"])),

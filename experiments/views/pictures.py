@@ -31,7 +31,7 @@ from ..artifacts.run_folder import prepare
 from ..artifacts.saved import REMEDY
 from ..replays.replay import read_run
 from ..scenario import TrialConfig, load_world
-from ..scoring.summary import wheels_path
+from ..scoring.summary import odometry_poses
 from ..usage import UsageError
 from .saved_map import saved_map
 from .timelines import true_rings
@@ -115,7 +115,7 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     count = len(lines)
     blocks = first.walls["cov"][3:, 3:].reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count), :]
     covs = hessian_cov(lines[:, 0], first.walls["anchors"], blocks)
-    true, wheels = first.log["true_poses"], wheels_path(first.log["true_poses"][0], first.log["odometry"])
+    true, wheels = first.log["true_poses"], odometry_poses(first.log["true_poses"][0], first.log["odometry"])
     colours = [palette.of_backend(trial.backend)] * count
     return {
         "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and believed", wheels),

@@ -15,7 +15,7 @@ from slam.geometry.poses import J
 from slam.map.stochastic_map import StochasticMap
 
 POSE = 3
-SIGHTING_SIGMAS = np.array([0.005, 0.004])
+OBSERVATION_SIGMAS = np.array([0.005, 0.004])
 """What one look at a wall leaves open: its direction rad, its distance m."""
 DRIFT_SIGMAS = np.array([0.02, 0.02, 0.07])
 """What each root metre of the way adds to the pose (m, m, rad): odometry that slips while walls hold the heading."""
@@ -67,7 +67,7 @@ def expect(
     joint = walls.belief.joint(seen)
     cov = _on_arrival(joint.cov, place_world - walls.belief.pose_world[:2], metres)
     H = _looks(walls, seen, place_world)
-    R = np.diag(np.tile(SIGHTING_SIGMAS**2, len(seen)))
+    R = np.diag(np.tile(OBSERVATION_SIGMAS**2, len(seen)))
     PHt = cov @ H.T
     after = cov - PHt @ np.linalg.solve(H @ PHt + R, PHt.T)
     gain = 0.5 * (_log_det(cov[POSE:, POSE:]) - _log_det(after[POSE:, POSE:]))

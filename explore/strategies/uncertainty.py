@@ -6,7 +6,7 @@ from slam.geometry.lines import directions
 from slam.map.chains import HEAD, OpenEnd
 
 from ..survey.viewpoints import ideal_places
-from .expectation import SIGHTING_SIGMAS, Expectation, expect, walls_seen_from
+from .expectation import OBSERVATION_SIGMAS, Expectation, expect, walls_seen_from
 from .strategy import Choice, Situation
 
 UNKNOWN_WALL = np.diag([np.pi**2, 4.0**2]) / 12.0
@@ -50,5 +50,5 @@ def new_wall_nats(situation: Situation, end: OpenEnd, expected: Expectation) -> 
     row = situation.map.belief.rows([end.wall])
     ahead = directions(situation.map.belief.means[row, 0])[0] * (1.0 if end.side == HEAD else -1.0)
     G = np.array([[0.0, 0.0, 1.0], [ahead[0], ahead[1], 0.0]])
-    entered = G @ expected.pose_cov @ G.T + np.diag(SIGHTING_SIGMAS**2)
+    entered = G @ expected.pose_cov @ G.T + np.diag(OBSERVATION_SIGMAS**2)
     return float(0.5 * (np.linalg.slogdet(UNKNOWN_WALL)[1] - np.linalg.slogdet(entered)[1]))

@@ -1,7 +1,7 @@
 """What is left to go by where a segment may be of either of two walls, and nothing else tells where the robot is.
 
 One long wall that stands in the map twice, 0.1 m and half a degree apart, was enough to lose ten degrees beside it: no
-sighting could tell which of the two it was of, and the wheels alone led on. Either of the two is a far better guide.
+observation could tell which of the two it was of, and odometry alone led on. Either of the two is a far better guide.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from .matching import Matches
 
 
 @dataclass(frozen=True)
-class TornConfig:
+class AmbiguityConfig:
     """When two walls are so alike that taking the one for the other does little harm."""
 
     turn_rad: float = float(np.deg2rad(2.0))
@@ -27,14 +27,18 @@ class TornConfig:
 
 
 def observed_either_way(
-    matches: Matches, segments: Segments, ids: Int[np.ndarray, " n"], joint: Joint, config: TornConfig = TornConfig()
+    matches: Matches,
+    segments: Segments,
+    ids: Int[np.ndarray, " n"],
+    joint: Joint,
+    config: AmbiguityConfig = AmbiguityConfig(),
 ) -> tuple[Int[np.ndarray, " k"], Observations]:
-    """Return the segments torn between two walls alike, and them as observations of the likelier, with more noise.
+    """Return the segments that may be of either of two walls, and observations of the likelier, with more noise.
 
     What is added is what lies between the two (a mixture of two Gaussians, taken for one). `joint` is that of the walls
     `ids`, ascending.
     """
-    segment, likelier, rival = matches.torn.T
+    segment, likelier, rival = matches.ambiguous.T
     means = joint.mean[3:].reshape(-1, 2)
     one, other = (
         lines_robot(joint.mean[:3], joint.anchors[rows], means[rows])

@@ -11,13 +11,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.gates import gate_level
-from .joint_compatibility import JointSightings, judged_by_the_rest, squared_distances
+from .joint_compatibility import JointObservations, judged_by_the_rest, squared_distances
 
 _UNMATCHED = -1
 
 
 @dataclass(frozen=True)
-class Consensus:
+class Hypothesis:
     """What the best of the hypotheses says, and how sure that is."""
 
     pairs: Int[np.ndarray, " m"]
@@ -27,18 +27,18 @@ class Consensus:
     distances); infinite where there is none."""
 
 
-_NONE = Consensus(np.zeros(0, dtype=np.int64), np.zeros(0))
+_NONE = Hypothesis(np.zeros(0, dtype=np.int64), np.zeros(0))
 
 
 def agree(
     segment: Int[np.ndarray, " c"],
     line: Int[np.ndarray, " c"],
-    seen: JointSightings,
+    seen: JointObservations,
     may_seed: Bool[np.ndarray, " c"],
     gate: float,
     doubt: float,
     density: float,
-) -> Consensus:
+) -> Hypothesis:
     """Return the candidates (pairs of `segment` and `line`, seen together) that the best hypothesis keeps.
 
     Each candidate within the level of doubt is the seed of a hypothesis: with it, for each segment, goes its best
@@ -54,7 +54,7 @@ def agree(
     if not len(seeds):
         return _NONE
     given = _distances(seen, seeds)
-    given[segment[None, :] == segment[seeds][:, None]] = np.inf  # a segment is one sighting
+    given[segment[None, :] == segment[seeds][:, None]] = np.inf  # a segment is one observation
     given[np.arange(len(seeds)), seeds] = 0.0
     best = np.full((len(seeds), len(segments)), level)
     choice = np.full((len(seeds), len(segments)), _UNMATCHED)
@@ -73,11 +73,11 @@ def agree(
     walls = np.where(matched, line[choice], _UNMATCHED)
     other = (walls != walls[winner]) & matched
     margins = np.where(other, costs[:, None], np.inf).min(axis=0) - costs[winner]
-    return Consensus(choice[winner, matched[winner]], margins[matched[winner]])
+    return Hypothesis(choice[winner, matched[winner]], margins[matched[winner]])
 
 
 def _together(
-    seen: JointSightings, choice: Int[np.ndarray, "h k"], unmatched: float
+    seen: JointObservations, choice: Int[np.ndarray, "h k"], unmatched: float
 ) -> tuple[Int[np.ndarray, "h k"], Float[np.ndarray, " h"]]:
     """Return what is left of each hypothesis, and its cost.
 
@@ -104,17 +104,17 @@ def _together(
 def nearest_alone(
     segment: Int[np.ndarray, " c"],
     d2: Float[np.ndarray, " c"],
-    seen: JointSightings,
+    seen: JointObservations,
     R: Float[np.ndarray, "c 2 2"],
     gate: float,
     clear: float,
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "t 2"]]:
     """Return for each segment its nearest candidate, unless another wall costs hardly more (by less than `clear`).
 
-    The second are the segments that are torn so, each by its nearest candidate and the likeliest of the others.
+    The second are the segments that are ambiguous, each by its nearest candidate and the likeliest of the others.
 
-    Two entries of one wall are not another: by the gate their covariance does not tell them apart. `R` is the noise of
-    each candidate's segment, which is the same for all candidates of one.
+    Two landmarks of one wall are not another: by the gate their covariance does not tell them apart. `R` is the noise
+    of each candidate's segment, which is the same for all candidates of one.
     """
     order = np.lexsort((d2, segment))
     first = order[np.unique(segment[order], return_index=True)[1]]
@@ -130,26 +130,26 @@ def nearest_alone(
     return np.setdiff1d(first, best[likeliest]), np.stack([best[likeliest], likeliest], axis=-1)
 
 
-def _own_distances(seen: JointSightings) -> Float[np.ndarray, " c"]:
+def _own_distances(seen: JointObservations) -> Float[np.ndarray, " c"]:
     return squared_distances(seen.e.reshape(-1, 2), _own_covariances(seen))
 
 
-def _own_covariances(seen: JointSightings) -> Float[np.ndarray, "c 2 2"]:
+def _own_covariances(seen: JointObservations) -> Float[np.ndarray, "c 2 2"]:
     count = len(seen.e) // 2
     each = np.arange(count)
     return seen.S.reshape(count, 2, count, 2)[each, :, each, :]
 
 
-def _unlike_new(seen: JointSightings, density: float) -> Float[np.ndarray, " c"]:
-    """Return the squared distance up to which a sighting is likelier of its wall than of a new one.
+def _unlike_new(seen: JointObservations, density: float) -> Float[np.ndarray, " c"]:
+    """Return the squared distance up to which a observation is likelier of its wall than of a new one.
 
     There the Gaussian's own density, exp(-d2 / 2) / (2 pi sqrt(det S)), is that of new walls.
     """
     return np.asarray(-2.0 * np.log(2.0 * np.pi * density) - np.linalg.slogdet(_own_covariances(seen))[1])
 
 
-def _distances(seen: JointSightings, seeds: Int[np.ndarray, " h"]) -> Float[np.ndarray, "h c"]:
-    """Return the squared Mahalanobis distance of each sighting, given that the seed is right."""
+def _distances(seen: JointObservations, seeds: Int[np.ndarray, " h"]) -> Float[np.ndarray, "h c"]:
+    """Return the squared Mahalanobis distance of each observation, given that the seed is right."""
     count = len(seen.e) // 2
     each = np.arange(count)
     e, S = seen.e.reshape(count, 2), seen.S.reshape(count, 2, count, 2)

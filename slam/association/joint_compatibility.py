@@ -1,4 +1,4 @@
-"""Sightings of several lines taken together: where they put the pose and the lines, and which of them agree."""
+"""Observations of several lines taken together: where they put the pose and the lines, and which of them agree."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ from ..estimation.models import Innovations, halfway, innovations, stack
 
 
 @dataclass(frozen=True)
-class JointSightings:
-    """What m sightings of a joint Gaussian's lines say of its pose and lines."""
+class JointObservations:
+    """What m observations of a joint Gaussian's lines say of its pose and lines."""
 
     e: Float[np.ndarray, " k"]
     """How they differ from what the mean predicts, k = 2 m."""
@@ -21,22 +21,22 @@ class JointSightings:
     S: Float[np.ndarray, "k k"]
     """Covariance of e."""
 
-    def take(self, rows: Int[np.ndarray, " r"]) -> "JointSightings":
-        """Return some of the sightings."""
+    def take(self, rows: Int[np.ndarray, " r"]) -> "JointObservations":
+        """Return some of the observations."""
         at = (2 * rows[:, None] + np.arange(2)).ravel()
-        return JointSightings(self.e[at], self.PHt[:, at], self.S[at[:, None], at])
+        return JointObservations(self.e[at], self.PHt[:, at], self.S[at[:, None], at])
 
     def gain(self) -> Float[np.ndarray, "s k"]:
         """Return by how much each part of e moves the state."""
         return np.linalg.solve(self.S, self.PHt.T).T
 
 
-def taken_together(joint: Joint, rows: Int[np.ndarray, " m"], model: Innovations) -> JointSightings:
-    """Join the innovations of m sightings of the joint's lines in these rows; several may be of one line."""
+def taken_together(joint: Joint, rows: Int[np.ndarray, " m"], model: Innovations) -> JointObservations:
+    """Join the innovations of m observations of the joint's lines in these rows; several may be of one line."""
     linear = stack(rows, model)
     columns = columns_of(linear.rows)
     PHt = joint.cov[:, columns] @ linear.H.T
-    return JointSightings(linear.e, PHt, linear.H @ PHt[columns] + linear.R)
+    return JointObservations(linear.e, PHt, linear.H @ PHt[columns] + linear.R)
 
 
 def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
@@ -54,8 +54,8 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
     return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
 
 
-def compatible(seen: JointSightings, gate: float, together: float) -> Int[np.ndarray, " k"]:
-    """Drop sightings, the worst first, until each passes the gate given all others, and all `together` their own.
+def compatible(seen: JointObservations, gate: float, together: float) -> Int[np.ndarray, " k"]:
+    """Drop observations, the worst first, until each passes the gate given all others, and all `together` their own.
 
     Both are levels of probability; a bad slip alone takes all together far out.
 
@@ -76,12 +76,12 @@ def compatible(seen: JointSightings, gate: float, together: float) -> Int[np.nda
 def judged_by_the_rest(
     e: Float[np.ndarray, "*h k"], S: Float[np.ndarray, "*h k k"]
 ) -> tuple[Float[np.ndarray, "*h"], Float[np.ndarray, "*h m"]]:
-    """Return the squared distance of m sightings taken together, k = 2 m, and that of each given all others."""
+    """Return the squared distance of m observations taken together, k = 2 m, and that of each given all others."""
     inverse = np.linalg.inv(S)
     weighted = (inverse @ e[..., None])[..., 0]
     *h, k = e.shape
     own = np.diagonal(inverse.reshape(*h, k // 2, 2, k // 2, 2), axis1=-4, axis2=-2)
-    # What the sum of squares loses when one sighting is left out is its own, given all others.
+    # What the sum of squares loses when one observation is left out is its own, given all others.
     losses = squared_distances(weighted.reshape(*h, k // 2, 2), np.moveaxis(own, -1, -3))
     return np.asarray(np.vecdot(e, weighted)), losses
 

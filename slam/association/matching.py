@@ -44,9 +44,9 @@ class MatchingConfig:
     """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
     sight is matched beyond the gate too where a new one would be less likely."""
     one_wall: float = 0.9999
-    """Probability level within which two entries of the map may be one wall, so that either will do; where they lie
+    """Probability level within which two landmarks of the map may be one wall, so that either will do; where they lie
     along each other they are made one. One true pair in 10,000 is refused, and stays, since each observation goes to
-    the entry that it fits better, which keeps them apart."""
+    the landmark that it fits better, which keeps them apart."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
 
@@ -63,7 +63,7 @@ class Matches:
     """Indices of the segments that belong to no wall."""
     doubtful: Int[np.ndarray, " d"]
     """Those of the unmatched that lie too near a wall to be a new one."""
-    torn: Int[np.ndarray, "t 3"]
+    ambiguous: Int[np.ndarray, "t 3"]
     """Those of the unmatched that two walls fit about as well: index of the segment, ids of the likelier and other."""
     refusals: dict[int, str]
     """For each unmatched segment with a wall near it, why that wall was refused."""
@@ -129,9 +129,9 @@ def match(
     if clear_only:
         chosen = _agreed(found, np.flatnonzero(covers), segments, joint, config)
         chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
-        torn = np.zeros((0, 2), dtype=np.int64)
+        ambiguous = np.zeros((0, 2), dtype=np.int64)
     else:
-        chosen, torn = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
+        chosen, ambiguous = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     beside = _is_beside(found, segments, config)
@@ -143,7 +143,7 @@ def match(
         found.d2[chosen],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
-        np.column_stack([found.segment[torn[:, 0]], ids[found.line[torn]]]),
+        np.column_stack([found.segment[ambiguous[:, 0]], ids[found.line[ambiguous]]]),
         _refusals(found, ids, ~matched, level, config),
     )
 
@@ -224,8 +224,8 @@ def _nearest(
     model = found.model.take(rows)
     seen = taken_together(joint, found.line[rows], model)
     segment, d2 = found.segment[rows], found.d2[rows]
-    alone, torn = nearest_alone(segment, d2, seen, model.R, config.one_wall, config.clear)
-    return rows[alone], rows[torn]
+    alone, ambiguous = nearest_alone(segment, d2, seen, model.R, config.one_wall, config.clear)
+    return rows[alone], rows[ambiguous]
 
 
 def _still_overlapping(

@@ -23,13 +23,15 @@ from .splitting import (
 )
 
 DEFAULT = ExtractionConfig()
-NO_BENDS = np.zeros(0)
+NO_VERTICES = np.zeros(0)
 
 
-def extract(scan: Scan, config: ExtractionConfig = DEFAULT, bends_rad: Float[np.ndarray, " b"] = NO_BENDS) -> Segments:
+def extract(
+    scan: Scan, config: ExtractionConfig = DEFAULT, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
+) -> Segments:
     """Return the straight segments of `scan` in the robot frame, counter-clockwise; none where nothing is straight.
 
-    An end is OPEN also where the wall stops in front of something farther. At the bearings `bends_rad` the wall is
+    An end is OPEN also where the wall stops in front of something farther. At the bearings `vertices_rad` the wall is
     known to bend.
     """
     with np.errstate(all="ignore"):
@@ -45,8 +47,8 @@ def extract(scan: Scan, config: ExtractionConfig = DEFAULT, bends_rad: Float[np.
         pieces = split(gains, sums, returns.breaks, config)
         if len(pieces.start) == 0:
             return _none()
-        if len(bends_rad):
-            pieces = cut_at(pieces, position_of(bends_rad, scan, returns), config)
+        if len(vertices_rad):
+            pieces = cut_at(pieces, position_of(vertices_rad, scan, returns), config)
         pieces = settled(pieces, sums, returns.breaks, config)
         fit, pieces, is_corner, in_doubt = _sharpen(pieces, sums, returns, config)
         return _fitted(fit, pieces, is_corner, in_doubt, returns, config)

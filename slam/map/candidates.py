@@ -16,7 +16,7 @@ from ..geometry.poses import to_world, wrap
 
 
 @dataclass(frozen=True)
-class FaintConfig:
+class CandidatesConfig:
     """When a line of few beams is believed."""
 
     looks: int = 2
@@ -31,13 +31,13 @@ class FaintConfig:
     patience_steps: int = 1000
     """It is forgotten when it was not seen for so many scans: the second look may be on the way back."""
     gate: float = 0.99
-    """Probability level of the test whether two sightings are of one line."""
+    """Probability level of the test whether two observations are of one line."""
     slack_m: float = 0.01
-    """What the pose may have drifted between two sightings, sigma."""
+    """What the pose may have drifted between two observations, sigma."""
 
 
 @dataclass(frozen=True)
-class _Sightings:
+class _Lines:
     """Lines in the world frame, each about the middle of its seen piece."""
 
     alpha: Float[np.ndarray, " n"]
@@ -48,24 +48,24 @@ class _Sightings:
     half_m: Float[np.ndarray, " n"]
     """Half the length of the seen piece."""
 
-    def take(self, rows: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"]) -> "_Sightings":
+    def take(self, rows: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"]) -> "_Lines":
         """Return the chosen rows."""
-        return _Sightings(
+        return _Lines(
             self.alpha[rows], self.centre_world[rows], self.var_alpha[rows], self.var_across[rows], self.half_m[rows]
         )
 
-    def join(self, other: "_Sightings") -> "_Sightings":
+    def join(self, other: "_Lines") -> "_Lines":
         """Return these and then the others."""
         mine, theirs = vars(self).values(), vars(other).values()
-        return _Sightings(*(np.concatenate(both) for both in zip(mine, theirs, strict=True)))
+        return _Lines(*(np.concatenate(both) for both in zip(mine, theirs, strict=True)))
 
 
-class FaintLines:
+class LandmarkCandidates:
     """The lines of few beams that may become walls."""
 
-    def __init__(self, config: FaintConfig = FaintConfig()) -> None:
+    def __init__(self, config: CandidatesConfig = CandidatesConfig()) -> None:
         self._config = config
-        self._lines = _Sightings(np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
+        self._lines = _Lines(np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
         self._places = np.zeros((0, 2))
         self._looks = np.zeros(0, dtype=np.int64)
         self._spare_beams = np.zeros(0, dtype=np.int64)
@@ -74,14 +74,14 @@ class FaintLines:
     def see(self, pose_world: Float[np.ndarray, "3"], segments: Segments) -> Int[np.ndarray, " m"]:
         """Take in one scan's segments of few beams, none of which lies on a wall; return those to be believed now.
 
-        A line keeps the sighting whose direction is known best, so that it does not wander off step by step.
+        A line keeps the observation whose direction is known best, so that it does not wander off step by step.
         """
-        seen = _sightings(pose_world, segments)
+        seen = _lines_of(pose_world, segments)
         short = np.flatnonzero(2.0 * seen.half_m <= self._config.longest_m)
         return short[self._see(pose_world, seen.take(short), segments.beam_counts[short] - 2)]
 
     def _see(
-        self, pose_world: Float[np.ndarray, "3"], seen: _Sightings, spare_beams: Int[np.ndarray, " s"]
+        self, pose_world: Float[np.ndarray, "3"], seen: _Lines, spare_beams: Int[np.ndarray, " s"]
     ) -> Int[np.ndarray, " m"]:
         self._unseen += 1
         line_of = self._line_of(seen)
@@ -102,8 +102,8 @@ class FaintLines:
         self._append(seen.take(fresh), spare_beams[fresh], pose_world[:2])
         return believed
 
-    def _line_of(self, seen: _Sightings) -> Int[np.ndarray, " s"]:
-        """Return for each sighting the row of the line that it shows again, -1 for none; each line at most once."""
+    def _line_of(self, seen: _Lines) -> Int[np.ndarray, " s"]:
+        """Return for each observation the row of the line that it shows again, -1 for none; each line at most once."""
         known = self._lines
         turn = wrap(seen.alpha[:, None] - known.alpha)
         shift = seen.centre_world[:, None] - known.centre_world
@@ -127,9 +127,7 @@ class FaintLines:
         self._looks, self._unseen = self._looks[kept], self._unseen[kept]
         self._spare_beams = self._spare_beams[kept]
 
-    def _append(
-        self, fresh: _Sightings, spare_beams: Int[np.ndarray, " m"], place_world: Float[np.ndarray, "2"]
-    ) -> None:
+    def _append(self, fresh: _Lines, spare_beams: Int[np.ndarray, " m"], place_world: Float[np.ndarray, "2"]) -> None:
         m = len(fresh.alpha)
         self._lines = self._lines.join(fresh)
         self._places = np.concatenate([self._places, np.tile(place_world, (m, 1))])
@@ -138,10 +136,10 @@ class FaintLines:
         self._unseen = np.concatenate([self._unseen, np.zeros(m, dtype=np.int64)])
 
 
-def _sightings(pose_world: Float[np.ndarray, "3"], segments: Segments) -> _Sightings:
+def _lines_of(pose_world: Float[np.ndarray, "3"], segments: Segments) -> _Lines:
     centres = 0.5 * (segments.ends[:, 0] + segments.ends[:, 1])
     var_alpha, covariance = segments.cov[:, 0, 0], segments.cov[:, 0, 1]
-    return _Sightings(
+    return _Lines(
         lines_to_world(segments.lines, pose_world)[:, 0],
         to_world(centres, pose_world),
         var_alpha,

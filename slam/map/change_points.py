@@ -1,7 +1,7 @@
 """Bends that neither a scan nor the map shows: what the beams of many scans together say about how straight a wall is.
 
 A line over both sides of a bend of half a degree fits any one scan. It is wrong by tenths of a degree, and by the same
-tenths in the next scan, so that dozens of sightings make the map sure of a direction that neither side has, and turn
+tenths in the next scan, so that dozens of observations make the map sure of a direction that neither side has, and turn
 the robot by it. Where the residuals of a fit turn along the wall says nothing about the robot's heading: each scan
 tells the turn at a place to a degree, and what the scans tell adds up.
 """
@@ -25,7 +25,7 @@ Sums = Float[np.ndarray, "2 p"]
 
 
 @dataclass(frozen=True)
-class KinksConfig:
+class ChangePointsConfig:
     """When a wall is known to bend."""
 
     pitch_m: float = 0.25
@@ -49,7 +49,7 @@ class KinksConfig:
 
 
 @dataclass(frozen=True)
-class Kink:
+class ChangePoint:
     """Where a wall bends."""
 
     wall: int
@@ -71,10 +71,10 @@ class Kink:
         return abs(self.turn_rad) / self.sigma_rad
 
 
-class Kinks:
-    """What the sightings of each wall say of a turn, at places along it."""
+class ChangePoints:
+    """What the observations of each wall say of a turn, at places along it."""
 
-    def __init__(self, config: KinksConfig = KinksConfig(), records: Records | None = None) -> None:
+    def __init__(self, config: ChangePointsConfig = ChangePointsConfig(), records: Records | None = None) -> None:
         self._config = config
         self._records = Records() if records is None else records
         self._records.declare(self._merge, turns=None)
@@ -85,7 +85,7 @@ class Kinks:
         """Pairs of ids, the lower first, made of one bent wall: they are two, whatever their lines look like."""
         return {(min(pair), max(pair)) for pair in self._records.pairs["cut"]}
 
-    def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> Kink | None:
+    def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> ChangePoint | None:
         """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
         beams, of = beams_of(segments.beams[pairs[:, 0]], len(scan.bearings_rad))
         alpha, r = segments.lines[pairs[:, 0]].T
@@ -116,26 +116,31 @@ class Kinks:
         row = place_of[best]
         bearing = float(alpha[row] + np.arctan((at[best] - foot[row]) / r[row]))
         segment, wall = pairs[row].tolist()
-        return Kink(wall, segment, bearing, float(at[best]), float(turn[best]), float(information[best] ** -0.5))
+        return ChangePoint(wall, segment, bearing, float(at[best]), float(turn[best]), float(information[best] ** -0.5))
 
-    def sides_of(self, kink: Kink, segments: Segments, pieces: Segments, scan: Scan) -> tuple[int, int] | None:
+    def sides_of(
+        self, change_point: ChangePoint, segments: Segments, pieces: Segments, scan: Scan
+    ) -> tuple[int, int] | None:
         """Return the neighbours among `pieces`, of the same scan cut at a bend, between which it lies.
 
         None where there are no two, or where they do not show that turn.
         """
         beams, margin = len(scan.bearings_rad), 2
-        first, last = segments.beams[kink.segment] + [-margin, margin]  # a beam in doubt may have been left to either
+        first, last = segments.beams[change_point.segment] + [
+            -margin,
+            margin,
+        ]  # a beam in doubt may have been left to either
         run = np.mod(pieces.beams - first, beams)
         ours = np.flatnonzero((run[:, 0] <= run[:, 1]) & (run[:, 1] <= np.mod(last - first, beams)))
         if len(ours) < 2:
             return None
         ours = ours[np.argsort(run[ours, 0])]
-        bend = np.mod(kink.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / beam_step(scan)
+        bend = np.mod(change_point.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / beam_step(scan)
         bend = np.mod(bend - first, beams)
         nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
         before, after = ours[nearest : nearest + 2].tolist()
-        off = wrap(pieces.lines[after, 0] - pieces.lines[before, 0]) - kink.turn_rad
-        variance = pieces.cov[before, 0, 0] + pieces.cov[after, 0, 0] + kink.sigma_rad**2
+        off = wrap(pieces.lines[after, 0] - pieces.lines[before, 0]) - change_point.turn_rad
+        variance = pieces.cov[before, 0, 0] + pieces.cov[after, 0, 0] + change_point.sigma_rad**2
         return (before, after) if off**2 < self._config.agrees_sigmas**2 * variance else None
 
     def _add(

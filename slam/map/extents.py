@@ -11,9 +11,9 @@ from ..extraction.visible_extent import beam_spacing, owners_of_beams
 from ..geometry.lines import directions
 from ..geometry.poses import to_world
 from ..robot import Scan
-from .ray_evidence import Sightlines, sightlines
+from .ray_evidence import RayEvidence, ray_evidence
 from .records import Merger, Records
-from .reliability import FirmnessConfig
+from .reliability import ReliabilityConfig
 from .stochastic_map import StochasticMap
 
 
@@ -21,12 +21,12 @@ from .stochastic_map import StochasticMap
 class WallsConfig:
     """When a wall is trusted, and when it is forgotten."""
 
-    trusted_sightings: int = 2
+    trusted_observations: int = 2
     """A wall is tentative until it was seen this often with enough beams."""
     patience_steps: int = 15
-    """A tentative wall is forgotten after this many scans without a sighting."""
-    firmness: FirmnessConfig = field(default_factory=FirmnessConfig)
-    """Which sightings may move the estimate."""
+    """A tentative wall is forgotten after this many scans without a observation."""
+    reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
+    """Which observations may move the estimate."""
     pass_margin_m: float = 0.1
     """A beam that goes on this far beyond a line has passed through it."""
     contradictions: int = 2
@@ -37,7 +37,7 @@ class WallsConfig:
     """A wall cut back to less than this is forgotten."""
     claims: int = 6
     """A wall is forgotten when so many scans in turn gave all its beams to other walls ..."""
-    established_sightings: int = 10
+    established_observations: int = 10
     """... unless it was seen at least this often."""
 
 
@@ -52,7 +52,7 @@ class Extents:
             self._merge,
             extents=np.array([np.inf, -np.inf]),
             spacing=np.full(2, np.inf),
-            sightings=0,
+            observations=0,
             last_seen=0,
             against=0,
             overlaid=np.zeros(2, dtype=np.int64),
@@ -61,9 +61,9 @@ class Extents:
 
     def map(self, belief: Belief, crooked: Bool[np.ndarray, " n"]) -> StochasticMap:
         """Return the belief together with the extents."""
-        extents, sightings = (self._records.columns[name] for name in ("extents", "sightings"))
-        tentative = sightings < self._config.trusted_sightings
-        return StochasticMap(belief, extents.copy(), sightings.copy(), tentative, crooked)
+        extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
+        tentative = observations < self._config.trusted_observations
+        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked)
 
     def see(
         self,
@@ -83,14 +83,14 @@ class Extents:
         columns = self._records.columns
         self._stretch(belief, scan, segments, used, rows)
         self._uncover(belief, segments, owners, used, rows)
-        sightings, last_seen, extents = (columns[name] for name in ("sightings", "last_seen", "extents"))
-        sightings[np.unique(rows)] += 1
-        sightings[seen_often] = np.maximum(sightings[seen_often], self._config.trusted_sightings)
+        observations, last_seen, extents = (columns[name] for name in ("observations", "last_seen", "extents"))
+        observations[np.unique(rows)] += 1
+        observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)
         last_seen[rows] = self._scans
         self._weigh(belief, scan, segments, owners)
         stale = self._scans - last_seen > self._config.patience_steps
-        shaky = stale & (sightings < self._config.trusted_sightings)
-        shaky |= (columns["claimed"] >= self._config.claims) & (sightings < self._config.established_sightings)
+        shaky = stale & (observations < self._config.trusted_observations)
+        shaky |= (columns["claimed"] >= self._config.claims) & (observations < self._config.established_observations)
         return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < self._config.least_m)]
 
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
@@ -98,12 +98,12 @@ class Extents:
         walls = self.map(belief, np.zeros(len(self._records), dtype=bool))
         near = np.flatnonzero(walls.distances_m < scan.range_max_m)
         anchors, means = belief.anchors[near], belief.means[near]
-        lines = sightlines(scan, belief.pose_world, anchors, means, self._config.pass_margin_m)
+        lines = ray_evidence(scan, belief.pose_world, anchors, means, self._config.pass_margin_m)
         self._note_claims(near, lines, owners_of_beams(segments, owners, len(scan.bearings_rad)))
         self._cut_back(near, lines)
 
     def _note_claims(
-        self, near: Int[np.ndarray, " n"], lines: Sightlines, owners_of_beams: Int[np.ndarray, " k"]
+        self, near: Int[np.ndarray, " n"], lines: RayEvidence, owners_of_beams: Int[np.ndarray, " k"]
     ) -> None:
         """Count for how many scans in turn every beam on a wall has been some other wall's."""
         extents, last_seen, scans = (self._records.columns[name] for name in ("extents", "last_seen", "claimed"))
@@ -115,7 +115,7 @@ class Extents:
         seen = last_seen[near] == self._scans
         scans[near] = np.where(seen, 0, scans[near] + claimed)
 
-    def _cut_back(self, near: Int[np.ndarray, " n"], lines: Sightlines) -> None:
+    def _cut_back(self, near: Int[np.ndarray, " n"], lines: RayEvidence) -> None:
         """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
         extents, spacing, against = (self._records.columns[name] for name in ("extents", "spacing", "against"))
         margin = self._config.end_margin_m
@@ -140,7 +140,7 @@ class Extents:
             if outward * (theirs[side] - extents[row, side]) > 0:
                 extents[row, side] = theirs[side]
                 spacing[row, side] = spacing[other, side]
-        columns["sightings"][row] += columns["sightings"][other]
+        columns["observations"][row] += columns["observations"][other]
         columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:

@@ -10,11 +10,11 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
 from .chains import ChainConfig
-from .change_points import Kinks, KinksConfig
+from .change_points import ChangePoints, ChangePointsConfig
 from .extents import Extents, WallsConfig
-from .openings import Gaps, GapsConfig
+from .openings import Openings, OpeningsConfig
 from .records import Records
-from .reliability import Firmness
+from .reliability import Reliability
 from .stochastic_map import StochasticMap
 
 
@@ -31,12 +31,14 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(self, walls: WallsConfig, kinks: KinksConfig, gaps: GapsConfig, chains: ChainConfig) -> None:
+    def __init__(
+        self, walls: WallsConfig, change_points: ChangePointsConfig, gaps: OpeningsConfig, chains: ChainConfig
+    ) -> None:
         self.records = Records()
         self.extents = Extents(walls, self.records)
-        self.reliability = Firmness(walls.firmness, self.records)
-        self.change_points = Kinks(kinks, self.records)
-        self.openings = Gaps(gaps, chains, self.records)
+        self.reliability = Reliability(walls.reliability, self.records)
+        self.change_points = ChangePoints(change_points, self.records)
+        self.openings = Openings(gaps, chains, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""

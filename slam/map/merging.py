@@ -1,7 +1,7 @@
-"""One wall that stands in the map twice: found by where the entries lie, believed by their joint covariance.
+"""One wall that stands in the map twice: found by where the landmarks lie, believed by their joint covariance.
 
-Where one entry would hide the other from every beam, no covariance is asked: after a thousand sightings an EKF is surer
-of the millimetres between the two than it has a right to be, and would keep both for good.
+Where one landmark would hide the other from every beam, no covariance is asked: after a thousand observations an EKF is
+surer of the millimetres between the two than it has a right to be, and would keep both for good.
 """
 
 from collections.abc import Collection
@@ -17,8 +17,8 @@ from .stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True)
-class DuplicatesConfig:
-    """When two entries of a map may be one wall."""
+class MergingConfig:
+    """When two landmarks of a map may be one wall."""
 
     turn_rad: float = float(np.deg2rad(5.0))
     """Largest difference in direction; the other face of a wall differs by pi."""
@@ -34,7 +34,7 @@ class DuplicatesConfig:
     hidden_m: float = 0.01
     """Two faces on one side no farther apart than this, at both ends of the shorter one, are one to a laser whose
     beams are as far off: the nearer hides the farther. With 0.02 m eight mergers in 121 apartments were false, none
-    by the gate alone: an entry across a step of 2 cm from wall to wall lies near both."""
+    by the gate alone: an landmark across a step of 2 cm from wall to wall lies near both."""
     hidden_overlap_m: float = 1.0
     """They overlap by at least this."""
     hidden_share: float = 0.5
@@ -45,13 +45,13 @@ def duplicate_of(
     walls: StochasticMap,
     touched: Collection[int],
     one_wall: float,
-    config: DuplicatesConfig = DuplicatesConfig(),
+    config: MergingConfig = MergingConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> tuple[int, int] | None:
-    """Return the ids (older, younger) of two entries of one wall, one of them among `touched`, or None.
+    """Return the ids (older, younger) of two landmarks of one wall, one of them among `touched`, or None.
 
     `one_wall` is the probability level of the chi-square gate on the difference of the two lines; `cut` are pairs of
-    ids, the lower first, of which it is known that they are two walls (`kinks`).
+    ids, the lower first, of which it is known that they are two walls (`change_points`).
 
     The belief is asked once at most, for all that geometry leaves; the likeliest place for a mistake, a large
     uncertainty between the two, is what the bounds of geometry are for.
@@ -72,23 +72,23 @@ def duplicate_of(
 
 
 def lying_along(
-    walls: StochasticMap, touched: Collection[int], config: DuplicatesConfig
+    walls: StochasticMap, touched: Collection[int], config: MergingConfig
 ) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
     """Return the pairs of ids (older first) of trusted walls on one side that lie along each other, by position.
 
     And of which pairs the one hides the other.
     """
-    firm = np.flatnonzero(~walls.tentative)
-    ours = firm[np.isin(walls.ids[firm], list(touched))]
+    established = np.flatnonzero(~walls.tentative)
+    ours = established[np.isin(walls.ids[established], list(touched))]
     alpha, ends = walls.belief.means[:, 0], walls.ends_world
     middle, length = ends.mean(axis=1), walls.extents[:, 1] - walls.extents[:, 0]
     # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
-    between = middle[ours, None] - middle[firm]
-    reach = 0.5 * (length[ours, None] + length[firm]) + config.across_m
-    near = (between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2) & (ours[:, None] != firm)
-    near &= np.cos(alpha[ours, None] - alpha[firm]) > np.cos(config.turn_rad)
+    between = middle[ours, None] - middle[established]
+    reach = 0.5 * (length[ours, None] + length[established]) + config.across_m
+    near = (between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2) & (ours[:, None] != established)
+    near &= np.cos(alpha[ours, None] - alpha[established]) > np.cos(config.turn_rad)
     row, column = np.nonzero(near)
-    one, other = ours[row], firm[column]
+    one, other = ours[row], established[column]
     older, younger = np.divmod(np.unique(np.minimum(one, other) * len(walls) + np.maximum(one, other)), len(walls))
     is_shorter = length[older] <= length[younger]
     shorter, longer = np.where(is_shorter, older, younger), np.where(is_shorter, younger, older)

@@ -17,7 +17,7 @@ from .stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True)
-class GapsConfig:
+class OpeningsConfig:
     """When a gap counts as passed."""
 
     least_m: float = 0.15
@@ -33,10 +33,10 @@ class GapsConfig:
     behind it, across the wall: five sigmas of a beam."""
 
 
-class Gaps:
+class Openings:
     """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through."""
 
-    def __init__(self, config: GapsConfig, chains: ChainConfig, records: Records | None = None) -> None:
+    def __init__(self, config: OpeningsConfig, chains: ChainConfig, records: Records | None = None) -> None:
         self._config, self._chains = config, chains
         self._records = Records() if records is None else records
         self._records.relate("passed", "cut_off")
@@ -52,7 +52,7 @@ class Gaps:
         return self._records.pairs["cut_off"]
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
-        """Hold one scan, taken at the map's pose, against gaps and corners of all firm walls within its range."""
+        """Hold one scan, taken at the map's pose, against gaps and corners of established walls within its range."""
         config, pose = self._config, walls.belief.pose_world
         widest_m = self._chains.set_aside_reach_m
         rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + widest_m))

@@ -10,7 +10,7 @@ from ..robot import Scan
 
 
 @dataclass(frozen=True)
-class Sightlines:
+class RayEvidence:
     """Beams against walls."""
 
     along: Float[np.ndarray, "n k"]
@@ -21,13 +21,13 @@ class Sightlines:
     """The beam goes on beyond the line: there is no wall where it crosses."""
 
 
-def sightlines(
+def ray_evidence(
     scan: Scan,
     pose_world: Float[np.ndarray, "3"],
     anchors: Float[np.ndarray, "n 2"],
     means: Float[np.ndarray, "n 2"],
     margin_m: float,
-) -> Sightlines:
+) -> RayEvidence:
     """Compare a scan with lines (alpha, d) about anchors, world frame; `margin_m` is across the line."""
     n = normals(means[:, 0])
     to_anchor = anchors - pose_world[:2]
@@ -44,4 +44,4 @@ def sightlines(
     returned = np.isfinite(scan.ranges_m)
     hits = ahead & returned & (np.abs(across) <= margin_m)
     passes = ahead & (across > margin_m)
-    return Sightlines(along, hits, passes)
+    return RayEvidence(along, hits, passes)

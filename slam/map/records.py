@@ -16,7 +16,7 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True)
 class Merger:
-    """Two entries of the map that are one wall: the rows, and how the dropped one lies to the kept one."""
+    """Two landmarks of the map that are one wall: the rows, and how the dropped one lies to the kept one."""
 
     keep: int
     """Row."""

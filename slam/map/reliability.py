@@ -1,9 +1,9 @@
-"""Which sightings may move the estimate: those of a clear direction, on walls of which all sightings together agree.
+"""Which observations may move the estimate: those of a clear direction, on walls of which all observations agree.
 
 Around a corner of short faces a line fits six beams of each scan well enough, and another line from every place. What
-makes the direction clear is then that it took in a beam of the next face: the sightings that are let through are the
+makes the direction clear is then that it took in a beam of the next face: the observations that are let through are the
 wrong ones. One scan cannot tell such a line from a wall; all scans together can. So they can where the robot, far
-from a wall that bends by a few degrees, sees of it now one side and then the other: each sighting is straight.
+from a wall that bends by a few degrees, sees of it now one side and then the other: each observation is straight.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from .records import Merger, Records
 
 
 @dataclass(frozen=True)
-class FirmnessConfig:
+class ReliabilityConfig:
     """When a direction is clear, and when a wall is not straight."""
 
     heading_rad: float = float(np.deg2rad(3.0))
@@ -41,17 +41,17 @@ class FirmnessConfig:
     """Straight walls are taken for crooked this rarely by each of the three tests."""
 
 
-def are_clear(segments: Segments, config: FirmnessConfig = FirmnessConfig()) -> Bool[np.ndarray, " s"]:
+def are_clear(segments: Segments, config: ReliabilityConfig = ReliabilityConfig()) -> Bool[np.ndarray, " s"]:
     """Return which segments have enough beams and a clear direction."""
     return ~segments.is_tentative & (segments.cov[:, 0, 0] < config.heading_rad**2)
 
 
 def as_told(
-    cov: Float[np.ndarray, "m 2 2"], few: Bool[np.ndarray, " m"], config: FirmnessConfig = FirmnessConfig()
+    cov: Float[np.ndarray, "m 2 2"], few: Bool[np.ndarray, " m"], config: ReliabilityConfig = ReliabilityConfig()
 ) -> Float[np.ndarray, "m 2 2"]:
-    """Return the covariances of (alpha, r) of sightings that together move the estimate, of which `few` show few beams.
+    """Return the covariances of (alpha, r) of observations that together move the estimate; `few` show few beams.
 
-    Beside a clear sighting one of few beams says where the robot stands, not how it is turned: such a line over the
+    Beside a clear observation one of few beams says where the robot stands, not how it is turned: such a line over the
     corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
@@ -61,10 +61,10 @@ def as_told(
     return cov + turn[:, :, None] * turn[:, None]
 
 
-class Firmness:
-    """Sums over the sightings of each wall."""
+class Reliability:
+    """Sums over the observations of each wall."""
 
-    def __init__(self, config: FirmnessConfig = FirmnessConfig(), records: Records | None = None) -> None:
+    def __init__(self, config: ReliabilityConfig = ReliabilityConfig(), records: Records | None = None) -> None:
         self._config = config
         self._records = Records() if records is None else records
         self._records.declare(
@@ -129,7 +129,7 @@ class Firmness:
 
         Where nothing else would, a long crooked wall does: it bends by a degree or two, which the wheels lose in 0.2 m.
 
-        A few beams tell where the robot stands, not where the wall does: its clear sightings together know its
+        A few beams tell where the robot stands, not where the wall does: its clear observations together know its
         direction better. Three beams from one wall's corner over the next to a third are a line, known to 0.1 degrees
         and 90 off, within the gate of a wall of vague direction.
         """
@@ -143,7 +143,7 @@ class Firmness:
         return told & (segments.lengths_m >= self._config.crooked_m)
 
     def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        """Return which walls are surely not straight: by their fits, or by what vague and clear sightings say."""
+        """Return which walls are surely not straight: by their fits, or by what vague and clear observations say."""
         rows = self._records.rows(ids)
         crooked: Bool[np.ndarray, " n"] = self._records.columns["crooked"][rows]
         return crooked

@@ -17,12 +17,12 @@ class StochasticMap:
     belief: Belief
     extents: Float[np.ndarray, "n 2"]
     """From and to along t = J n(alpha), m, measured from the anchor; the free side is on the left."""
-    sightings: Int[np.ndarray, " n"]
+    observations: Int[np.ndarray, " n"]
     """In how many scans each wall was seen with enough beams to be fused."""
     tentative: Bool[np.ndarray, " n"]
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
-    """Walls whose beams, over many scans, do not lie on a line (`firmness`): matched and chained, but they move no
+    """Walls whose beams, over many scans, do not lie on a line (`reliability`): matched and chained, but they move no
     estimate that another wall can move, and what is stated of them is not to be believed."""
 
     def __len__(self) -> int:

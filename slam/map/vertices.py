@@ -20,7 +20,7 @@ from .stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True)
-class BendsConfig:
+class VerticesConfig:
     """Where two walls make a bend, and which segments pass over it."""
 
     reach_m: float = 0.1
@@ -47,8 +47,8 @@ class BendsConfig:
     """The same for a bend that a scan shows: a beam of the other side was taken in, at 4 m one in 0.13 m."""
     sharpest_rad: float = float(np.deg2rad(30.0))
     """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
-    young_sightings: int = 10
-    """A wall seen this often is not forgotten for a bend that one scan shows: all scans together tell (`kinks`)."""
+    young_observations: int = 10
+    """A wall seen this often is not forgotten for a bend that one scan shows: all scans together tell."""
     shown: float = 0.99
     """Probability level at which two neighbours in a scan turn: that they are two, the cut between them tells, too."""
     past_m: float = 0.05
@@ -56,15 +56,15 @@ class BendsConfig:
     less do not."""
 
 
-def bends_within(
+def vertices_within(
     segments: Segments,
     walls: StochasticMap,
-    config: BendsConfig = BendsConfig(),
+    config: VerticesConfig = VerticesConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> Float[np.ndarray, " b"]:
     """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief.
 
-    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`kinks`).
+    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`change_points`).
     """
     if not len(segments):
         return np.zeros(0)
@@ -82,7 +82,10 @@ def bends_within(
 
 
 def meetings(
-    walls: StochasticMap, range_m: float, config: BendsConfig = BendsConfig(), cut: Collection[tuple[int, int]] = ()
+    walls: StochasticMap,
+    range_m: float,
+    config: VerticesConfig = VerticesConfig(),
+    cut: Collection[tuple[int, int]] = (),
 ) -> tuple[Int[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
     """Return ids of walls that overlap, before and after a bend, and how far along each from its anchor they meet, m.
 
@@ -101,7 +104,7 @@ def meetings(
 
 
 def laid_across(
-    walls: StochasticMap, wall: int, along_m: float, config: BendsConfig = BendsConfig()
+    walls: StochasticMap, wall: int, along_m: float, config: VerticesConfig = VerticesConfig()
 ) -> Int[np.ndarray, " n"]:
     """Return the ids of the walls laid, like `wall`, across the bend that lies so far along it from its anchor."""
     (row,) = walls.belief.rows([wall])
@@ -110,7 +113,9 @@ def laid_across(
     return walls.ids[_across(walls, bend[None], np.array([alpha]), config.across_m, config)[0]]
 
 
-def mistaken(segments: Segments, walls: StochasticMap, config: BendsConfig = BendsConfig()) -> Int[np.ndarray, " n"]:
+def mistaken(
+    segments: Segments, walls: StochasticMap, config: VerticesConfig = VerticesConfig()
+) -> Int[np.ndarray, " n"]:
     """Return the ids of walls laid across a bend that this scan shows, and few scans before it.
 
     From 4 m the sides of a bend of a few degrees are one line of eight beams; from a step nearer they are two, and the
@@ -127,7 +132,7 @@ def mistaken(segments: Segments, walls: StochasticMap, config: BendsConfig = Ben
     points = to_world(segments.ends[before, 1] + 0.5 * between[before], pose)
     alpha = segments.lines[before, 0] + pose[2] + 0.5 * turn[before]
     laid = _across(walls, points, alpha, config.past_shown_m, config).any(axis=0)
-    return walls.ids[laid & (walls.sightings < config.young_sightings)]
+    return walls.ids[laid & (walls.observations < config.young_observations)]
 
 
 def _across(
@@ -135,7 +140,7 @@ def _across(
     bends_world: Float[np.ndarray, "b 2"],
     alpha: Float[np.ndarray, " b"],
     past_m: float,
-    config: BendsConfig,
+    config: VerticesConfig,
 ) -> Bool[np.ndarray, "b n"]:
     """Return which walls reach so far past each of the bends, about which the normals are `alpha`, on both sides."""
     means = walls.belief.means[:, 0]
@@ -147,7 +152,7 @@ def _across(
 
 
 @dataclass(frozen=True)
-class _Bends:
+class _Vertices:
     """Where walls may make a bend."""
 
     rows: Int[np.ndarray, "b 2"]
@@ -165,7 +170,7 @@ class _Bends:
 
 
 def _are_known(
-    bends: _Bends, asked: Bool[np.ndarray, " b"], walls: StochasticMap, config: BendsConfig
+    bends: _Vertices, asked: Bool[np.ndarray, " b"], walls: StochasticMap, config: VerticesConfig
 ) -> Bool[np.ndarray, " b"]:
     """Return which of the bends asked for lie between walls that are surely not one straight wall."""
     known = asked & bends.is_cut
@@ -177,7 +182,7 @@ def _are_known(
     return known
 
 
-def _bends(walls: StochasticMap, range_m: float, config: BendsConfig, cut: Collection[tuple[int, int]]) -> _Bends:
+def _bends(walls: StochasticMap, range_m: float, config: VerticesConfig, cut: Collection[tuple[int, int]]) -> _Vertices:
     """Return where bends may lie; walls that begin beyond `range_m` have none that a scan of that range shows."""
     rows = np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
     alpha, ends = walls.belief.means[rows, 0], walls.ends_world[rows]
@@ -200,7 +205,7 @@ def _bends(walls: StochasticMap, range_m: float, config: BendsConfig, cut: Colle
     at = np.where(cross, crossing, 0.5 * gap)
     points = ends[before, 1] + at[:, None] * directions(alpha[before])
     pair = np.stack([rows[before], rows[after]], axis=-1)
-    return _Bends(pair, points, np.abs(turn), cross, gap < -config.past_m, is_cut[is_bend])
+    return _Vertices(pair, points, np.abs(turn), cross, gap < -config.past_m, is_cut[is_bend])
 
 
 def _are_pairs(ids: Int[np.ndarray, " n"], pairs: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n n"]:

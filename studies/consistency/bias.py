@@ -18,9 +18,9 @@ from jaxtyping import Float
 from rich.table import Table
 
 from experiments.campaign.scores.score import offsets, wall_errors
+from experiments.replays.observations import DriveObservations, observations_of, ride
 from experiments.replays.recordings import record
 from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
-from experiments.replays.sightings import Sightings, ride, sightings_of
 from experiments.scenario import TrialConfig, strategy_of
 from experiments.scoring.coverage import alignment
 from experiments.terminal.console import plain_console
@@ -138,14 +138,14 @@ def rows_of(study: Study, task: tuple[str, int]) -> Rows:
     rows: Rows = {}
     for fault in study.chosen:
         run = faulty(made, fault)
-        drive = sightings_of(run, False) if study.association == "true" else None
+        drive = observations_of(run, False) if study.association == "true" else None
         for name in study.backends:
             scores = _replayed(run, name) if drive is None else ridden_scores(run, name, drive)
             rows[study.key(strategy, fault, name, seed)] = scores
     return rows
 
 
-def ridden_scores(run: RecordedRun, name: str, drive: Sightings) -> Sequence[Any]:
+def ridden_scores(run: RecordedRun, name: str, drive: DriveObservations) -> Sequence[Any]:
     """Return the scores of a back end that is handed what was seen, wall by wall."""
     ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     to_true = alignment(run.start_pose, run.true_poses_world[0])

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import tyro
 
+from experiments.replays.observations import DriveObservations, observations_of, ride, start
 from experiments.replays.recordings import record
 from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
-from experiments.replays.sightings import Sightings, ride, sightings_of, start
 from experiments.scenario import P0, P0_SIGMAS, TrialConfig
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
@@ -45,7 +45,7 @@ class Study:
     perfect_extraction: bool = True
     """True lines with an error drawn as the measurement model states it."""
     told_noise: float = 1.0
-    """The back ends are told this share of the sightings' covariance: below 1 they must be found out."""
+    """The back ends are told this share of the observations' covariance: below 1 they must be found out."""
     driver: str = "full-ekf"
     """The estimator that explored, from a small start covariance, when the recordings were made."""
     recordings: Path | None = None
@@ -84,7 +84,9 @@ class Study:
 def rows_of(study: Study, seed: int) -> Rows:
     """Record one seed, or find its recording, and send it through every back end; raises UsageError for a bad one."""
     made = record(TrialConfig(study.world, study.driver, seed=seed), study.recordings)
-    drive = sightings_of(made, study.perfect_extraction).told(study.told_noise) if study.association == "true" else None
+    drive = (
+        observations_of(made, study.perfect_extraction).told(study.told_noise) if study.association == "true" else None
+    )
     rows: Rows = {}
     for p0 in study.p0:
         pose, cov = start(seed, made.true_poses_world[0], p0)
@@ -101,7 +103,7 @@ def _replayed(run: RecordedRun, name: str, study: Study) -> Sequence[Any]:
     return [summary[key] for key in SCORES]
 
 
-def _ridden(run: RecordedRun, name: str, drive: Sightings) -> Sequence[Any]:
+def _ridden(run: RecordedRun, name: str, drive: DriveObservations) -> Sequence[Any]:
     ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     off = ridden.estimated_world[:, :2] - ridden.true_poses_world[:, :2]
     rmse, lines = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), len(ridden.true_lines_world)

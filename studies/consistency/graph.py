@@ -1,7 +1,7 @@
 """The factor graph against an independent solution: dense Gauss-Newton over every pose and line of one recorded run.
 
-The truth here shares only numbers with the graph: what was sensed, with its covariances, and which line each sighting
-went into. Errors are written out anew and differentiated numerically; nothing comes from GTSAM or
+The truth here shares only numbers with the graph: what was sensed, with its covariances, and the line of each
+observation. Errors are written out anew and differentiated numerically; nothing comes from GTSAM or
 `slam.estimation.models`.
 """
 
@@ -28,7 +28,7 @@ STEP = 1e-6
 
 @dataclass(frozen=True)
 class Problem:
-    """All that a graph was told: n poses, the first with a prior, m sightings of l lines."""
+    """All that a graph was told: n poses, the first with a prior, m observations of l lines."""
 
     prior: Float[np.ndarray, "3"]
     prior_cov: Float[np.ndarray, "3 3"]
@@ -55,7 +55,7 @@ class Problem:
     ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "l 2"], Float[np.ndarray, "s s"]]:
         """Return poses, lines (alpha, d about their anchors) and the covariance of all, from a first guess.
 
-        The noise of a sighting depends a little on the solution: each round takes it from the one before.
+        The noise of a observation depends a little on the solution: each round takes it from the one before.
         """
         poses, lines = poses.copy(), lines.copy()
         for _ in range(rounds):

@@ -15,7 +15,7 @@ import numpy as np
 import tyro
 
 from experiments.replays.corridor import Loop, drive
-from experiments.replays.sightings import Sightings, ride, start
+from experiments.replays.observations import DriveObservations, ride, start
 from experiments.scenario import P0, P0_SIGMAS
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
@@ -77,7 +77,7 @@ def rows_of(study: Study, task: tuple[Loop, int]) -> Rows:
     return {study.key(loop, name, seed): ridden_scores(study.p0, name, loop, seed, seen) for name in study.backends}
 
 
-def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: Sightings) -> Sequence[Any]:
+def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservations) -> Sequence[Any]:
     """Return the scores of one back end on one ring's drive: None where its covariance is none."""
     ridden = ride(BACKENDS[name].make(*start(seed, seen.true_poses_world[0], p0)), seen)
     heading = np.abs(wrap(ridden.estimated_world[:, 2] - ridden.true_poses_world[:, 2])).max()

@@ -61,7 +61,7 @@ def test_every_segment_of_a_known_room_belongs_to_a_wall_of_the_map():
         assert sorted(update.walls_of_segments.tolist()) == first.map.ids.tolist()
         assert len(update.matches.unmatched) == 0
     assert not update.map.tentative.any()
-    assert np.all(update.map.sightings == len(PLACES))
+    assert np.all(update.map.observations == len(PLACES))
 
 
 @pytest.mark.parametrize("backend", list(BACKENDS))

@@ -1,4 +1,4 @@
-"""What the studies of back ends rest on: sightings told wall by wall, noise as stated, rings of corridors."""
+"""What the studies of back ends rest on: observations told wall by wall, noise as stated, rings of corridors."""
 
 import csv
 from dataclasses import replace
@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from experiments.campaign.scores.score import offsets
 from experiments.replays.corridor import FIRM_RAD, Loop, drive, on_ring
+from experiments.replays.observations import observations_of, ride, start
 from experiments.replays.oracles import as_stated
 from experiments.replays.recordings import record, recorded
 from experiments.replays.replay import ReplayOptions, replay
-from experiments.replays.sightings import ride, sightings_of, start
 from experiments.reproductions.runs.origin import Study as OriginStudy
 from experiments.reproductions.runs.standing import slope, stand
 from experiments.scenario import TrialConfig
@@ -36,7 +36,7 @@ few = settings(max_examples=20, deadline=None, derandomize=True)
 @pytest.mark.parametrize("perfect", [True, False])
 def test_a_back_end_alone_gets_what_the_mapper_would_hand_it_bit_for_bit(perfect):
     run = recorded(run_trial(TrialConfig("paper-fig4", seed=4, max_steps=25)))
-    ridden = ride(BACKENDS["full-ekf"].make(run.start_pose.copy(), run.start_cov.copy()), sightings_of(run, perfect))
+    ridden = ride(BACKENDS["full-ekf"].make(run.start_pose.copy(), run.start_cov.copy()), observations_of(run, perfect))
     mapped = replay(run, "full-ekf", ReplayOptions("true", perfect))
     np.testing.assert_array_equal(ridden.estimated_world, mapped.log.estimated_world)
     np.testing.assert_array_equal(ridden.estimated_cov, mapped.log.estimated_cov)
@@ -45,7 +45,7 @@ def test_a_back_end_alone_gets_what_the_mapper_would_hand_it_bit_for_bit(perfect
 
 @few
 @given(seed=st.integers(0, 2**32))
-def test_a_sighting_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
+def test_a_observation_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
     """Whitened by the model's own R at the truth, the innovation is the draw, however far off the direction is."""
     rng = np.random.default_rng(seed)
     pose, alpha, r = np.array([1.0, -2.0, 0.4]), rng.uniform(-3, 3, 6), rng.uniform(0.5, 4.0, 6)

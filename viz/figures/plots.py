@@ -52,7 +52,7 @@ def draw_trajectories(
     title: str,
     wheels_world: Float[np.ndarray, "s 3"] | None = None,
 ) -> Figure:
-    """Return the paths that back ends estimate over the true one and over what the wheels alone say."""
+    """Return the paths that back ends estimate over the true one and over what the odometry alone say."""
     figure, axes = _plan(rings, title)
     if true_world is not None:
         axes.plot(
@@ -60,7 +60,7 @@ def draw_trajectories(
         )
     if wheels_world is not None:
         axes.plot(
-            wheels_world[:, 0], wheels_world[:, 1], ":", color=palette.TENTATIVE, linewidth=1.2, label="wheels alone"
+            wheels_world[:, 0], wheels_world[:, 1], ":", color=palette.TENTATIVE, linewidth=1.2, label="odometry alone"
         )
     # Estimates that agree lie on each other: each is drawn narrower than the one below it.
     widths = np.linspace(2.4, 0.8, len(estimated_world)) if len(estimated_world) > 1 else np.ones(1)

@@ -70,7 +70,7 @@ def _wall_features(walls: StochasticMap, chains: tuple[Chain, ...], joint: Joint
                 chain=chain_of.get(wall),
                 tentative=bool(walls.tentative[row]),
                 crooked=bool(walls.crooked[row]),
-                sightings=int(walls.sightings[row]),
+                observations=int(walls.observations[row]),
                 alpha_rad=walls.belief.means[row, 0],
                 d_m=walls.belief.means[row, 1],
                 anchor_m=walls.belief.anchors[row],

@@ -57,7 +57,7 @@ def _outside(row: Row) -> tuple[Row, bool | None]:
 
 
 def _wrong(row: Row, pooled: Sequence[Row]) -> tuple[Row, bool | None]:
-    """Count per sighting: one back end may drive further than another."""
+    """Count per observation: one back end may drive further than another."""
     rates = {r["backend"]: _rate(r) for r in pooled if r["arm"] == row["arm"] and r["sightings"]}
     others = {name: rate for name, rate in rates.items() if name != row["backend"]}
     if row["backend"] not in rates or not others:

@@ -35,8 +35,8 @@ def _cell(kind: str, told: Row | None) -> str:
 
 def _wrong(found: Row) -> str:
     if found["wrong"] is None:
-        return f"{number(found['sightings'])} sightings, nothing to hold them against"
-    share = f"{number(found['wrong'])} of {number(found['sightings'])} sightings"
+        return f"{number(found['sightings'])} observations, nothing to hold them against"
+    share = f"{number(found['wrong'])} of {number(found['sightings'])} observations"
     return f"{share}, {percent(found['share'])} %; next {found['next']}, {percent(found['next_share'])} %"
 
 
@@ -69,7 +69,7 @@ def _held(found: Row) -> str:
 
 
 def _doubles(found: Row) -> str:
-    words = f"{number(found['double_entries'])} among {number(found['sightings'])} sightings"
+    words = f"{number(found['double_entries'])} among {number(found['sightings'])} observations"
     beyond = found["beyond_a_run"]
     if beyond is None:
         return words

@@ -117,7 +117,7 @@ _HONESTY_WORDS = (
 _ERROR_HEADER = (
     *("back end", "walls, cm", "shape, cm", "without", "path, cm", "heading, degrees", "entered twice"),
     "of these merged",
-    *("false matches", "missed matches %", "sightings"),
+    *("false matches", "missed matches %", "observations"),
 )
 _ERROR_WORDS = (
     "Over all worlds and strategies, rms. Walls: after undoing the error of the start; shape: after the best shift and"

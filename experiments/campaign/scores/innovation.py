@@ -11,14 +11,14 @@ from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
 from slam.evaluation.consistency import nis
 from slam.extraction.segments import Segments
-from slam.map.reliability import FirmnessConfig, are_clear
+from slam.map.reliability import ReliabilityConfig, are_clear
 
 
 @dataclass
 class InnovationEar:
     """Listens to a matcher that knows the true pairs, and keeps what the filter thought of each scan beforehand."""
 
-    firmness: FirmnessConfig
+    reliability: ReliabilityConfig
     """Segments of an unclear direction move no estimate and are not listened to."""
     values: list[float] = field(default_factory=list)
     """NIS of each scan that showed a known wall."""
@@ -48,7 +48,7 @@ class InnovationEar:
         return float(np.sum(before * after) / norm) if norm > 0 else None
 
     def _hear(self, segments: Segments, ids: Int[np.ndarray, " n"], joint: Joint, matches: Matches) -> None:
-        pairs = matches.pairs[are_clear(segments, self.firmness)[matches.pairs[:, 0]]]
+        pairs = matches.pairs[are_clear(segments, self.reliability)[matches.pairs[:, 0]]]
         if not len(pairs):
             self._before = {}
             return

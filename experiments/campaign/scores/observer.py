@@ -119,7 +119,7 @@ def association_counts(fates: list[Fate], votes: Votes) -> dict[str, int]:
 def _lying_on(
     ends_robot: Float[np.ndarray, "m 2 2"], pose_world: Float[np.ndarray, "3"], walls: StochasticMap
 ) -> list[Int[np.ndarray, " _"]]:
-    """Return, for each segment, the rows of the firm walls that it lies on."""
+    """Return, for each segment, the rows of the established walls that it lies on."""
     lines = walls.belief.lines_world
     ends = to_world(ends_robot, pose_world)
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
@@ -147,6 +147,6 @@ def _moment(step: Step, joint: Joint | None) -> Moment:
         belief, pose_world=belief.pose_world.copy(), pose_cov=belief.pose_cov.copy(), ids=belief.ids.copy(),
         anchors=belief.anchors.copy(), means=belief.means.copy(),
     )  # fmt: skip
-    marks = (walls.sightings.copy(), walls.tentative.copy(), walls.crooked.copy())
+    marks = (walls.observations.copy(), walls.tentative.copy(), walls.crooked.copy())
     copied = StochasticMap(kept, walls.extents.copy(), *marks)
     return Moment(step.index, step.path_length_m, copied, joint)

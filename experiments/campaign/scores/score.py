@@ -100,14 +100,14 @@ class _Scorer:
     nees: Float[np.ndarray, " s"]
 
     def coverage(self, moment: Moment) -> float:
-        firm = ~moment.map.tentative
-        return coverage(self.samples, to_world(moment.map.ends_world[firm], self.to_true), NEAR_NOISY_M)
+        established = ~moment.map.tentative
+        return coverage(self.samples, to_world(moment.map.ends_world[established], self.to_true), NEAR_NOISY_M)
 
     def at(self, moment: Moment) -> dict[str, Any]:
         """Return the row of one mark."""
         k, walls, log = moment.index, moment.map, self.log
-        firm, labels = ~walls.tentative, self.votes.walls_of(walls.ids)
-        among, true_pose = firm & (labels >= 0), log.true_world[k]
+        established, labels = ~walls.tentative, self.votes.walls_of(walls.ids)
+        among, true_pose = established & (labels >= 0), log.true_world[k]
         off, shape = wall_errors(walls, self.votes, among, self.to_true)
         return {
             "step": k,
@@ -123,7 +123,7 @@ class _Scorer:
             "map_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among),
             "joint_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among, with_pose=True),
             "lines": len(walls),
-            "duplicate_lines": duplicate_lines(walls, labels, firm),
+            "duplicate_lines": duplicate_lines(walls, labels, established),
         }
 
 

@@ -34,7 +34,7 @@ def map_numbers(result: TrialResult) -> dict[str, Value]:
         "coverage, %": 100.0 * summary["coverage"],
         "double entries": summary["duplicate_lines"],
         "pose error rms, cm": 100.0 * summary["pose_rmse_m"],
-        "wheels alone, worst, m": summary["odometry_max_m"],
+        "odometry alone, worst, m": summary["odometry_max_m"],
         "pose ANEES (1 is ideal)": summary["pose_anees"],
         "map ANEES (1 is ideal)": summary["map_anees"],
         "least trace of the pose covariance over the start's": float(trace_over_start(result).min()),

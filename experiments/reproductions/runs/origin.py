@@ -22,7 +22,7 @@ from slam.estimation.backend import Backend
 from slam.geometry.lines import normals
 
 from ...replays.corridor import Loop, drive
-from ...replays.sightings import Sightings, ride, start
+from ...replays.observations import DriveObservations, ride, start
 from ...scenario import P0, P0_SIGMAS
 from ...terminal.console import plain_console
 from ...usage import choose
@@ -79,7 +79,7 @@ class Study:
             return np.nan, np.nan, np.nan
 
 
-def moved(seen: Sightings, shift: Float[np.ndarray, "2"]) -> Sightings:
+def moved(seen: DriveObservations, shift: Float[np.ndarray, "2"]) -> DriveObservations:
     """Return the same drive in a world that stands elsewhere; what the robot reports stays as it was."""
     lines = {wall: line + np.array([0.0, normals(line[:1])[0] @ shift]) for wall, line in seen.true_lines_world.items()}
     return replace(seen, true_poses_world=seen.true_poses_world + np.append(shift, 0.0), true_lines_world=lines)

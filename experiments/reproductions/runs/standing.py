@@ -17,7 +17,7 @@ from slam.geometry.lines import through
 from slam.geometry.poses import J
 
 from ...replays.corridor import look, on_ring, ring
-from ...replays.sightings import start
+from ...replays.observations import start
 from ...scenario import P0, P0_SIGMAS
 from ...terminal.console import plain_console
 from ...usage import UsageError, choose

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from slam.backends import BACKENDS
 from viz.figures.plots import draw_traversal, traversals
 
+from ...replays.observations import observations_of, ride
 from ...replays.recordings import recorded
-from ...replays.sightings import ride, sightings_of
 from ...scenario import TrialConfig
 from ...trial import TrialResult
 from ...views.timelines import true_rings
@@ -23,7 +23,7 @@ RIDERS = (PAPER, "full-ekf", "invariant-ekf")
 """The graph keeps every pose of some thousand and would take minutes."""
 NOTES = (
     "As in the paper, motion and perception are errorless, so that the seed changes nothing; the models keep their"
-    f" stated noise. {PAPER} drives; sigmas are of each back end alone on the same sightings, true association.",
+    f" stated noise. {PAPER} drives; sigmas are of each back end alone on the same observations, true association.",
 )
 NEAR_START_M = 1.0
 AWAY_M = 1.5
@@ -40,7 +40,7 @@ def traversal_numbers(config: TrialConfig) -> dict[str, dict[str, Value]]:
         "share of the path driven before, %": 100.0 * float(np.mean(traversals(log.true_world[:, :2]) > 1)),
     }
     run = recorded(made)
-    seen = sightings_of(run, perfect_extraction=False)
+    seen = observations_of(run, perfect_extraction=False)
     ours = {}
     for name in RIDERS:
         covs = ride(

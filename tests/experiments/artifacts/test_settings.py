@@ -160,12 +160,24 @@ def test_the_settings_of_a_campaign_are_those_that_differ_from_the_defaults(tmp_
 
 
 def test_a_config_of_the_first_format_is_read_as_what_it_was(tmp_path):
+    before = sorted(((now, old) for old, now in RENAMED.items() if now is not None), key=lambda pair: -len(pair[0]))
+
+    def old_name(key):
+        for now, old in before:
+            if key == now or key.startswith(f"{now}."):
+                return old + key[len(now) :]
+        return key
+
     record = json.loads(json_bytes(config_record(TrialConfig("hall", seed=4)))) | {"format": 1}
-    for new, old in [(new, old) for old, new in RENAMED.items() if new is not None]:
-        value = LEAVES[new]
-        record["trial"] = over(record["trial"], nested([(old, value)]))
-    del record["trial"]["mission"]["mapper"]["matching"]["gate"]
+    said = [(key, 0.85 if key.endswith(".torn.across_m") else value)
+            for key, value in ((old_name(key), value) for key, value in leaves(record["trial"]))]  # fmt: skip
+    record["trial"] = nested(said)
+    assert "torn" in record["trial"]["mission"]["mapper"]
     path = tmp_path / "config.json"
+    path.write_text(json.dumps(record))
+    assert read_trial(path).mission.mapper.ambiguity.across_m == 0.85
+    record["trial"] = over(record["trial"], nested([("mission.mapper.torn.across_m", 0.2)]))
+    del record["trial"]["mission"]["mapper"]["matching"]["gate"]
     path.write_text(json.dumps(record))
     assert read_trial(path) == TrialConfig("hall", seed=4)
     now = json.loads(json_bytes(config_record(TrialConfig("hall", seed=4))))

@@ -44,9 +44,9 @@ def test_a_campaign_takes_from_a_file_what_no_option_says(tmp_path):
 
 
 def test_a_group_that_may_be_none_is_switched_off_and_stays_so():
-    settled = campaign("--set", "mission.mapper.duplicates=null", "--set", f"{GATE}=0.9")
+    settled = campaign("--set", "mission.mapper.merging=null", "--set", f"{GATE}=0.9")
     trial = config_of(settled, Trial("paper-fig8", "nearest-robot", "graph", CLOSED, 1))
-    assert trial.mission.mapper.duplicates is None
+    assert trial.mission.mapper.merging is None
     assert gate_of(settled) == trial.mission.mapper.matching.gate == 0.9
     assert gate_of(campaign()) == 0.99
     # The command that a report names makes the same campaign.

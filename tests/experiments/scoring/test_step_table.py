@@ -18,7 +18,7 @@ def test_each_column_is_that_of_its_name():
     table = {name: [row[name] for row in rows] for name in STEP_COLUMNS}
     assert table.pop("reason") == ["begins", "follows", "ends"]
     estimated = TRUE + OFF
-    # The wheels alone go to (1.1, 1) and (1.2, 1) from the true start.
+    # The odometry alone go to (1.1, 1) and (1.2, 1) from the true start.
     expected = {
         "step": [0, 1, 2], "time_s": [0, 1, 2], "path_length_m": [0.0, 0.1, 0.25],
         "pose_nees": nees_of_poses(estimated, COVS, TRUE), "pose_trace": COVS[:, 0, 0] + COVS[:, 1, 1] + COVS[:, 2, 2],

@@ -49,4 +49,4 @@ def test_the_title_says_replayed_and_holds_one_error_against_the_other_in_one_un
         shown = saved_map(folder, read.trial, read.log, read.walls, read.estimated_world)
         assert shown.title == f"paper-fig4   full-ekf, {how}, seed 1"
         errors = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
-        assert "pose error rms {:.1f} cm (wheels alone {:.0f} cm)".format(*errors) in shown.subtitle
+        assert "pose error rms {:.1f} cm (odometry alone {:.0f} cm)".format(*errors) in shown.subtitle

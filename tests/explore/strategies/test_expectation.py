@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.strategies.expectation import DRIFT_SIGMAS, SIGHTING_SIGMAS, expect, position_sigma, walls_seen_from
+from explore.strategies.expectation import DRIFT_SIGMAS, OBSERVATION_SIGMAS, expect, position_sigma, walls_seen_from
 from explore.strategies.uncertainty import UNKNOWN_WALL, Uncertainty, new_wall_nats
 from slam.geometry.lines import directions, normals
 
@@ -55,7 +55,7 @@ def test_the_expected_pose_and_gain_are_those_of_a_kalman_update_in_information_
         return np.stack([lines[:, 0] - p[2], r - foot * epsilon], axis=-1).ravel()
 
     H = np.stack([(h(state + d) - h(state - d)) / 2e-6 for d in steps], axis=1)
-    R = np.diag(np.tile(SIGHTING_SIGMAS**2, m))
+    R = np.diag(np.tile(OBSERVATION_SIGMAS**2, m))
     after = np.linalg.inv(np.linalg.inv(prior) + H.T @ np.linalg.inv(R) @ H)
     found = expect(walls, seen, place, metres)
     np.testing.assert_allclose(found.pose_cov, after[:3, :3], rtol=1e-4, atol=1e-12)

@@ -20,7 +20,7 @@ from tests.slam.association.test_matching import straight_pieces
 IDS = np.array([4, 9])
 PRIOR = np.array([0.05, 0.08, np.deg2rad(2.0)])
 SEEN = np.array([np.deg2rad(0.1), 0.003])
-TORN = replace(NO_MATCHES, torn=np.array([[0, 4, 9]]))
+AMBIGUOUS = replace(NO_MATCHES, ambiguous=np.array([[0, 4, 9]]))
 
 
 def two_walls(turn_rad, across_m):
@@ -30,7 +30,7 @@ def two_walls(turn_rad, across_m):
     return Joint(mean, stated, np.array([[1.5, 0.0], [1.5, 0.0]]))
 
 
-def sighting(line):
+def observation(line):
     """Return one segment, 3 m of a line in the robot's frame."""
     foot, along = line[1] * normals(np.array(line[0])), directions(np.array(line[0]))
     piece = straight_pieces([[foot + 1.5 * along, foot - 1.5 * along]])
@@ -45,8 +45,8 @@ def test_whichever_it_was_the_robot_knows_its_heading_better_and_no_better_than_
     for trial in range(400):
         pose = PRIOR * rng.standard_normal(3)
         lines = lines_robot(pose, joint.anchors, joint.mean[3:].reshape(-1, 2))
-        seen = sighting(lines[rng.integers(2)] + SEEN * rng.standard_normal(2))
-        likelier_first = TORN if trial % 2 else replace(TORN, torn=np.array([[0, 9, 4]]))
+        seen = observation(lines[rng.integers(2)] + SEEN * rng.standard_normal(2))
+        likelier_first = AMBIGUOUS if trial % 2 else replace(AMBIGUOUS, ambiguous=np.array([[0, 9, 4]]))
         rows, observed = observed_either_way(likelier_first, seen, IDS, joint)
         assert rows.tolist() == [0]
         after = relocate(joint, IDS, observed)
@@ -59,27 +59,29 @@ def test_whichever_it_was_the_robot_knows_its_heading_better_and_no_better_than_
 def test_two_walls_that_are_not_alike_are_no_guide():
     for turn_deg, across_m in ((3.0, 0.0), (0.0, 0.25), (1.5, 0.18)):
         joint = two_walls(np.deg2rad(turn_deg), across_m)
-        seen = sighting((0.0, 1.5))
-        rows, observed = observed_either_way(TORN, seen, IDS, joint)
+        seen = observation((0.0, 1.5))
+        rows, observed = observed_either_way(AMBIGUOUS, seen, IDS, joint)
         assert not len(rows)
         assert not len(observed.ids)
         assert not len(observed_either_way(NO_MATCHES, seen, IDS, joint)[0])
 
 
-def heading_error_deg(is_torn):
+def heading_error_deg(is_ambiguous):
     """Return the worst error where the wheels miss half a degree a step beside one wall, which may be either of two."""
     finder = RangeFinder(np.array([[[5.0, 1.0], [-5.0, 1.0]]]), LidarConfig())
     wheels = Odometry(np.zeros(3), np.diag([0.002, 0.002, np.deg2rad(0.5)]) ** 2)
     step = 0
 
-    def torn(segments, walls, joint, config, *, clear_only=False):
+    def ambiguous(segments, walls, joint, config, *, clear_only=False):
         if step < 5:
             return match(segments, walls, joint, config, clear_only=clear_only)
         every = np.arange(len(segments))
         either = np.column_stack([every, np.full((len(every), 2), walls.ids[0])])
-        return replace(NO_MATCHES, unmatched=every, doubtful=every, torn=either if is_torn else NO_MATCHES.torn)
+        return replace(
+            NO_MATCHES, unmatched=every, doubtful=every, ambiguous=either if is_ambiguous else NO_MATCHES.ambiguous
+        )
 
-    mapper = Mapper(BACKENDS["full-ekf"].make(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6])), matcher=torn)
+    mapper = Mapper(BACKENDS["full-ekf"].make(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6])), matcher=ambiguous)
     errors = []
     for step in range(60):
         turned = np.deg2rad(0.5) * max(step - 5, 0)
@@ -91,5 +93,5 @@ def heading_error_deg(is_torn):
 
 
 def test_beside_a_wall_that_may_be_either_the_robot_keeps_its_heading():
-    assert heading_error_deg(is_torn=True) < 1.0
-    assert heading_error_deg(is_torn=False) > 20.0
+    assert heading_error_deg(is_ambiguous=True) < 1.0
+    assert heading_error_deg(is_ambiguous=False) > 20.0

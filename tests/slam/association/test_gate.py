@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from slam.association.hypotheses import agree
-from slam.association.joint_compatibility import JointSightings, compatible
+from slam.association.joint_compatibility import JointObservations, compatible
 from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
 from slam.extraction.segments import Segments
@@ -44,9 +44,9 @@ def test_a_segment_beyond_the_level_of_two_degrees_of_freedom_is_refused(share, 
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.98, 2), (1.02, 1), (1.2, 1)])
-def test_of_two_sightings_the_one_beyond_that_level_is_dropped(share, kept):
+def test_of_two_observations_the_one_beyond_that_level_is_dropped(share, kept):
     e = np.array([0.0, 0.0, np.sqrt(share * LEVEL), 0.0])
-    both = JointSightings(e, np.zeros((3, 4)), np.eye(4))
+    both = JointObservations(e, np.zeros((3, 4)), np.eye(4))
     assert len(compatible(both, 0.99, 0.999999)) == kept
     begins = np.array([True, False])
     agreed = agree(np.array([0, 1]), np.array([0, 1]), both, begins, 0.99, 0.999999, 0.1)
@@ -126,9 +126,9 @@ def test_few_beams_alone_do_not_say_where_the_robot_is_but_belong_to_their_wall(
 
 
 @pytest.mark.parametrize("squared", [7.0, 8.0, 9.0])
-def test_sightings_of_which_each_passes_are_dropped_until_all_together_do(squared):
+def test_observations_of_which_each_passes_are_dropped_until_all_together_do(squared):
     count = 16
     e = np.tile([np.sqrt(squared), 0.0], count)
     within = [k for k in range(2, count + 1) if k * squared <= chi2.ppf(0.999999, 2 * k)]
-    kept = compatible(JointSightings(e, np.zeros((3, 2 * count)), np.eye(2 * count)), 0.99, 0.999999)
+    kept = compatible(JointObservations(e, np.zeros((3, 2 * count)), np.eye(2 * count)), 0.99, 0.999999)
     assert len(kept) == max(within)

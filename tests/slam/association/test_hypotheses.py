@@ -6,7 +6,7 @@ import shapely
 from scipy.stats import multivariate_normal
 
 from slam.association.hypotheses import agree, nearest_alone
-from slam.association.joint_compatibility import JointSightings
+from slam.association.joint_compatibility import JointObservations
 from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
 from slam.estimation.gates import gate_level
@@ -14,17 +14,17 @@ from slam.robot import Odometry
 from tests.slam.association.test_matching import Walker, faces_of, straight_pieces
 
 
-def sightings(rng, segment, noise=0.3):
-    """Return random candidates, correlated through a pose of 3 and 2 numbers of each line, as joint sightings."""
+def observations(rng, segment, noise=0.3):
+    """Return random candidates, correlated through a pose of 3 and 2 numbers of each line, as joint observations."""
     count = len(segment)
     H = rng.standard_normal((2 * count, 3))
     S = H @ np.diag([1.0, 0.5, 0.2]) @ H.T + noise * np.eye(2 * count)
     e = np.linalg.cholesky(S) @ rng.standard_normal(2 * count) + rng.choice([0.0, 3.0], 2 * count)
-    return JointSightings(e, np.zeros((3, 2 * count)), S)
+    return JointObservations(e, np.zeros((3, 2 * count)), S)
 
 
 def conditioned(seen, c, seed):
-    """Return the squared distance of one sighting given another, from the joint Gaussian of both."""
+    """Return the squared distance of one observation given another, from the joint Gaussian of both."""
     both = seen.take(np.array([seed, c]))
     joint = both.e @ np.linalg.solve(both.S, both.e)
     alone = seen.take(np.array([seed]))
@@ -32,13 +32,13 @@ def conditioned(seen, c, seed):
 
 
 def likelihood(seen, c):
-    """Return the density, per rad m, of the sighting of one wall where it was seen."""
+    """Return the density, per rad m, of the observation of one wall where it was seen."""
     one = seen.take(np.array([c]))
     return multivariate_normal(np.zeros(2), one.S).pdf(one.e)
 
 
 def together(seen, pairs):
-    """Return the squared distance of some sightings taken together."""
+    """Return the squared distance of some observations taken together."""
     some = seen.take(np.array(pairs, dtype=np.int64))
     return some.e @ np.linalg.solve(some.S, some.e)
 
@@ -75,7 +75,7 @@ def test_the_cheapest_hypothesis_of_all_is_found_and_its_margin(seed):
     rng = np.random.default_rng(seed)
     segment = np.sort(rng.integers(0, 5, rng.integers(1, 12)))
     line = np.concatenate([rng.permutation(12)[: np.count_nonzero(segment == s)] for s in np.unique(segment)])
-    seen, may_seed = sightings(rng, segment), rng.uniform(size=len(segment)) < 0.8
+    seen, may_seed = observations(rng, segment), rng.uniform(size=len(segment)) < 0.8
     agreed = agree(segment, line, seen, may_seed, 0.99, 0.999999, 1e-3)
     found = hypotheses(segment, seen, np.flatnonzero(may_seed), gate_level(0.99, 2), gate_level(0.999999, 2), 1e-3)
     if not found:
@@ -126,13 +126,13 @@ def test_a_robot_that_is_lost_takes_no_wall_beyond_the_gate():
     far = np.sqrt(12.0)
     for sigmas, kept in (((0.026, 0.005), 1), ((0.12, 0.3), 0)):
         S = np.diag(np.square(sigmas))
-        seen = JointSightings(np.array([far * sigmas[0], 0.0]), np.zeros((3, 2)), S)
+        seen = JointObservations(np.array([far * sigmas[0], 0.0]), np.zeros((3, 2)), S)
         agreed = agree(np.array([0]), np.array([0]), seen, np.array([True]), 0.99, 0.999999, 0.1)
         assert len(agreed.pairs) == kept
 
 
 def alone(d2, between, cov_between):
-    """Return what is matched of one segment with two candidates, and which it is torn between.
+    """Return what is matched of one segment with two candidates, and which it may be of.
 
     By their distances and what the map says of both.
     """
@@ -140,9 +140,9 @@ def alone(d2, between, cov_between):
     S = np.kron(np.array([[1.0, 1.0], [1.0, 1.0]]), np.eye(2)) + 0.1 * np.eye(4)
     S[2:, 2:] += cov_between * np.eye(2)
     R = np.broadcast_to(0.05 * np.eye(2), (2, 2, 2))
-    seen = JointSightings(e, np.zeros((3, 4)), S)
-    chosen, torn = nearest_alone(np.zeros(2, dtype=np.int64), np.array(d2), seen, R, 0.99, 9.0)
-    return chosen.tolist(), torn.tolist()
+    seen = JointObservations(e, np.zeros((3, 4)), S)
+    chosen, ambiguous = nearest_alone(np.zeros(2, dtype=np.int64), np.array(d2), seen, R, 0.99, 9.0)
+    return chosen.tolist(), ambiguous.tolist()
 
 
 def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_of_two_entries_of_one():
@@ -154,7 +154,7 @@ def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_o
 
 
 def test_the_only_wall_in_sight_is_found_where_it_stands_in_the_map_as_two_that_would_be_merged():
-    """Half of a hall's wall was entered again, 4 sigmas off: refused, the robot drove along it by its wheels alone."""
+    """Half of a hall's wall was entered again, 4 sigmas off: refused, the robot drove along it by odometry alone."""
     walls = KnownWalls(np.array([3, 7]), np.array([[-4.0, 0.1], [-0.1, 4.0]]))
     anchors, sigma = np.array([[0.0, 1.5], [0.0, 1.5]]), np.deg2rad(0.03)
     for turned, matched in ((3.8, 1), (30.0, 0)):
@@ -166,4 +166,4 @@ def test_the_only_wall_in_sight_is_found_where_it_stands_in_the_map_as_two_that_
         assert not len(found.pairs)
         found = match(segment, walls, joint)
         assert len(found.pairs) == matched
-        assert sorted(found.torn.ravel().tolist()) == ([] if matched else [0, 3, 7])
+        assert sorted(found.ambiguous.ravel().tolist()) == ([] if matched else [0, 3, 7])

@@ -1,9 +1,9 @@
-"""Sightings taken together: conditioning on them, and which of them agree."""
+"""Observations taken together: conditioning on them, and which of them agree."""
 
 import numpy as np
 import pytest
 
-from slam.association.joint_compatibility import JointSightings, compatible, relocate
+from slam.association.joint_compatibility import JointObservations, compatible, relocate
 from slam.estimation.backend import Joint, Observations
 from slam.estimation.models import innovations, lines_robot
 from slam.geometry.poses import wrap
@@ -69,13 +69,13 @@ def test_relocation_by_nothing_is_no_relocation():
     assert relocate(joint, np.array([5]), nothing) is joint
 
 
-def test_the_sighting_that_the_others_contradict_is_dropped_though_alone_it_would_pass():
-    """One error of 20 mm is common to four sightings, each known to 1 mm in itself; one of them is 8 mm off."""
+def test_the_observation_that_the_others_contradict_is_dropped_though_alone_it_would_pass():
+    """One error of 20 mm is common to four observations, each known to 1 mm in itself; one of them is 8 mm off."""
     shared, own = 0.02, 0.001
     S = shared**2 * np.kron(np.ones((4, 4)), np.eye(2)) + own**2 * np.eye(8)
     e = np.tile([0.03, 0.0], 4)
     e[4] += 0.008
-    seen = JointSightings(e, np.zeros((3, 8)), S)
+    seen = JointObservations(e, np.zeros((3, 8)), S)
     alone = [part.e @ np.linalg.solve(part.S, part.e) for part in (seen.take(np.array([k])) for k in range(4))]
     assert max(alone) < 9.2
     assert compatible(seen, 0.99, 0.99).tolist() == [0, 1, 3]

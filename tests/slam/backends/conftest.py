@@ -1,4 +1,4 @@
-"""Sightings of lines drawn straight from the model, with known association, for tests of filters."""
+"""Observations of lines drawn straight from the model, with known association, for tests of filters."""
 
 from dataclasses import dataclass
 

@@ -83,7 +83,7 @@ def assert_sound(backend):
 
 
 def journey(name, room, steps, rng, start=START, world=NOWHERE, order=lambda rows: rows):
-    """Drive a noisy circle through a room whose sightings do not depend on where `world` puts it.
+    """Drive a noisy circle through a room whose observations do not depend on where `world` puts it.
 
     Every line is entered when first seen; two to five lines are seen in each step.
     """

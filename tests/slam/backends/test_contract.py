@@ -71,7 +71,7 @@ def test_covariances_stay_sound_while_the_robot_stands_still(name):
     assert_sound(backend)
 
 
-def test_a_sighting_that_says_nothing_changes_next_to_nothing(name):
+def test_a_observation_that_says_nothing_changes_next_to_nothing(name):
     rng = np.random.default_rng(7)
     room = Room.random(rng)
     backend, true, ids = journey(name, room, 30, rng)
@@ -98,7 +98,7 @@ def test_a_scan_without_matches_changes_nothing(name):
 @pytest.mark.parametrize(
     "world", [np.array([100.0, -100.0, 0.0]), np.array([0.0, 0.0, 2.0]), np.array([70.0, 70.0, -1.0])]
 )
-def test_moving_the_world_moves_the_answer_on_the_same_sightings(name, world):
+def test_moving_the_world_moves_the_answer_on_the_same_observations(name, world):
     def run(world):
         rng = np.random.default_rng(9)
         return journey(name, Room.random(rng), 80, rng, world=world)[0]
@@ -117,7 +117,7 @@ def test_moving_the_world_moves_the_answer_on_the_same_sightings(name, world):
 
 
 @pytest.mark.usefixtures("_unchecked")
-def test_the_order_of_the_sightings_in_one_scan_does_not_matter(name):
+def test_the_order_of_the_observations_in_one_scan_does_not_matter(name):
     def run(order):
         rng = np.random.default_rng(10)
         return everything(journey(name, Room.random(rng), 60, rng, order=order)[0])
@@ -142,7 +142,7 @@ def test_the_order_in_which_lines_are_entered_renumbers_the_answer(name):
     np.testing.assert_allclose(answers[1].cov, answers[0].cov, atol=1e-15)
 
 
-def test_several_sightings_of_one_line_in_one_scan_are_each_taken_in(name):
+def test_several_observations_of_one_line_in_one_scan_are_each_taken_in(name):
     rng = np.random.default_rng(17)
     room = Room.random(rng)
     backend, true, ids = journey(name, room, 30, rng)

@@ -102,7 +102,7 @@ P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 
 
 def look(pose, rows, rng):
-    """Draw sightings from the exact model: an angle error turns the line about the seen piece's centre."""
+    """Draw observations from the exact model: an angle error turns the line about the seen piece's centre."""
     alpha = LINES[rows, 0]
     n, t = normal(alpha), np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
     points = LINES[rows, 1:] * n + SEEN_AT[rows, None] * t

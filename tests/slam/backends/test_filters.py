@@ -228,7 +228,7 @@ def test_the_weighted_mean_is_equations_2_and_3(seed):
 
 @pytest.mark.parametrize("name", EKFS)
 def test_only_lines_about_the_worlds_origin_feel_where_the_world_lies(name, make_walls):
-    """Equation (4): the very same sightings, the world 100 m away. Anchored at the wall nothing changes."""
+    """Equation (4): the very same observations, the world 100 m away. Anchored at the wall nothing changes."""
 
     def run(at_wall, shift):
         rng, walls = np.random.default_rng(55), make_walls()

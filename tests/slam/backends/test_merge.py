@@ -89,7 +89,7 @@ def test_merging_leaves_the_covariance_sound_and_its_volume_smaller(name):
 
 
 def test_merging_a_line_with_its_twin_again_and_again_stays_sound(name):
-    """Two entries of one sighting are equal but for its noise; after many merges nothing becomes indefinite."""
+    """Two entries of one observation are equal but for its noise; after many merges nothing becomes indefinite."""
     rng = np.random.default_rng(22)
     backend, keep, other, drop = two_of_one_wall(name)
     backend.merge(keep, drop)

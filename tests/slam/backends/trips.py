@@ -20,7 +20,7 @@ MILLIMETRE, HUNDREDTH_DEGREE = 1e-3, np.deg2rad(0.01)
 
 @dataclass
 class Trip:
-    """A recorded drive with known association: per step the motion and the sightings (wall, line, cov, centre)."""
+    """A recorded drive with known association: per step the motion and the observations (wall, line, cov, centre)."""
 
     start: np.ndarray
     motions: np.ndarray
@@ -50,12 +50,12 @@ class Trip:
     def run(self, backend, walls_of=lambda k, i: i, ask=True, skip=lambda k, i: False):
         """Feed a back end; wall `i` at step `k` counts as the line of `walls_of(k, i)`."""
         self.ids = {}
-        for k, sightings in enumerate(self.seen):
+        for k, observations in enumerate(self.seen):
             if k:
                 backend.predict(Odometry(self.motions[k - 1], self.odometry_cov))
-            sightings = [(walls_of(k, i), *rest) for i, *rest in sightings if not skip(k, i)]
-            old = [s for s in sightings if s[0] in self.ids]
-            new = [s for s in sightings if s[0] not in self.ids]
+            observations = [(walls_of(k, i), *rest) for i, *rest in observations if not skip(k, i)]
+            old = [s for s in observations if s[0] in self.ids]
+            new = [s for s in observations if s[0] not in self.ids]
             if old:
                 see(backend, [self.ids[s[0]] for s in old], [s[1] for s in old], [s[2] for s in old])
             if new:
@@ -71,7 +71,7 @@ class Trip:
 
         `shared` takes errors as `slam.estimation.models.innovations` does, `plain` as differences of (alpha, r).
         """
-        n, rows = len(self.seen), [(k, *s) for k, sightings in enumerate(self.seen) for s in sightings]
+        n, rows = len(self.seen), [(k, *s) for k, observations in enumerate(self.seen) for s in observations]
         step = np.array([r[0] for r in rows])
         wall = np.array([r[1] for r in rows])
         z, cov = np.array([r[2] for r in rows]), np.array([r[3] for r in rows])
@@ -111,7 +111,7 @@ class Trip:
             return np.concatenate([prior @ off, (moved @ odometry.T).ravel(), e.ravel()])
 
         x = np.concatenate([poses.ravel(), lines.ravel()])
-        for _ in range(2):  # The noise of a sighting depends a little on the solution.
+        for _ in range(2):  # The noise of a observation depends a little on the solution.
             R = [at.R for at in errors(x[: 3 * n].reshape(-1, 3), x[3 * n :].reshape(-1, 2))]
             scale = np.sqrt(np.diagonal(np.concatenate(R), axis1=1, axis2=2))
             found = least_squares(residuals, x, method="trf", xtol=1e-13, ftol=1e-13, gtol=1e-13, x_scale="jac")
@@ -120,7 +120,7 @@ class Trip:
 
 
 def look(pose, point, alpha, sigmas, rng):
-    """Draw a sighting about a point of a wall: its line, covariance and centre in the robot frame."""
+    """Draw a observation about a point of a wall: its line, covariance and centre in the robot frame."""
     centre = to_robot(point[None], pose)[0]
     seen = float(wrap(alpha - pose[2]))
     turn = np.array([[1.0, 0.0], [directions(np.array(seen)) @ centre, 1.0]])

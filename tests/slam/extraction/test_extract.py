@@ -228,7 +228,7 @@ def test_a_bend_known_beforehand_is_cut_also_where_one_line_fits_both_walls(turn
     scan = scan_of(faces, [0.0, 0.0, turn], config=config)
     one = extract(scan)
     assert abs(wrap(one.lines[0, 0] + turn)) > 5 * np.sqrt(one.cov[0, 0, 0])
-    lines = extract(scan, bends_rad=np.array([wrap(np.arctan2(0.1, 0.4) - turn + 0.05)])).lines
+    lines = extract(scan, vertices_rad=np.array([wrap(np.arctan2(0.1, 0.4) - turn + 0.05)])).lines
     np.testing.assert_allclose(wrap(lines[:, 0] + turn), [0.0, np.arctan(slope)], atol=1e-9)
 
 
@@ -236,7 +236,7 @@ def test_of_a_bend_near_an_end_only_the_longer_part_is_a_segment():
     scan = scan_of(wall(0.0), np.zeros(3))
     whole = extract(scan)
     first = scan.bearings_rad[whole.beams[0, 0]]
-    (part,) = extract(scan, bends_rad=np.array([first + np.deg2rad(1.0)])).beams.tolist()
+    (part,) = extract(scan, vertices_rad=np.array([first + np.deg2rad(1.0)])).beams.tolist()
     assert part[0] > whole.beams[0, 0]
     assert part[1] == whole.beams[0, 1]
 

@@ -11,7 +11,7 @@ from slam.config import MapperConfig
 from slam.estimation.backend import Belief
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
-from slam.map.change_points import Kink, Kinks, KinksConfig, _places, _turns
+from slam.map.change_points import ChangePoint, ChangePoints, ChangePointsConfig, _places, _turns
 from slam.map.records import Records
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -41,11 +41,13 @@ def belief_of(pose):
     return Belief(pose, np.eye(3), np.array([WALL]), np.zeros((1, 2)), line, lambda ids: None)
 
 
-def seen(kinks, pose, scan):
+def seen(change_points, pose, scan):
     """Show a scan to the sums, every segment of five beams or more as one of the wall; return its segments, too."""
     segments = extract(scan)
     rows = np.flatnonzero(~segments.is_tentative)
-    return segments, kinks.see(belief_of(pose), scan, segments, np.stack([rows, np.full(len(rows), WALL)], axis=-1))
+    return segments, change_points.see(
+        belief_of(pose), scan, segments, np.stack([rows, np.full(len(rows), WALL)], axis=-1)
+    )
 
 
 def random_poses(rng, count):
@@ -88,25 +90,25 @@ def test_a_bend_that_no_scan_shows_is_found_where_it_is(turn_deg):
     """Whatever the robot believes its heading to be, and whether the noise that is stated is there or not."""
     rng = np.random.default_rng(3)
     for sigma_m, heading_error in ((SIGMA_M, 0.0), (SIGMA_M, 0.02), (0.0, 0.0)):
-        kinks, poses = Kinks(), random_poses(rng, 400)
+        change_points, poses = ChangePoints(), random_poses(rng, 400)
         for pose, scan in zip(poses, scans(bent(np.deg2rad(turn_deg), 0.4), poses, rng, sigma_m), strict=True):
             if len(extract(scan)) > 1:
                 continue
-            _, kink = seen(kinks, pose + np.array([0.0, 0.0, heading_error]), scan)
-            if kink is not None:
+            _, change_point = seen(change_points, pose + np.array([0.0, 0.0, heading_error]), scan)
+            if change_point is not None:
                 break
-        assert kink is not None
-        assert abs(kink.turn_rad - np.deg2rad(turn_deg)) < 4.0 * kink.sigma_rad
-        along = pose[0] - pose[1] / np.tan(pose[2] + kink.bearing_rad)
+        assert change_point is not None
+        assert abs(change_point.turn_rad - np.deg2rad(turn_deg)) < 4.0 * change_point.sigma_rad
+        along = pose[0] - pose[1] / np.tan(pose[2] + change_point.bearing_rad)
         assert along == pytest.approx(0.4, abs=0.6)
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_straight_wall_never_bends(seed):
     rng = np.random.default_rng(seed)
-    kinks, poses = Kinks(KinksConfig(sigmas=5.0)), random_poses(rng, 700)
+    change_points, poses = ChangePoints(ChangePointsConfig(sigmas=5.0)), random_poses(rng, 700)
     for pose, scan in zip(poses, scans(bent(0.0), poses, rng), strict=True):
-        assert seen(kinks, pose, scan)[1] is None
+        assert seen(change_points, pose, scan)[1] is None
 
 
 @pytest.mark.parametrize("heading", [1.5, -1.6, 3.1])
@@ -116,20 +118,24 @@ def test_the_scan_cut_at_the_bend_has_a_side_before_and_one_after(heading):
     (scan,) = scans(bent(np.deg2rad(0.2)), [pose], np.random.default_rng(1), 0.0)
     segments = extract(scan)
     bearing = np.arctan2(1.2, -0.2) - heading
-    pieces = extract(scan, bends_rad=np.array([bearing]))
-    kinks, kink = Kinks(), Kink(WALL, 0, bearing, 0.0, np.deg2rad(0.2), np.deg2rad(0.03))
-    before, after = kinks.sides_of(kink, segments, pieces, scan)
+    pieces = extract(scan, vertices_rad=np.array([bearing]))
+    change_points, change_point = ChangePoints(), ChangePoint(WALL, 0, bearing, 0.0, np.deg2rad(0.2), np.deg2rad(0.03))
+    before, after = change_points.sides_of(change_point, segments, pieces, scan)
     assert sorted([before, after]) == [0, 1] == list(range(len(pieces)))
     one, other = pieces.ends[[before, after]].mean(axis=1)
     assert one[0] * other[1] - one[1] * other[0] > 0, "counter-clockwise"
-    assert kinks.sides_of(kink, segments, pieces.take(np.array([0])), scan) is None
-    assert kinks.sides_of(replace(kink, turn_rad=np.deg2rad(8.0)), segments, pieces, scan) is None, "not that turn"
+    assert change_points.sides_of(change_point, segments, pieces.take(np.array([0])), scan) is None
+    assert change_points.sides_of(replace(change_point, turn_rad=np.deg2rad(8.0)), segments, pieces, scan) is None, (
+        "not that turn"
+    )
 
 
-@pytest.mark.parametrize(("rules", "is_bend"), [(KinksConfig(), False), (KinksConfig(ends=0, least_beams=1), True)])
+@pytest.mark.parametrize(
+    ("rules", "is_bend"), [(ChangePointsConfig(), False), (ChangePointsConfig(ends=0, least_beams=1), True)]
+)
 def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_bend):
     """In cml_Vipiteno2 44 beams of a wall of 7 m and one of a face of 0.1 m made a turn of 19 degrees of six sigmas."""
-    kinks, found = Kinks(rules), False
+    change_points, found = ChangePoints(rules), False
     poses = np.column_stack([np.linspace(1.0, 0.0, 60), np.full(60, -1.0), np.zeros(60)])
     for pose, scan in zip(poses, scans(bent(0.0), poses, np.random.default_rng(5), 0.0), strict=True):
         segments = extract(scan)
@@ -137,18 +143,18 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_be
         ranges = scan.ranges_m.copy()
         ranges[last] += 0.03
         taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
-        found |= kinks.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
+        found |= change_points.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
     assert found == is_bend
 
 
 @pytest.mark.parametrize(("turn_deg", "is_bend"), [(0.05, False), (0.1, False), (0.3, True), (8.0, True)])
 def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg, is_bend):
     """However sure the turn is after 1,500 scans from one place, all taken for one straight wall."""
-    pose, kinks, found = np.array([0.0, -1.0, 0.0]), Kinks(), False
+    pose, change_points, found = np.array([0.0, -1.0, 0.0]), ChangePoints(), False
     straight, bending = (next(scans(bent(np.deg2rad(turn)), [pose], None, 0.0)) for turn in (0.0, turn_deg))
     segments = extract(straight)
     for _ in range(1500):
-        found |= kinks.see(belief_of(pose), bending, segments, np.array([[0, WALL]])) is not None
+        found |= change_points.see(belief_of(pose), bending, segments, np.array([[0, WALL]])) is not None
         if found:
             break
     assert found == is_bend
@@ -156,26 +162,26 @@ def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg
 
 def test_pairs_are_renamed_when_entries_are_merged():
     records = Records()
-    kinks = Kinks(records=records)
-    kinks.keep_apart(9, 4)
-    assert kinks.cut == {(4, 9)}
+    change_points = ChangePoints(records=records)
+    change_points.keep_apart(9, 4)
+    assert change_points.cut == {(4, 9)}
     records.merge(2, 9, 0.0)
-    assert kinks.cut == {(2, 4)}
+    assert change_points.cut == {(2, 4)}
     records.remove(np.array([4]))
-    assert not kinks.cut
-    kinks.keep_apart(1, 2)
+    assert not change_points.cut
+    change_points.keep_apart(1, 2)
     records.merge(1, 2, 0.0)
-    assert not kinks.cut
+    assert not change_points.cut
 
 
 def test_turns_of_a_merged_wall_are_added_at_the_nearest_places_of_the_kept_one():
     """Exact turns of one bent wall that stands in the map twice, told about two anchors 0.6 m apart."""
     records, rng = Records(), np.random.default_rng(3)
-    kinks = Kinks(records=records)
+    change_points = ChangePoints(records=records)
     kept, dropped = records.rows(np.array([4, 8])).tolist()
     mine, theirs = rng.uniform(size=(2, 5)), rng.uniform(size=(2, 3))
-    kinks._add_to(kept, -2, mine)
-    kinks._add_to(dropped, 0, theirs)
+    change_points._add_to(kept, -2, mine)
+    change_points._add_to(dropped, 0, theirs)
     records.merge(4, 8, 0.6)
     first, sums = records.columns["turns"][0]
     expected = np.zeros((2, 7))
@@ -185,11 +191,13 @@ def test_turns_of_a_merged_wall_are_added_at_the_nearest_places_of_the_kept_one(
     np.testing.assert_allclose(sums, expected)
 
 
-def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, away_m=1.0):
+def drive(change_points, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, away_m=1.0):
     """Drive along a bent wall and back, exact wheels; return the update of each step."""
     way = np.concatenate([np.linspace(-4, 4, steps // 2), np.linspace(4, -4, steps - steps // 2)])
     poses = np.column_stack([way, np.full(steps, -away_m), np.zeros(steps)])
-    mapper = Mapper(BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), MapperConfig(kinks=kinks))
+    mapper = Mapper(
+        BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), MapperConfig(change_points=change_points)
+    )
     updates = []
     for k, scan in enumerate(scans(bent(turn_rad), poses, np.random.default_rng(seed), sigma)):
         if k:
@@ -202,7 +210,7 @@ def drive(kinks, turn_rad, backend="full-ekf", steps=100, sigma=0.0, seed=0, awa
 @pytest.mark.parametrize("backend", list(BACKENDS))
 def test_a_wall_that_bends_becomes_two_and_stays_two(backend):
     turn = np.deg2rad(0.8)
-    updates = drive(KinksConfig(), turn, backend)
+    updates = drive(ChangePointsConfig(), turn, backend)
     walls = updates[-1].map
     assert len(walls) == 2
     first = next(k for k, update in enumerate(updates) if len(update.map) == 2)
@@ -215,7 +223,7 @@ def test_a_wall_that_bends_becomes_two_and_stays_two(backend):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_sides_of_a_bend_never_overlap(seed):
     """Each fits, within the noise, a piece of the other."""
-    updates = drive(KinksConfig(), np.deg2rad(0.6), steps=300, sigma=0.01, seed=seed)
+    updates = drive(ChangePointsConfig(), np.deg2rad(0.6), steps=300, sigma=0.01, seed=seed)
     last = updates[-1].map
     one, other = np.sort(last.ends_world[..., 0], axis=-1)[np.argsort(last.ends_world[..., 0].min(axis=-1))]
     assert -0.5 < one[1] < 0.5
@@ -226,7 +234,7 @@ def test_the_sides_of_a_bend_never_overlap(seed):
 def test_a_bend_that_only_many_scans_together_show_makes_two_walls_of_one(away_m):
     """From so far one line fits both sides in every scan; without the sums over the scans they stay one wall."""
     turn = np.deg2rad(0.5)
-    updates = drive(KinksConfig(), turn, steps=120, sigma=0.01, away_m=away_m)
+    updates = drive(ChangePointsConfig(), turn, steps=120, sigma=0.01, away_m=away_m)
     assert len(updates[15].map) == 1
     first = next(k for k, update in enumerate(updates) if len(update.map) == 2)
     assert all(len(update.map) == 2 for update in updates[first:])
@@ -235,20 +243,22 @@ def test_a_bend_that_only_many_scans_together_show_makes_two_walls_of_one(away_m
 
 
 def test_a_straight_wall_stays_one_and_no_number_is_changed():
-    off, on = (drive(kinks, 0.0)[-1].map for kinks in (KinksConfig(sigmas=np.inf), KinksConfig()))
+    off, on = (
+        drive(change_points, 0.0)[-1].map for change_points in (ChangePointsConfig(sigmas=np.inf), ChangePointsConfig())
+    )
     assert len(on) == 1
     np.testing.assert_array_equal(on.belief.means, off.belief.means)
     np.testing.assert_array_equal(on.extents, off.extents)
 
 
 def test_sums_of_what_exact_lines_say_do_not_depend_on_how_a_wall_was_grown_along():
-    """Sightings at places before and after those known before are added where they belong."""
+    """Observations at places before and after those known before are added where they belong."""
     records, rng = Records(), np.random.default_rng(2)
-    kinks, row = Kinks(records=records), int(records.rows(np.array([WALL]))[0])
+    change_points, row = ChangePoints(records=records), int(records.rows(np.array([WALL]))[0])
     for first, count in ((3, 4), (-2, 3), (0, 12), (-4, 1)):
         terms = rng.uniform(size=(2, count))
         before = {place: turns_at(records, place) for place in range(first, first + count)}
-        now = kinks._add_to(row, first, terms)
+        now = change_points._add_to(row, first, terms)
         for k, place in enumerate(range(first, first + count)):
             np.testing.assert_allclose(now[:, k], before[place] + terms[:, k])
             np.testing.assert_allclose(turns_at(records, place), before[place] + terms[:, k])

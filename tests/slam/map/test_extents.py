@@ -8,13 +8,13 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
 from slam.geometry.lines import normals, through
 from slam.map.chains import ChainConfig
-from slam.map.change_points import KinksConfig
+from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
-from slam.map.openings import GapsConfig
+from slam.map.openings import OpeningsConfig
 from slam.robot import Scan
 
-SETTINGS = (WallsConfig(), KinksConfig(), GapsConfig(), ChainConfig())
+SETTINGS = (WallsConfig(), ChangePointsConfig(), OpeningsConfig(), ChainConfig())
 CONFIG = WallsConfig()
 
 
@@ -83,12 +83,12 @@ WALL, BEHIND = [[2.0, -1.0], [2.0, 1.0]], [[2.05, -1.0], [2.05, 1.0]]
 """Seen from the origin."""
 
 
-@pytest.mark.parametrize(("sightings", "claimed_after"), [(1, CONFIG.claims), (5, CONFIG.claims), (10, None)])
-def test_a_wall_all_of_whose_beams_another_takes_is_forgotten_unless_it_was_seen_often(sightings, claimed_after):
+@pytest.mark.parametrize(("observations", "claimed_after"), [(1, CONFIG.claims), (5, CONFIG.claims), (10, None)])
+def test_a_wall_all_of_whose_beams_another_takes_is_forgotten_unless_it_was_seen_often(observations, claimed_after):
     pose, walls = [0.0, 0.0, 0.0], Landmarks(*SETTINGS)
-    for _ in range(CONFIG.established_sightings):
+    for _ in range(CONFIG.established_observations):
         see(walls, [WALL], [WALL], [0], pose)
-    for _ in range(sightings):
+    for _ in range(observations):
         assert see(walls, [WALL, BEHIND], [BEHIND], [1], pose) == []
     known = [WALL, BEHIND]
     forgotten = [see(walls, known, [WALL], [0], pose) for _ in range(CONFIG.claims)]
@@ -116,14 +116,14 @@ def extent_of(walls, known, pose=ORIGIN):
     return walls.map(belief_of(known, pose)).ends_world[0, :, 1].tolist()
 
 
-@pytest.mark.parametrize("sightings", [1, 2])
-def test_a_wall_seen_once_is_tentative_and_forgotten_when_it_is_not_seen_again(sightings):
+@pytest.mark.parametrize("observations", [1, 2])
+def test_a_wall_seen_once_is_tentative_and_forgotten_when_it_is_not_seen_again(observations):
     walls = Landmarks(*SETTINGS)
-    for _ in range(sightings):
+    for _ in range(observations):
         see(walls, [FRONT], [FRONT], [0], ORIGIN)
-    assert walls.map(belief_of([FRONT], ORIGIN)).tentative.tolist() == [sightings < 2]
+    assert walls.map(belief_of([FRONT], ORIGIN)).tentative.tolist() == [observations < 2]
     forgotten = [see(walls, [FRONT, ELSEWHERE], [ELSEWHERE], [1], AWAY) for _ in range(CONFIG.patience_steps + 1)]
-    assert forgotten == [[]] * CONFIG.patience_steps + [[0] if sightings < 2 else []]
+    assert forgotten == [[]] * CONFIG.patience_steps + [[0] if observations < 2 else []]
 
 
 def with_a_hole(low, high):

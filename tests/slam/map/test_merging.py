@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from slam.association.matching import MatchingConfig
 from slam.estimation.backend import Belief, Joint
 from slam.geometry.lines import directions, normals
-from slam.map.merging import DuplicatesConfig, duplicate_of, lying_along
+from slam.map.merging import MergingConfig, duplicate_of, lying_along
 from slam.map.stochastic_map import StochasticMap
 
-CONFIG = DuplicatesConfig()
+CONFIG = MergingConfig()
 twice = partial(duplicate_of, one_wall=MatchingConfig().one_wall)
 angles, places = st.floats(-3.1, 3.1), st.floats(-20.0, 20.0)
 
@@ -103,7 +103,7 @@ def test_the_joint_covariance_decides_where_geometry_does_not():
 
 
 def test_a_face_that_hides_another_is_the_same_wall_however_sure_the_filter_is_of_the_millimetres():
-    """5 mm and 0.03 degrees along 4 m, as after a thousand sightings of each; 1.5 cm apart the covariance decides."""
+    """5 mm and 0.03 degrees along 4 m, as after a thousand looks at each; 1.5 cm apart the covariance decides."""
     sure = (1e-5, 1e-4)
     turn = float(np.deg2rad(0.03))
 

@@ -10,7 +10,7 @@ from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind, Segments
 from slam.extraction.visible_extent import owners_of_beams, sure_pieces
 from slam.geometry.lines import normals, through
-from slam.map.ray_evidence import sightlines
+from slam.map.ray_evidence import ray_evidence
 from slam.robot import Scan
 
 
@@ -43,7 +43,7 @@ def test_each_beam_hits_passes_or_falls_short_as_a_ray_traced_alone_does(seed):
     segments, margin = rng.uniform([0, 0], [5, 4], (6, 2, 2)), 0.07
     lines, anchors = through(segments), segments.mean(axis=1)
     means = np.column_stack([lines[:, 0], np.einsum("nd,nd->n", normals(lines[:, 0]), segments[:, 0] - anchors)])
-    found = sightlines(scan, pose, anchors, means, margin)
+    found = ray_evidence(scan, pose, anchors, means, margin)
     compared = 0
     for i, (alpha, r) in enumerate(lines):
         n, t = np.array([np.cos(alpha), np.sin(alpha)]), np.array([-np.sin(alpha), np.cos(alpha)])

@@ -9,22 +9,22 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import directions, normals
 from slam.map.chains import ChainConfig
-from slam.map.change_points import KinksConfig
+from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
-from slam.map.openings import GapsConfig
+from slam.map.openings import OpeningsConfig
 from slam.map.records import Records
-from slam.map.reliability import Firmness
+from slam.map.reliability import Reliability
 
-SETTINGS = (WallsConfig(), KinksConfig(), GapsConfig(), ChainConfig())
-SUMS = ("sightings", "fits")
+SETTINGS = (WallsConfig(), ChangePointsConfig(), OpeningsConfig(), ChainConfig())
+SUMS = ("observations", "fits")
 """Columns that add up over mergers, whatever walls were merged."""
 
 
 def observed(landmarks, ids, rng):
     """Give each of these walls evidence of every kind, as observations would."""
     columns, rows = landmarks.records.columns, landmarks.records.rows(np.asarray(ids))
-    columns["sightings"][rows] += rng.integers(1, 5, len(rows))
+    columns["observations"][rows] += rng.integers(1, 5, len(rows))
     columns["fits"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2))
     columns["directions"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2, 2))
     columns["first"][rows] = rng.uniform(-1.0, 1.0, (len(rows), 3))
@@ -96,7 +96,7 @@ def test_no_evidence_is_lost_or_left_behind(seed, doings):
     for one in ended:
         # An id is never used again, but if it were its record would be that of a new wall.
         row = landmarks.records.rows(np.array([one]))[0]
-        assert landmarks.records.columns["sightings"][row] == 0
+        assert landmarks.records.columns["observations"][row] == 0
         assert landmarks.records.columns["turns"][row] is None
 
 
@@ -134,7 +134,7 @@ def test_the_reliability_of_a_merged_wall_is_that_of_one_that_made_all_observati
     rng = np.random.default_rng(5)
     first, second = observations(rng, 12), observations(rng, 15)
     apart, together = Records(), Records()
-    split, whole = Firmness(records=apart), Firmness(records=together)
+    split, whole = Reliability(records=apart), Reliability(records=together)
     for segments, owner in ((first, 0), (second, 1)):
         for k in range(len(segments)):
             split.see(segments.take(np.array([k])), np.array([owner]), np.zeros(3))
@@ -150,10 +150,10 @@ def test_the_reliability_of_a_merged_wall_is_that_of_one_that_made_all_observati
 @pytest.mark.parametrize("turn_rad", [0.0, 0.05])
 def test_two_straight_walls_merged_are_one_crooked_wall_only_if_they_turn(turn_rad):
     rng, records = np.random.default_rng(6), Records()
-    firmness = Firmness(records=records)
+    reliability = Reliability(records=records)
     for wall, turn in ((0, 0.0), (1, turn_rad)):
-        firmness.see(observations(rng, 30, turn), np.full(30, wall), np.zeros(3))
-    assert not firmness.are_crooked(np.array([0, 1])).any()
+        reliability.see(observations(rng, 30, turn), np.full(30, wall), np.zeros(3))
+    assert not reliability.are_crooked(np.array([0, 1])).any()
     records.columns["first"][1, 1:] += [0.0, 8.0]  # the second lies 8 m on
     records.merge(0, 1, 0.0)
-    assert firmness.are_crooked(np.array([0])).tolist() == [turn_rad > 0.0]
+    assert reliability.are_crooked(np.array([0])).tolist() == [turn_rad > 0.0]

@@ -9,7 +9,7 @@ from slam.backends import BACKENDS
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.geometry.poses import compose, inverse, to_world
-from slam.map.reliability import Firmness, FirmnessConfig, are_clear, as_told
+from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 
@@ -38,7 +38,7 @@ def scans(faces, poses, rng):
         )
 
 
-def sighting(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
+def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
     """Return one segment with a direction and how well it is known."""
     cov = np.diag([sigma_rad**2, 1e-5])[None]
     ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
@@ -62,7 +62,7 @@ def test_real_scans_of_straight_walls_make_no_wall_crooked(seed):
     places = rng.uniform(0, 4, (500, 2))
     places = places[shapely.contains_xy(room.buffer(-0.25), places[:, 0], places[:, 1])][:120]
     poses = np.column_stack([places, rng.uniform(-np.pi, np.pi, len(places))])
-    firmness = Firmness()
+    reliability = Reliability()
     for k, scan, hit in scans(faces, poses, rng):
         segments = extract(scan)
         first, last = segments.beams.T
@@ -70,58 +70,58 @@ def test_real_scans_of_straight_walls_make_no_wall_crooked(seed):
         runs = [hit[np.arange(a, b + 1 + beams * (b < a)) % beams] for a, b in segments.beams]
         pure = np.array([len(set(run)) == 1 for run in runs], dtype=bool)
         middle = (first + (last - first) % beams // 2) % beams
-        firmness.see(segments, np.where(pure & ~segments.is_tentative, hit[middle], -1), poses[k])
-    assert not firmness.are_crooked(np.arange(len(faces))).any()
+        reliability.see(segments, np.where(pure & ~segments.is_tentative, hit[middle], -1), poses[k])
+    assert not reliability.are_crooked(np.arange(len(faces))).any()
 
 
-def test_a_clear_sighting_far_from_all_vague_ones_gives_the_wall_away():
+def test_a_clear_observation_far_from_all_vague_ones_gives_the_wall_away():
     """A wall's end of 7 cm: 35 looks know its direction to 10 degrees each; one took in a beam of the next face."""
     rng = np.random.default_rng(1)
     for off, crooked in ((np.deg2rad(-31.0), True), (np.deg2rad(-8.0), False)):
-        firmness = Firmness()
+        reliability = Reliability()
         for _ in range(35):
-            firmness.see(sighting(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, POSE)
-        firmness.see(sighting(off, np.deg2rad(2.8)), OWNER, POSE)
-        assert firmness.are_crooked(OWNER).tolist() == [crooked]
+            reliability.see(observation(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, POSE)
+        reliability.see(observation(off, np.deg2rad(2.8)), OWNER, POSE)
+        assert reliability.are_crooked(OWNER).tolist() == [crooked]
 
 
 def test_directions_are_those_in_the_world_across_the_cut_at_half_a_turn():
     rng = np.random.default_rng(2)
-    firmness = Firmness()
+    reliability = Reliability()
     for _ in range(60):
         heading = rng.uniform(-np.pi, np.pi)
         vague, clear = np.deg2rad(8.0), np.deg2rad(2.0)
-        firmness.see(
-            sighting(np.pi - heading + vague * rng.standard_normal(), vague), OWNER, np.array([0.0, 0.0, heading])
+        reliability.see(
+            observation(np.pi - heading + vague * rng.standard_normal(), vague), OWNER, np.array([0.0, 0.0, heading])
         )
-        firmness.see(
-            sighting(np.pi - heading + clear * rng.standard_normal(), clear), OWNER, np.array([0.0, 0.0, heading])
+        reliability.see(
+            observation(np.pi - heading + clear * rng.standard_normal(), clear), OWNER, np.array([0.0, 0.0, heading])
         )
-    assert not firmness.are_crooked(OWNER).any()
+    assert not reliability.are_crooked(OWNER).any()
 
 
 def test_fits_that_are_a_little_bad_every_time_tell_after_a_while():
-    firmness = Firmness()
+    reliability = Reliability()
     told = []
     for _ in range(60):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=16.0), OWNER, POSE)
-        told.append(bool(firmness.are_crooked(OWNER)[0]))
+        reliability.see(observation(0.0, 0.01, beams=12, chi2=16.0), OWNER, POSE)
+        told.append(bool(reliability.are_crooked(OWNER)[0]))
     assert not told[2]
     assert told[-1]
     for _ in range(2000):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=11.0), np.array([1]), POSE)
-    assert not firmness.are_crooked(np.array([1]))[0], "a tenth too much is what real walls show"
+        reliability.see(observation(0.0, 0.01, beams=12, chi2=11.0), np.array([1]), POSE)
+    assert not reliability.are_crooked(np.array([1]))[0], "a tenth too much is what real walls show"
 
 
 def test_a_wall_never_seen_is_not_crooked():
-    assert Firmness().are_crooked(np.array([3])).tolist() == [False]
+    assert Reliability().are_crooked(np.array([3])).tolist() == [False]
 
 
 def test_clear_are_many_beams_and_a_known_direction():
-    config = FirmnessConfig()
-    assert are_clear(sighting(0.0, 0.5 * config.heading_rad)).all()
-    assert not are_clear(sighting(0.0, 2.0 * config.heading_rad)).any()
-    assert not are_clear(sighting(0.0, 0.01, beams=4)).any()
+    config = ReliabilityConfig()
+    assert are_clear(observation(0.0, 0.5 * config.heading_rad)).all()
+    assert not are_clear(observation(0.0, 2.0 * config.heading_rad)).any()
+    assert not are_clear(observation(0.0, 0.01, beams=4)).any()
 
 
 def test_a_line_laid_down_the_stairs_is_found_out_and_moves_nothing_more():
@@ -152,40 +152,40 @@ def test_a_line_laid_down_the_stairs_is_found_out_and_moves_nothing_more():
 
 
 def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction():
-    firmness, few = Firmness(), sighting(0.0, 0.01, beams=3)
-    assert not firmness.may_move(few, OWNER).any(), "of this wall nothing is known"
+    reliability, few = Reliability(), observation(0.0, 0.01, beams=3)
+    assert not reliability.may_move(few, OWNER).any(), "of this wall nothing is known"
     for _ in range(200):
-        firmness.see(sighting(0.0, 0.12, beams=6), OWNER, POSE)
-    assert not firmness.may_move(few, OWNER).any(), "only vague sightings"
-    firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
-    assert not firmness.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
-    assert firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).all()
+        reliability.see(observation(0.0, 0.12, beams=6), OWNER, POSE)
+    assert not reliability.may_move(few, OWNER).any(), "only vague observations"
+    reliability.see(observation(0.0, 0.02, beams=8), OWNER, POSE)
+    assert not reliability.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
+    assert reliability.may_move(observation(0.0, 0.02, beams=8), OWNER).all()
     for _ in range(5):
-        firmness.see(sighting(0.0, 0.02, beams=8), OWNER, POSE)
-    assert firmness.may_move(few, OWNER).all()
-    assert not firmness.may_move(sighting(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
+        reliability.see(observation(0.0, 0.02, beams=8), OWNER, POSE)
+    assert reliability.may_move(few, OWNER).all()
+    assert not reliability.may_move(observation(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
     for _ in range(300):
-        firmness.see(sighting(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
-    assert not firmness.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
-    assert not firmness.may_move(sighting(0.0, 0.02, beams=8), OWNER).any()
+        reliability.see(observation(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
+    assert not reliability.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
+    assert not reliability.may_move(observation(0.0, 0.02, beams=8), OWNER).any()
 
 
 def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
     """Refused, the only wall in sight cost 8 degrees of heading in 3.5 m; its bend is one."""
-    firmness, straight = Firmness(), 1
+    reliability, straight = Reliability(), 1
     for _ in range(60):
-        firmness.see(sighting(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, POSE)
-        firmness.see(sighting(0.0, 0.02, beams=8), np.array([straight]), POSE)
-    assert firmness.are_crooked(np.array([0, straight])).tolist() == [True, False]
-    long, short = (sighting(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
-    assert firmness.may_move(long, OWNER).tolist() == [True]
-    assert firmness.may_move(short, OWNER).tolist() == [False]
+        reliability.see(observation(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, POSE)
+        reliability.see(observation(0.0, 0.02, beams=8), np.array([straight]), POSE)
+    assert reliability.are_crooked(np.array([0, straight])).tolist() == [True, False]
+    long, short = (observation(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
+    assert reliability.may_move(long, OWNER).tolist() == [True]
+    assert reliability.may_move(short, OWNER).tolist() == [False]
     both = long.take(np.array([0, 0]))
-    assert firmness.may_move(both, np.array([0, straight])).tolist() == [False, True]
+    assert reliability.may_move(both, np.array([0, straight])).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("middle_m", [0.5, -1.0])
-def test_beside_a_clear_sighting_few_beams_tell_their_distance_at_their_middle_and_no_direction(middle_m):
+def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middle_and_no_direction(middle_m):
     """A line that beams met `middle_m` along it from the foot of the robot's perpendicular."""
     to_robot = np.array([[1.0, 0.0], [middle_m, 1.0]])  # (alpha, across at the middle) to (alpha, r)
     cov = to_robot @ np.diag([1e-6, 4e-6]) @ to_robot.T
@@ -216,15 +216,15 @@ def seen_along(turn_rad, rng, drift_rad=0.0, sigma_rad=0.009):
 
     The robot's heading drifts by so much on its way along it.
     """
-    firmness = Firmness()
+    reliability = Reliability()
     for share in np.linspace(0.0, 1.0, 40):
         alpha = turn_rad * (share > 0.5) + drift_rad * share + sigma_rad * rng.standard_normal()
         heading = rng.uniform(-np.pi, np.pi)
-        piece = sighting(alpha - heading, sigma_rad)
+        piece = observation(alpha - heading, sigma_rad)
         middle = np.array([1.0, 3.0 * share])  # the wall x = 1, walked along upwards
         place = middle - to_world(piece.ends.mean(axis=1), np.array([0.0, 0.0, heading]))[0]
-        firmness.see(piece, OWNER, np.append(place, heading))
-    return bool(firmness.are_crooked(OWNER)[0])
+        reliability.see(piece, OWNER, np.append(place, heading))
+    return bool(reliability.are_crooked(OWNER)[0])
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -238,8 +238,8 @@ def test_sides_of_a_bend_seen_one_after_the_other_give_it_away(seed):
 
 def test_a_wall_seen_turned_from_one_place_does_not_bend():
     """Along the wall nothing changes: what differs is the robot's heading."""
-    firmness, rng = Firmness(), np.random.default_rng(7)
+    reliability, rng = Reliability(), np.random.default_rng(7)
     for k in range(200):
         off = np.deg2rad(3.0) * (k > 100) + 0.01 * rng.standard_normal()
-        firmness.see(sighting(off, 0.01), OWNER, POSE)
-    assert not firmness.are_crooked(OWNER)[0]
+        reliability.see(observation(off, 0.01), OWNER, POSE)
+    assert not reliability.are_crooked(OWNER)[0]

@@ -8,7 +8,7 @@ from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, through
 from slam.geometry.poses import to_robot, to_world
 from slam.map.stochastic_map import StochasticMap
-from slam.map.vertices import bends_within, laid_across, meetings, mistaken
+from slam.map.vertices import laid_across, meetings, mistaken, vertices_within
 
 POSE = np.array([1.0, 2.0, 0.7])
 
@@ -59,7 +59,7 @@ def bent(gap=0.0, slope=0.03, aside=0.0):
 )
 def test_where_one_wall_ends_another_begins_that_turns_little(walls, is_bend):
     """Not past a gap, nor where they turn much, lie apart, or one lies within the other; lines cross there."""
-    found = bends_within(segment_of([1.0, 0.01], [3.0, -0.02]), map_of(walls))
+    found = vertices_within(segment_of([1.0, 0.01], [3.0, -0.02]), map_of(walls))
     assert len(found) == is_bend
     if is_bend:
         np.testing.assert_allclose(found, np.arctan2(-2.0, walls[1][0][0] - 1.0) - POSE[2], atol=1e-9)
@@ -78,35 +78,35 @@ def test_where_one_wall_ends_another_begins_that_turns_little(walls, is_bend):
 )
 def test_a_bend_lies_within_the_segments_that_pass_over_it(first, last, is_on):
     """Not on one that ends there, lies aside, is the other side of the wall, or crosses it."""
-    assert len(bends_within(segment_of(first, last), map_of(bent()))) == is_on
+    assert len(vertices_within(segment_of(first, last), map_of(bent()))) == is_on
 
 
 def test_what_was_cut_is_known_and_need_not_come_near_the_bend():
     """Two walls of one direction as far as the map knows, whose ends far beams have left 0.4 m apart."""
     segment, pair = segment_of([1.0, 0.0], [3.0, -0.03]), {(0, 1)}
-    assert len(bends_within(segment, map_of(bent(slope=0.001)), cut=pair)) == 1
-    (bearing,) = bends_within(segment, map_of(bent(gap=0.4, slope=0.001)), cut=pair)
+    assert len(vertices_within(segment, map_of(bent(slope=0.001)), cut=pair)) == 1
+    (bearing,) = vertices_within(segment, map_of(bent(gap=0.4, slope=0.001)), cut=pair)
     np.testing.assert_allclose(bearing, np.arctan2(-2.0, 1.2) - POSE[2], atol=1e-3)
-    assert not len(bends_within(segment, map_of(bent(gap=0.6)), cut=pair))
-    assert not len(bends_within(segment, map_of(bent(slope=0.001)), cut={(1, 2), (0, 7)}))
+    assert not len(vertices_within(segment, map_of(bent(gap=0.6)), cut=pair))
+    assert not len(vertices_within(segment, map_of(bent(slope=0.001)), cut={(1, 2), (0, 7)}))
 
 
 def test_a_wall_seen_once_makes_no_bend():
     walls = map_of(bent())
     walls.tentative[1] = True
-    assert not len(bends_within(segment_of([1.0, 0.0], [3.0, 0.0]), walls))
+    assert not len(vertices_within(segment_of([1.0, 0.0], [3.0, 0.0]), walls))
 
 
 def test_where_walls_overlap_the_bend_is_where_their_lines_cross():
     """The first one was stretched by 1.2 m past the bend."""
     walls = map_of([[[0.0, 0.0], [3.2, 0.0]], [[2.0, 0.0], [4.0, -0.06]]])
-    (bearing,) = bends_within(segment_of([1.0, 0.01], [3.5, -0.03]), walls)
+    (bearing,) = vertices_within(segment_of([1.0, 0.01], [3.5, -0.03]), walls)
     np.testing.assert_allclose(bearing, np.arctan2(-2.0, 1.0) - POSE[2], atol=1e-9)
 
 
 @pytest.mark.parametrize(("sigma", "is_known"), [(0.004, True), (0.02, False)])
 def test_a_bend_that_may_be_a_straight_wall_is_not_known(sigma, is_known):
-    assert len(bends_within(segment_of([1.0, 0.0], [3.0, -0.03]), map_of(bent(), sigma))) == is_known
+    assert len(vertices_within(segment_of([1.0, 0.0], [3.0, -0.03]), map_of(bent(), sigma))) == is_known
 
 
 def test_walls_laid_across_a_bend_are_those_that_reach_past_it_on_both_sides():
@@ -179,7 +179,7 @@ def test_a_wall_laid_across_a_bend_that_the_scan_shows_was_none(shift):
         [[0.0, 0.0], [4.0, -0.02]],
     ]
     walls = map_of(ends)
-    walls.sightings[4] = 50
+    walls.observations[4] = 50
     others = ([4.0, -0.1], [4.0, 3.0]), ([4.0, 3.0], [0.0, 3.0])
     assert mistaken(scan_of(*np.roll([*BENT, *others], shift, axis=0)), walls).tolist() == [0]
 

@@ -184,7 +184,7 @@ def test_what_was_found_is_told_as_it_was_measured():
     assert doubled["found"] == {"double_entries": 4, "sightings": 600, "beyond_a_run": told(-2.0, -3.0, -1.0)}
 
 
-def test_wrong_matches_are_held_against_the_worst_of_the_others_by_the_sighting():
+def test_wrong_matches_are_held_against_the_worst_of_the_others_by_the_observation():
     """3 + 7 of 500 beside 2 + 3 of 250 and 4 + 1 of 1,000, the first of which are as many."""
     pooled = [
         row("block-ekf", matches_false=3, double_entries=7, sightings=500),
@@ -206,9 +206,9 @@ def test_wrong_matches_are_held_against_the_worst_of_the_others_by_the_sighting(
     assert (wrong["closed"]["found"]["next"], wrong["closed"]["found"]["next_share"]) == ("full-ekf", 0.016)
 
 
-@pytest.mark.parametrize("sightings", [(0, 100), (100, 0), (0, 0), (100, None)])
-def test_without_sightings_on_both_sides_there_is_nothing_to_hold_them_against(sightings):
-    pooled = [row("block-ekf", sightings=sightings[0])]
-    pooled += [] if sightings[1] is None else [row("full-ekf", sightings=sightings[1])]
+@pytest.mark.parametrize("observations", [(0, 100), (100, 0), (0, 0), (100, None)])
+def test_without_observations_on_both_sides_there_is_nothing_to_hold_them_against(observations):
+    pooled = [row("block-ekf", sightings=observations[0])]
+    pooled += [] if observations[1] is None else [row("full-ekf", sightings=observations[1])]
     (wrong,) = [f["arms"]["closed"] for f in findings(pooled, 0.99) if f["kind"] == "wrong"]
-    assert wrong == {"found": {"wrong": None, "sightings": sightings[0]}, "holds": None}
+    assert wrong == {"found": {"wrong": None, "sightings": observations[0]}, "holds": None}

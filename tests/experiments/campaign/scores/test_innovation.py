@@ -11,7 +11,7 @@ from slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
 from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
 from slam.extraction.segments import Segments
-from slam.map.reliability import FirmnessConfig
+from slam.map.reliability import ReliabilityConfig
 
 IDS = np.array([3, 8, 9])
 WALLS = KnownWalls(IDS, np.tile([-1.0, 1.0], (3, 1)))
@@ -64,7 +64,7 @@ def test_stacked_innovations_are_those_of_each_line_with_the_covariance_of_pose_
 
 
 def test_the_nis_of_a_scan_is_that_of_all_its_lines_together_and_each_call_is_heard_once():
-    ear = InnovationEar(FirmnessConfig())
+    ear = InnovationEar(ReliabilityConfig())
     hear(ear, [(seen(LINES[[0, 2]] + 0.03), [3, 9]), (seen(LINES[[1]] - 0.02), [8])])
     expected = []
     for rows, off in (([0, 2], 0.03), ([1], -0.02)):
@@ -80,7 +80,7 @@ def whitened(row, off):
 
 
 def test_whiteness_is_the_correlation_of_a_wall_s_innovations_in_scans_running():
-    ear = InnovationEar(FirmnessConfig())
+    ear = InnovationEar(ReliabilityConfig())
     assert ear.whiteness() is None
     offs = {3: (0.03, 0.02, -0.05), 9: (0.01, None, 0.04), 8: (None, -0.02, -0.03)}
     row_of = {3: 0, 8: 1, 9: 2}
@@ -95,7 +95,7 @@ def test_whiteness_is_the_correlation_of_a_wall_s_innovations_in_scans_running()
 
 
 def test_a_scan_without_a_clear_wall_is_not_heard_and_parts_those_beside_it():
-    ear = InnovationEar(FirmnessConfig())
+    ear = InnovationEar(ReliabilityConfig())
     clear, unclear = seen(LINES[[0]] + 0.03), seen(LINES[[0]] + 0.03, sigma_rad=0.06)
     hear(ear, [(clear, [3]), (unclear, [3]), (clear, [3]), (seen(np.zeros((0, 2))), []), (clear, [3])])
     assert ear.dofs == [2, 2, 2]
@@ -103,7 +103,7 @@ def test_a_scan_without_a_clear_wall_is_not_heard_and_parts_those_beside_it():
 
 
 def test_only_the_clear_ones_of_a_scan_are_heard():
-    ear, alone = InnovationEar(FirmnessConfig()), InnovationEar(FirmnessConfig())
+    ear, alone = InnovationEar(ReliabilityConfig()), InnovationEar(ReliabilityConfig())
     mixed = seen(LINES[[0, 1]] + 0.02)
     mixed.cov[1] = np.diag([0.06**2, 4e-4])
     hear(ear, [(mixed, [3, 8])])
@@ -112,7 +112,7 @@ def test_only_the_clear_ones_of_a_scan_are_heard():
 
 
 def test_a_covariance_that_is_none_is_not_heard_and_ends_what_runs():
-    ear = InnovationEar(FirmnessConfig())
+    ear = InnovationEar(ReliabilityConfig())
     good = (seen(LINES[[0]] + 0.03), [3])
     hear(ear, [good])
     broken = replace(good[0], cov=np.array([np.diag([1e-4, -10.0])]))
@@ -122,7 +122,7 @@ def test_a_covariance_that_is_none_is_not_heard_and_ends_what_runs():
 
 
 def test_innovations_of_nothing_have_no_direction():
-    ear = InnovationEar(FirmnessConfig())
+    ear = InnovationEar(ReliabilityConfig())
     hear(ear, [(seen(LINES[[0]]), [3]), (seen(LINES[[0]]), [3])])
     assert ear.values == pytest.approx([0.0, 0.0])
     assert ear.whiteness() is None

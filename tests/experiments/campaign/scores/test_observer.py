@@ -68,7 +68,7 @@ def test_a_moment_is_a_copy_that_a_back_end_leaves_alone(walls, truth):
     observer = Observer(truth.walls, lambda index: np.zeros(BEAMS, int))
     observer(step(walls, path_m=10.0))
     moment = observer.marks[10.0]
-    before = {name: getattr(moment.map, name).copy() for name in ("extents", "sightings", "tentative", "crooked")}
+    before = {name: getattr(moment.map, name).copy() for name in ("extents", "observations", "tentative", "crooked")}
     held = {
         name: getattr(moment.map.belief, name).copy() for name in ("pose_world", "pose_cov", "ids", "anchors", "means")
     }

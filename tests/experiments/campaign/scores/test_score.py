@@ -16,7 +16,7 @@ from experiments.trial import TrialResult
 from slam.estimation.backend import Joint
 from slam.geometry.poses import compose, inverse, to_world
 from slam.map.chains import OpenEnd
-from slam.map.reliability import FirmnessConfig
+from slam.map.reliability import ReliabilityConfig
 from tests.experiments.by_hand import true_map
 
 N = 13
@@ -307,14 +307,14 @@ def test_segments_are_counted_by_what_became_of_them(made):
 
 
 def test_the_innovations_of_a_run_are_averaged_over_their_dimensions(made):
-    ear = InnovationEar(FirmnessConfig(), values=[3.0, 8.0], dofs=[2, 6])
+    ear = InnovationEar(ReliabilityConfig(), values=[3.0, 8.0], dofs=[2, 6])
     record = kept(made, ear)
     assert record.summary["nis_mean"] == pytest.approx(11.0 / 8.0)
     assert record.summary["nis_whiteness"] is None
     assert (record.arrays["nis"].tolist(), record.arrays["nis_dof"].tolist()) == ([3.0, 8.0], [2, 6])
     ear._pairs = [np.array([[1.0, 0.0], [1.0, 0.0]])]
     assert kept(made, ear).summary["nis_whiteness"] == 1.0
-    for deaf in (None, InnovationEar(FirmnessConfig())):
+    for deaf in (None, InnovationEar(ReliabilityConfig())):
         record = kept(made, deaf)
         assert record.summary["nis_mean"] is record.summary["nis_whiteness"] is None
         assert not {"nis", "nis_dof"} & record.arrays.keys()

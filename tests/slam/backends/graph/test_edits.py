@@ -1,4 +1,4 @@
-"""What only a graph can do: take back lines and sightings, go on from a file."""
+"""What only a graph can do: take back lines and observations, go on from a file."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_a_merged_run_equals_one_that_was_never_split():
     assert_same(split.belief.joint(order), whole.belief.joint(order), place=3e-4, angle=3e-4, cov=1e-3)
 
 
-def test_retracting_a_line_equals_a_run_without_its_sightings():
+def test_retracting_a_line_equals_a_run_without_its_observations():
     trip = Trip.record(8)
     full = trip.run(Graph(START, P0))
     gone = trip.ids[3]
@@ -66,7 +66,7 @@ def test_retracting_a_wrong_match_equals_a_run_without_it():
         wrong.retract_observations(line, [wrong_number])
 
 
-def test_a_line_without_any_sighting_left_is_gone():
+def test_a_line_without_any_observation_left_is_gone():
     trip = Trip.record(10, steps=3)
     backend = trip.run(Graph(START, P0))
     line = next(iter(trip.ids.values()))

@@ -1,4 +1,4 @@
-"""Sightings told wall by wall, so that a back end runs alone: no mapper, the true association settled beforehand.
+"""Observations told wall by wall, so that a back end runs alone: no mapper, the true association settled beforehand.
 
 What the mapper asks of a back end under `--association true` does not depend on the back end. It is worked out once for
 a drive and handed to many.
@@ -15,7 +15,7 @@ from slam.evaluation.consistency import joint_error, nees, pose_covariances, pos
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.extraction.visible_extent import sure_pieces
-from slam.map.reliability import Firmness, as_told
+from slam.map.reliability import Reliability, as_told
 from slam.map_keeper import seen_centres
 from slam.robot import Odometry, Scan
 
@@ -26,7 +26,7 @@ from .replay import RecordedRun
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
+class ScanObservations:
     """Lines seen in one scan, robot frame."""
 
     walls: Int[np.ndarray, " m"]
@@ -40,28 +40,28 @@ class Looks:
     def __len__(self) -> int:
         return len(self.walls)
 
-    def take(self, index: np.ndarray) -> "Looks":
+    def take(self, index: np.ndarray) -> "ScanObservations":
         """Return the chosen ones (integer or boolean index)."""
-        return Looks(self.walls[index], self.lines[index], self.cov[index], self.centres[index])
+        return ScanObservations(self.walls[index], self.lines[index], self.cov[index], self.centres[index])
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class DriveObservations:
     """A drive of s scans: what the wheels reported, what was seen again and what for the first time, and the truth."""
 
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each scan, robot frame before the motion, m m rad; the first is not used."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
-    again: tuple[Looks, ...]
-    """For each scan the sightings of walls seen before."""
-    first: tuple[Looks, ...]
+    again: tuple[ScanObservations, ...]
+    """For each scan the observations of walls seen before."""
+    first: tuple[ScanObservations, ...]
     """And those that begin a line."""
     true_poses_world: Float[np.ndarray, "s 3"]
     true_lines_world: dict[int, Float[np.ndarray, "2"]]
     """(alpha rad, r m) of each wall that begins a line."""
 
-    def told(self, share: float) -> "Sightings":
-        """Return the same sightings with their covariances stated as this share of what they are."""
+    def told(self, share: float) -> "DriveObservations":
+        """Return the same observations with their covariances stated as this share of what they are."""
         again, first = ([replace(looks, cov=share * looks.cov) for looks in part] for part in (self.again, self.first))
         return replace(self, again=tuple(again), first=tuple(first))
 
@@ -91,7 +91,7 @@ class Ridden:
         return float(nees(error[None, 3:], cov[None, 3:, 3:])[0]) / (len(error) - 3)
 
 
-def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
+def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservations:
     """Return what a recorded run saw, as the mapper would hand it to any back end under the true association.
 
     Raises UsageError for a world that cannot be loaded.
@@ -101,7 +101,7 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
     witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
     rules, extraction = trial.mission.mapper.walls, trial.mission.mapper.extraction
-    firmness = Firmness(rules.firmness)
+    reliability = Reliability(rules.reliability)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k, ranges in enumerate(recording.ranges_m):
@@ -114,24 +114,24 @@ def sightings_of(run: RecordedRun, perfect_extraction: bool) -> Sightings:
         walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
         known = np.isin(walls, list(true_lines))
         seen = np.flatnonzero(known)
-        seen = seen[firmness.may_move(segments.take(seen), walls[seen])]
+        seen = seen[reliability.may_move(segments.take(seen), walls[seen])]
         rest = np.flatnonzero(~known)
         begun = rest[begins_a_line(walls[rest], segments.beam_counts[rest], set(true_lines))]
         begun = begun[~segments.is_tentative[begun]]
         owned = known & ~segments.is_tentative
         owned[begun] = True
-        firmness.see(segments, np.where(owned, walls, -1), run.true_poses_world[k])
+        reliability.see(segments, np.where(owned, walls, -1), run.true_poses_world[k])
         looks = _looks(segments, walls).take(seen)
-        again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.firmness)))
+        again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.reliability)))
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
-    return Sightings(
+    return DriveObservations(
         recording.odometry, recording.odometry_cov, tuple(again), tuple(first), run.true_poses_world, true_lines
     )
 
 
-def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> Looks:
-    return Looks(walls, segments.lines, segments.cov, seen_centres(segments, np.arange(len(segments))))
+def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> ScanObservations:
+    return ScanObservations(walls, segments.lines, segments.cov, seen_centres(segments, np.arange(len(segments))))
 
 
 def start(seed: int, true_pose_world: Float[np.ndarray, "3"], p0: str) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +141,7 @@ def start(seed: int, true_pose_world: Float[np.ndarray, "3"], p0: str) -> tuple[
     return true_pose_world + sigmas * standard_normals(seed, Channel.START, 0, 3), np.diag(sigmas**2)
 
 
-def ride(backend: Backend, drive: Sightings) -> Ridden:
+def ride(backend: Backend, drive: DriveObservations) -> Ridden:
     """Take a back end without lines along a drive and return its estimates."""
     line_of_wall: dict[int, int] = {}
     poses, covs = [], []
