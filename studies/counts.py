@@ -27,6 +27,7 @@ PREFACE = """# Numbers that one may tune
 
 Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, reachable by `--set`), constants, and
 numbers in conditions. The end of a name is its unit (`_m`, `_rad`, `_s`, `_steps`); others are counts or ratios.
+Numbers in conditions that have no words guard the arithmetic or count in geometry (a ring has three corners).
 `make counts` counts them.
 """
 NO_ENTRIES = {"__pycache__", "__init__.py", "py.typed"}
@@ -108,9 +109,13 @@ def _is_number(value: ast.expr) -> bool:
     if not leaves or any(type(each) not in (int, float) for each in leaves):
         return False
     chosen = any(each not in PLAIN for each in leaves)
-    return isinstance(value, (ast.Constant, ast.Tuple, ast.UnaryOp)) or (
-        isinstance(value, (ast.BinOp, ast.Call)) and chosen
-    )
+    match value:
+        case ast.Constant() | ast.Tuple():
+            return True
+        case ast.Call(func=ast.Name(id=name)) if name[0].isupper():
+            return False
+        case _:
+            return chosen and isinstance(value, (ast.UnaryOp, ast.BinOp, ast.Call))
 
 
 def _literals(file: str, tree: ast.Module) -> list[Number]:

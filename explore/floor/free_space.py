@@ -20,6 +20,7 @@ class FreeSpaceConfig:
     """The grid and how evidence gathers in it."""
 
     cell_m: float = 0.05
+    """Side of a cell: a third of a step."""
     hit: int = 3
     """What one hit adds to a cell; a beam that passes takes one away."""
     limit: int = 6
@@ -30,6 +31,10 @@ class FreeSpaceConfig:
     """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
     clearance_limit_m: float = 1.0
     """Clearances are exact up to here; beyond, they are at least this."""
+
+
+HALF_DIAGONAL = 0.71
+"""From the middle of a cell of side one to its corner: no part of a free cell lies beyond a beam's end."""
 
 
 class FloorTooLargeError(ValueError):
@@ -201,13 +206,13 @@ class FreeSpace:
         step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (k - 1)
         bearing = np.arctan2(y[:, None], x[None, :]) - np.float32(pose_world[2] + scan.bearings_rad[0])
         beam = np.floor(wrap_positive(bearing) / np.float32(step)).astype(np.int64)
-        shown = reach - 0.71 * self.config.cell_m
+        shown = reach - HALF_DIAGONAL * self.config.cell_m
         between = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1.0, dtype=np.float32)
         between[: k - 1] = np.minimum(shown[:-1], shown[1:])
         if scan.is_full_turn:
             between[k - 1 :] = min(shown[-1], shown[0])
         body = distance < self.config.body_m
-        return (distance < between[beam]) | body, distance < self.config.body_m - 0.71 * self.config.cell_m
+        return (distance < between[beam]) | body, distance < self.config.body_m - HALF_DIAGONAL * self.config.cell_m
 
     @staticmethod
     def _reach(scan: Scan) -> Float[np.ndarray, " k"]:

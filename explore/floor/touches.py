@@ -10,6 +10,8 @@ REACH_M = 0.04
 """A return this near to the body, on the side to which it moved, may be what it met."""
 KEPT_M = 1.0
 """What is farther off matters to no step from here."""
+BESIDE_SHARE = 0.25
+"""A return up to 15 degrees behind the body's side counts as being on the side to which it moved."""
 
 
 class Touches:
@@ -42,7 +44,7 @@ class Touches:
         """
         gap = np.hypot(near_robot[:, 0], near_robot[:, 1])
         met = [self._radius_m * self._ahead]
-        on_side = (near_robot @ self._ahead > -0.25 * gap) & (gap < self._radius_m + REACH_M)
+        on_side = (near_robot @ self._ahead > -BESIDE_SHARE * gap) & (gap < self._radius_m + REACH_M)
         if on_side.any():
             nearest = near_robot[on_side][int(np.argmin(gap[on_side]))]
             met.append(self._radius_m * nearest / max(float(np.hypot(*nearest)), 1e-9))

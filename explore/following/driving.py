@@ -129,7 +129,7 @@ class Pilot:
             back = MotionCommand(-self._config.careful_m, 0.0)
             return back if _is_safe(back, points, self._config, narrow) else None
         turn = _turn_towards(aim, self._config)
-        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > 0.02 else None)
+        return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > FACING_RAD else None)
 
     def _clear_step(
         self,
@@ -177,6 +177,13 @@ class Pilot:
 
 
 _RIM = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=-1)
+"""Points of the rim of a disc of radius one, every fifteen degrees."""
+GAIN_SHARE = 0.2
+"""Such a step leads out if the gap grows by this share of it: less is noise of the ranges."""
+NEAR_M = 0.1
+"""Returns farther off than a step, the body and this are not in the way of a step."""
+FACING_RAD = 0.02
+"""A turn of less is not worth a step."""
 
 
 def _turn_towards(aim_robot: Float[np.ndarray, "2"], config: DrivingConfig) -> float:
@@ -216,7 +223,7 @@ def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> Moti
     gap = points_robot - ends[:, None]
     least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
     best = int(np.argmax(least))
-    leads_out = least[best] > gaps.min() + 0.2 * config.careful_m and _is_safe(
+    leads_out = least[best] > gaps.min() + GAIN_SHARE * config.careful_m and _is_safe(
         commands[best], points_robot, config, narrow=False
     )
     return commands[best] if leads_out else None
@@ -266,7 +273,7 @@ def _is_safe(
     """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
     if not len(points_robot):
         return True
-    near = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.step_m + 0.1]
+    near = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.step_m + NEAR_M]
     if not len(near):
         return True
     least = _least_gap(command, near)

@@ -15,6 +15,7 @@ from slam.geometry.poses import J
 from slam.map.stochastic_map import StochasticMap
 
 POSE = 3
+"""Rows of the pose in the joint state."""
 OBSERVATION_SIGMAS = np.array([0.005, 0.004])
 """What one look at a wall leaves open: its direction rad, its distance m."""
 DRIFT_SIGMAS = np.array([0.02, 0.02, 0.07])

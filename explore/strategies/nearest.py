@@ -10,6 +10,9 @@ from ..survey.frontiers import borders_on_unseen
 from ..survey.unmapped_obstacles import is_mapped
 from .strategy import Choice, Place, Situation
 
+STILL_UNSEEN = 0.5
+"""A frontier is worth the way while this share of it borders on floor that nobody saw."""
+
 
 def nearest_end(
     situation: Situation, metres: Float[np.ndarray, " n"] | None = None, among: Sequence[int] | None = None
@@ -79,4 +82,4 @@ def _still_unmapped(place: Place) -> Callable[[Surroundings], bool]:
 
 
 def _still_frontier(place: Place) -> Callable[[Surroundings], bool]:
-    return lambda around: bool(np.mean(borders_on_unseen(around.free_space, place.points_world)) >= 0.5)
+    return lambda around: bool(np.mean(borders_on_unseen(around.free_space, place.points_world)) >= STILL_UNSEEN)

@@ -16,6 +16,7 @@ APART_M = 0.3
 TOGETHER_CELLS = 5.0
 """Cells hit this near to each other are one thing: from afar beams meet it some centimetres apart."""
 LEAST_CELLS = 3
+"""Fewer are single beams that ended on noise."""
 LOOK_M = (0.6, 0.9)
 """From so far away, faces of a decimetre show beams enough."""
 

@@ -18,6 +18,9 @@ from ..geometry.poses import to_world
 from .hypotheses import agree, nearest_alone
 from .joint_compatibility import compatible, squared_distances, taken_together
 
+OVERLAP_SHARE = 0.5
+"""A short segment lies along a wall that covers at least this share of it."""
+
 
 @dataclass(frozen=True)
 class MatchingConfig:
@@ -191,7 +194,7 @@ def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -
         (length < config.short_m)
         & (np.abs(found.model.e[:, 0]) < turn)
         & (np.abs(found.model.e[:, 1]) < config.beside_m)
-        & (found.gap <= -0.5 * length * np.cos(found.model.e[:, 0]))
+        & (found.gap <= -OVERLAP_SHARE * length * np.cos(found.model.e[:, 0]))
     )
 
 

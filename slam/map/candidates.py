@@ -14,6 +14,9 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions, lines_to_world, normals
 from ..geometry.poses import to_world, wrap
 
+FACING_COSINE = 0.5
+"""Lines that turn by more than 60 degrees from one another are never one, however poor their directions."""
+
 
 @dataclass(frozen=True)
 class CandidatesConfig:
@@ -114,7 +117,7 @@ class LandmarkCandidates:
         s11 = seen.var_across[:, None] + known.var_across + along * s01 + self._config.slack_m**2
         d2 = (s11 * turn**2 - 2 * s01 * turn * off + s00 * off**2) / (s00 * s11 - s01**2)
         apart = np.abs(along) >= seen.half_m[:, None] + known.half_m
-        d2[apart | (d2 > gate_level(self._config.gate, 2)) | (np.cos(turn) < 0.5)] = np.inf
+        d2[apart | (d2 > gate_level(self._config.gate, 2)) | (np.cos(turn) < FACING_COSINE)] = np.inf
         line_of = np.full(len(seen.alpha), -1, dtype=np.int64)
         for flat in np.argsort(d2, axis=None)[: np.count_nonzero(np.isfinite(d2))]:
             row, line = divmod(int(flat), d2.shape[1])

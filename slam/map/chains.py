@@ -14,6 +14,10 @@ TAIL, HEAD = 0, 1
 """The two ends of a wall: walking from tail to head, the free side is on the left."""
 
 
+BESIDE_SHARE = 0.5
+"""Ends of parallel walls that stand apart by this share of the gap across them are a step, not one wall with a hole."""
+
+
 @dataclass(frozen=True)
 class ChainConfig:
     """When the head of one wall and the tail of another are one corner."""
@@ -118,7 +122,7 @@ def _links(
     allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
     straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
     across = np.abs(np.vecdot(normals(lines[head, 0]), ends[tail, TAIL] - ends[head, HEAD]))
-    allowed &= ~straight | (gap <= config.straight_reach_m) | (across > 0.5 * gap)
+    allowed &= ~straight | (gap <= config.straight_reach_m) | (across > BESIDE_SHARE * gap)
     allowed |= (
         (gap <= config.overlap_m)
         & (often[head] & often[tail])

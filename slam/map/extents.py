@@ -16,6 +16,13 @@ from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import StochasticMap
 
+CLAIMED_BEAMS = 4
+"""Fewer beams on a wall say nothing about whose they are."""
+CLAIMED_SHARE = 0.8
+"""A wall is claimed by others in a scan that gives them this share of its beams: a beam or two may lie near both."""
+TRIM_M = 0.5
+"""What is left of a wall that a beam passed through is cut back to its hits by less than this: beams stand apart."""
+
 
 @dataclass(frozen=True)
 class WallsConfig:
@@ -111,7 +118,7 @@ class Extents:
         on = lines.hits & (lines.along > low) & (lines.along < high)
         others = on & (owners_of_beams >= 0) & (owners_of_beams != self._records.ids[near, None])
         count = np.count_nonzero(on, axis=1)
-        claimed = (count >= 4) & (np.count_nonzero(others, axis=1) >= 0.8 * count)
+        claimed = (count >= CLAIMED_BEAMS) & (np.count_nonzero(others, axis=1) >= CLAIMED_SHARE * count)
         seen = last_seen[near] == self._scans
         scans[near] = np.where(seen, 0, scans[near] + claimed)
 
@@ -214,8 +221,8 @@ def _kept_piece(
     best = int(np.lexsort((length, hits))[-1])
     low, high = bounds[best], bounds[best + 1]
     inner = on[(on >= low) & (on <= high)]
-    if len(inner) and best > 0 and inner.min() - low < 0.5:
+    if len(inner) and best > 0 and inner.min() - low < TRIM_M:
         low = inner.min()
-    if len(inner) and best < len(length) - 1 and high - inner.max() < 0.5:
+    if len(inner) and best < len(length) - 1 and high - inner.max() < TRIM_M:
         high = inner.max()
     return np.array([low, high])

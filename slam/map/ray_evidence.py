@@ -8,6 +8,11 @@ from jaxtyping import Bool, Float
 from ..geometry.lines import directions, normals
 from ..robot import Scan
 
+GRAZING_COSINE = 0.05
+"""Beams within three degrees of a line say nothing about it: its own uncertainty moves the crossing by metres."""
+NEAREST_M = 0.02
+"""Nor do those to a line through the robot itself."""
+
 
 @dataclass(frozen=True)
 class RayEvidence:
@@ -34,7 +39,7 @@ def ray_evidence(
     r = means[:, 1] + np.vecdot(n, to_anchor)
     off_normal = scan.bearings_rad + pose_world[2] - means[:, :1]
     cosine = np.cos(off_normal)
-    ahead = (cosine > 0.05) & (r[:, None] > 0.02)
+    ahead = (cosine > GRAZING_COSINE) & (r[:, None] > NEAREST_M)
     safe = np.where(ahead, cosine, 1.0)
     distance = r[:, None] / safe
     foot = np.vecdot(directions(means[:, 0]), -to_anchor)
