@@ -78,10 +78,14 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if home := summary["return_to_start"]:
         rows.append(("from the start: believed, true", f"{home['distance_m']:.2f} m, {home['distance_true_m']:.2f} m"))
+    mapped = {pair: d for pair, d in summary["distances"].items() if d["mapped_m"] is not None}
     rows += [
-        (f"distance {pair}", f"{_number(d['mapped_m'])} m (true {d['true_m']:.2f} m)")
-        for pair, d in list(summary["distances"].items())[:6]
+        (f"distance {pair}", f"{d['mapped_m']:.3f} m (true {d['true_m']:.2f} m)")
+        for pair, d in list(mapped.items())[:6]
     ]
+    if mapped and len(mapped) < len(summary["distances"]):
+        missing = len(summary["distances"]) - len(mapped)
+        rows.append(("distances to corners that are not in the map", str(missing)))
     return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
 
 

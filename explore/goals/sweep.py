@@ -52,13 +52,13 @@ class Sweep:
             return nearest_frontier(situation, "no wall is in sight yet")
         if not self._is_on:
             return None
-        why = "every chain is done, unseen floor is left"
+        why = "no open end is in reach, unseen floor is left"
         frontier = (
             nearest_viewpoint(situation, self._beside_walls(situation, only_near=True), why, NEAR_M)
             or nearest_viewpoint(situation, self._beside_walls(situation, only_near=False), why)
             or nearest_frontier(situation, why)
         )
-        things = "every chain is done, things stand that are no wall of the map"
+        things = "no open end is in reach, things stand that are no wall of the map"
         return frontier or nearest_unmapped_obstacle(situation, things)
 
     def _beside_walls(self, situation: Situation, *, only_near: bool) -> dict[Place, Place]:
