@@ -85,7 +85,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if mapped and len(mapped) < len(summary["distances"]):
         missing = len(summary["distances"]) - len(mapped)
-        rows.append(("distances to corners that are not in the map", str(missing)))
+        rows.append(("distances not in the map", str(missing)))
     return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
 
 

@@ -26,4 +26,4 @@ def test_distances_that_were_measured_have_a_row_and_the_others_are_counted(summ
     print_summary(summary)
     said = " ".join(capsys.readouterr().out.split())
     assert "distance A-B │ 6.496 m (true 6.50 m)" in said
-    assert f"distances to corners that are not in the map │ {len(summary['distances']) - 1}" in said
+    assert f"distances not in the map │ {len(summary['distances']) - 1}" in said
