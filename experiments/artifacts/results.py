@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from explore.certificate import Certificate
+from explore.step import Step
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
-from viz.figures.floor_plan import floor_plan
+from viz.figures.floor_plan import Dimension, floor_plan
 
 from ..scenario import TrialConfig
 from ..scoring.records import Log
@@ -21,7 +23,9 @@ from ..scoring.summary import odometry_path, pose_nees
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
+from .maps.dimensions import dimensions
 from .maps.geojson import map_geojson
+from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
@@ -89,7 +93,9 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "steps.csv": lambda: steps_csv(log),
         "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
         "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
-        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title),
+        "map.svg": lambda: floor_plan(
+            last.map, last.chains, certificate, log.estimated_world, title, _dimensions(result, last, certificate, log)
+        ),
         "map.png": lambda: _picture(result),
     }
     if last.free_space.evidence.size:
@@ -97,6 +103,16 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         files["map.pgm"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[0]
         files["map.yaml"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[1]
     return files
+
+
+def _dimensions(result: TrialResult, last: Step, certificate: Certificate, log: Log) -> list[Dimension]:
+    """Return lengths and areas as `measure` would tell them of the files; none where the covariance is lost."""
+    arrays = map_arrays(result)
+    if not np.all(np.isfinite(arrays["cov"])):
+        return []
+    features = map_geojson(last, result.joint, certificate, log)["features"]
+    found = {kind: [f for f in features if f["properties"]["kind"] == kind] for kind in ("corner", "chain")}
+    return dimensions(corners_of(arrays, found["corner"], found["chain"]))
 
 
 def config_record(config: TrialConfig) -> dict[str, Any]:

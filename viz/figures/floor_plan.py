@@ -1,9 +1,11 @@
 """The map as a floor plan in SVG, one unit a metre, which `chainslam explore map.svg` reads as a world again.
 
 What is dark is wall: beside each chain its walls as solid bands, a closed island as a solid block, in the colour of the
-chain. What is light is decoration: the grid, the way of the robot, the rings around open ends.
+chain. What is light is decoration: the grid, the way of the robot, the rings around open ends. Text is no wall either.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -23,6 +25,26 @@ SCALE = 100
 MITRE = 5.0
 WAY, END, BAR = "#B9C3D6", "#FFB77A", "#B8B8B8"
 """Light enough to be read as decoration."""
+WORDS = "#444444"
+LETTERS_M = 0.22
+"""Height of the letters on the plan; a shorter side has smaller ones, down to `SMALLEST_M`, else none."""
+SMALLEST_M = 0.06
+SHARE = 0.115
+"""Height of letters of which fifteen fit beside a side of length one."""
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """The length of a side of a closed chain, or the area of a room."""
+
+    at_world: Float[np.ndarray, "2"]
+    """Middle of the side or of the room's largest free disc."""
+    along_world: Float[np.ndarray, "2"]
+    """The side as a vector, m, the free side on its left; for an area as far as there is room, level."""
+    words: str
+    hint: str
+    """What a browser shows under the pointer."""
+    is_area: bool = False
 
 
 def floor_plan(
@@ -31,6 +53,7 @@ def floor_plan(
     certificate: Certificate,
     path_world: Float[np.ndarray, "s 3"],
     title: str,
+    dimensions: Sequence[Dimension] = (),
 ) -> bytes:
     """Return the SVG file; its y axis points down, so its world is the map's moved to the view's lower left corner."""
     bands = [_band(chain, index, walls, certificate) for index, chain in enumerate(chains)]
@@ -58,12 +81,13 @@ def floor_plan(
     for end in certificate.open_ends:
         ring = plan.circle(end.position_world, 0.2, fill="none", stroke=END, stroke_width="0.05")
         SubElement(ring, "title").text = f"open end of wall {end.wall}: {end.why}"
+    for dimension in dimensions:
+        plan.dimension(dimension)
     start = plan.circle(path_world[0, :2], 0.12, id="start", fill="none", stroke=BAR, stroke_width="0.03")
     start.set("data-heading-deg", f"{np.rad2deg(path_world[0, 2]):.3f}")
-    label = SubElement(page, "text", x="0.2", y=f"{height - 0.2:g}", fill="#8A8A8A")
-    label.set("font-size", "0.35")
-    label.set("font-family", "sans-serif")
-    label.text = f"{title}; grid 1 m"
+    plan.footer(
+        [f"{title}; grid 1 m", *(["lengths in m, areas in m², with 95 % intervals"] if dimensions else [])], height
+    )
     indent(page)
     return tostring(page, encoding="utf-8", xml_declaration=True) + b"\n"
 
@@ -120,6 +144,32 @@ class _Plan:
         rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
         path = " ".join(f"{self._path(shapely.get_coordinates(ring)[:-1])} Z" for ring in rings)
         self._add("path", d=path, fill_rule="evenodd", **attributes)
+
+    def dimension(self, told: Dimension) -> None:
+        """Write a length beside its wall, on the free side and upright, or an area in the middle of its room."""
+        length = float(np.hypot(*told.along_world))
+        letters = min(LETTERS_M, SHARE * length)
+        if letters < SMALLEST_M:
+            return
+        along = told.along_world / length
+        beside = 0.0 if told.is_area else 0.9 * letters
+        x, y = self._on_page((told.at_world + beside * np.array([-along[1], along[0]]))[None])[0]
+        turn = np.rad2deg(np.arctan2(-along[1], along[0]))
+        upright = turn - 180.0 if turn > 90.0 else turn + 180.0 if turn <= -90.0 else turn
+        text = self._add(
+            "text", transform=f"translate({x:.3f} {y:.3f}) rotate({upright:.2f})", fill=WORDS, text_anchor="middle",
+            dominant_baseline="central", font_size=f"{letters:.3f}", font_family="sans-serif",
+            font_weight="bold" if told.is_area else "normal",
+        )  # fmt: skip
+        text.text = told.words
+        SubElement(text, "title").text = told.hint
+
+    def footer(self, lines: Sequence[str], height_m: float) -> None:
+        """Write lines at the lower edge of the page, the first the highest."""
+        for k, words in enumerate(lines):
+            y = height_m - 0.15 - 0.3 * (len(lines) - 1 - k)
+            text = self._add("text", x="0.2", y=f"{y:g}", fill="#6A6A6A", font_size="0.26", font_family="sans-serif")
+            text.text = words
 
     def circle(self, centre_world: Float[np.ndarray, "2"], radius_m: float, **attributes: str) -> Element:
         """Draw a circle and return it."""

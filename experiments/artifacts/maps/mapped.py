@@ -1,5 +1,6 @@
 """A run's map as it stands on disk: corners, walls and closed chains, with the joint covariance of all walls."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,10 +64,13 @@ def read_corners(folder: Path) -> MappedCorners:
     features = read_features(folder, arrays["ids"])
     if not np.all(np.isfinite(arrays["cov"])):
         raise UsageError("expected a map with its joint covariance, found one that was lost: measure another run")
-    return _corners(arrays, features["corner"], features["chain"])
+    return corners_of(arrays, features["corner"], features["chain"])
 
 
-def _corners(arrays: dict[str, np.ndarray], found: list[dict[str, Any]], chains: list[dict[str, Any]]) -> MappedCorners:
+def corners_of(
+    arrays: Mapping[str, np.ndarray], found: Sequence[Mapping[str, Any]], chains: Sequence[Mapping[str, Any]]
+) -> MappedCorners:
+    """Return the corners of a map from what `map.npz` and the features of `map.geojson` hold."""
     row_of = {int(wall): row for row, wall in enumerate(arrays["ids"])}
     positions = np.array([f["geometry"]["coordinates"] for f in found], dtype=np.float64).reshape(-1, 2)
     jacobians = np.zeros((len(found), 2, len(arrays["cov"])))

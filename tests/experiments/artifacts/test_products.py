@@ -1,6 +1,7 @@
 """The map as a product: each file is read by others, and by the readers of worlds here."""
 
 import json
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,8 +10,9 @@ import shapely
 import yaml
 from PIL import Image
 
+from experiments.artifacts.maps.mapped import read_corners
 from experiments.artifacts.maps.occupancy import occupancy_files
-from experiments.artifacts.results import write_results
+from experiments.artifacts.results import _dimensions, write_results
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
 from explore.floor.free_space import FreeSpace
@@ -64,6 +66,38 @@ def test_geojson_holds_valid_shapes_and_says_that_it_is_in_metres(explored, worl
         assert np.all(np.linalg.eigvalsh(covs) > 0)
     room = next(shape for shape, properties in shapes["chain"] if properties["contour"] == "room")
     assert room.hausdorff_distance(shapely.Polygon(world.free.exterior)) < 0.05
+
+
+def test_the_floor_plan_tells_lengths_and_areas_as_measure_does(explored):
+    _, folder = explored
+    mapped = read_corners(folder)
+    texts = [each for each in ElementTree.parse(folder / "map.svg").iter() if each.tag.endswith("}text")]
+    told = [(each.text, each[0].text) for each in texts if len(each)]
+    sides = [side for room in mapped.rooms for side in mapped.sides(room)]
+    (room,) = [room for room in mapped.rooms if not room.is_island]
+    assert len(told) == len(sides) + 1
+    for (words, hint), (first, second, measured) in zip(told, sides, strict=False):
+        low, high = measured.interval
+        assert words == f"{measured.value:.3f} ± {high - measured.value:.3f}"
+        assert hint.startswith(f"corner {first} to corner {second}: {measured.value:.3f} m")
+        assert hint.endswith(f"95 % interval {low:.3f} to {high:.3f} m")
+    low, high = mapped.area(room).interval
+    assert told[-1][0] == f"{(low + high) / 2:.3f} ± {(high - low) / 2:.3f} m²"
+
+
+def test_a_length_stands_on_the_free_side_of_its_wall_and_an_area_on_free_floor(explored, world):
+    result, _ = explored
+    for each in _dimensions(result, result.last, result.certificate, result.log):
+        left = np.array([-each.along_world[1], each.along_world[0]]) / np.hypot(*each.along_world)
+        shift = np.zeros(2) if each.is_area else 0.1 * left
+        assert world.free.contains(shapely.Point(each.at_world + shift))
+        if not each.is_area:
+            assert not world.free.contains(shapely.Point(each.at_world - shift))
+
+
+def test_without_a_covariance_the_floor_plan_has_no_intervals(explored):
+    result, _ = explored
+    assert _dimensions(replace(result, joint=None), result.last, result.certificate, result.log) == []
 
 
 @pytest.mark.parametrize("name", ["map.yaml", "map.svg", "map.geojson"])
