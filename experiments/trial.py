@@ -77,7 +77,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
     way_world = log.estimated_world[:, :2]
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, way_world)
-    summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending)
+    summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending, recorder.sketches)
     summary |= {"certificate": certificate_record(certificate)}
     smoothed = smooth(scenario.backend, last.map, len(log))
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
@@ -103,9 +103,9 @@ def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
 def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a single step: null for all that was not measured."""
     keys = (
-        "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage swept pose_rmse_m"
-        " heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges false_merges"
-        " return_to_start certificate step_ms planning_ms"
+        "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
+        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges"
+        " false_merges return_to_start certificate step_ms planning_ms"
     )
     return {
         **run_keys(scenario, ending),

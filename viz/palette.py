@@ -14,6 +14,11 @@ def of_backend(name: str) -> str:
     return BACKEND_COLOURS[turn % len(BACKEND_COLOURS)]
 
 
+def of_rank(rank: int) -> str:
+    """Return the colour of what has no colour of its own, by its place in a list."""
+    return BACKEND_COLOURS[rank % len(BACKEND_COLOURS)]
+
+
 CLOSED = ("#0072B2", "#7B4FA3", "#56B4E9", "#1F3F7A", "#A68BD0", "#4C5FD5", "#2A8FA8", "#5B2A86")
 """Closed chains, in turn; none is green, which stands for segments that were fused."""
 OPEN = "#E69F00"

@@ -11,7 +11,7 @@ CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
     CONFIG: 2,
-    "summary.json": 1,
+    "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 1,
     "map.npz": 1,
@@ -21,9 +21,10 @@ FORMATS = {
     "contrast.json": 1,
 }
 """By name; `config.json` is that of a run, of a campaign and of merged campaigns."""
-OLDEST = {CONFIG: 1}
+OLDEST = {CONFIG: 1, "summary.json": 1}
 """The first format that can still be looked at and replayed, where that is not the one of now. Format 1 of
-`config.json` had other names for some settings (`settings.RENAMED`), and a campaign no `settings`: nothing goes on."""
+`config.json` had other names for some settings (`settings.RENAMED`), and a campaign no `settings`: nothing goes on.
+Format 1 of `summary.json` had no `coverage_curve`."""
 
 
 def stamp(name: str) -> dict[str, int]:

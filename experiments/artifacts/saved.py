@@ -42,6 +42,7 @@ SUMMARY = {
     "steps": int,
     **{f"{name}?": float | None for name in NUMBERS},
     **{f"{name}?": int | None for name in COUNTS},
+    "coverage_curve?": Maybe({"path_length_m": [float], "coverage": [float]}),
     "set_aside?": Maybe([{"wall": int, "side": int, "position_m": tuple[float, float], "why": str}]),
 }
 """What pages and pictures take from a `summary.json`."""

@@ -1,5 +1,6 @@
 """How much of the reachable contour the map holds, and which true contours it has closed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
 from .association import Votes
+from .records import Sketch
 from .truth import Truth
 
 NEAR_M, NEAR_NOISY_M = 0.1, 0.3
@@ -98,6 +100,16 @@ def coverage(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: 
     """Return the covered share of the reachable contour, by length."""
     share = samples.length_m[covered(samples, walls_world, near_m)].sum() / samples.length_m.sum()
     return float(share)
+
+
+def coverage_curve(
+    samples: Samples, sketches: Sequence[Sketch], to_true: Float[np.ndarray, "3"], near_m: float
+) -> dict[str, list[float]]:
+    """Return the covered share of the contour beside the metres driven, each as a list."""
+    return {
+        "path_length_m": [sketch.path_length_m for sketch in sketches],
+        "coverage": [coverage(samples, to_world(sketch.ends_world, to_true), near_m) for sketch in sketches],
+    }
 
 
 def closed_contours(

@@ -11,6 +11,9 @@ from slam.estimation.backend import Joint
 from ..scenario import WitnessedRobot
 from .association import Votes
 
+EVERY_M = 1.0
+"""Metres driven between two sketches of the map."""
+
 
 @dataclass(frozen=True)
 class Log:
@@ -48,6 +51,15 @@ class Log:
         return len(self.time_s)
 
 
+@dataclass(frozen=True)
+class Sketch:
+    """The walls of the map when the robot had driven so far."""
+
+    path_length_m: float
+    ends_world: Float[np.ndarray, "n 2 2"]
+    """Without tentative walls."""
+
+
 @dataclass
 class Recorder:
     """Gathers a run while it goes on, so that whatever ends it leaves everything up to then."""
@@ -57,6 +69,8 @@ class Recorder:
     last: Step | None = None
     joint: Joint | None = None
     """Pose and all lines at the last step; None where the back end could no longer tell."""
+    sketches: list[Sketch] = field(default_factory=list)
+    """Of the map, every `EVERY_M` metres and at the last step."""
     _rows: list[dict[str, object]] = field(default_factory=list)
 
     def __len__(self) -> int:
@@ -72,6 +86,8 @@ class Recorder:
             )
         belief = step.map.belief
         self.last, self.joint = step, None
+        if step.path_length_m >= EVERY_M * len(self.sketches):
+            self.sketches.append(_sketch(step))
         for keep, drop in step.merged:
             self.votes.merge(keep, drop)
         self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1])
@@ -102,6 +118,7 @@ class Recorder:
         """Ask the last belief for its joint covariance, while its back end has not moved on."""
         if self.last is None:
             return
+        self.sketches.append(_sketch(self.last))
         try:
             self.joint = self.last.map.belief.joint(self.last.map.ids)
         except Exception:  # whatever a failing back end raises must not cost the results so far
@@ -120,3 +137,7 @@ class Recorder:
             reasons=tuple(str(row["reasons"]) for row in self._rows),
             **columns,
         )
+
+
+def _sketch(step: Step) -> Sketch:
+    return Sketch(step.path_length_m, step.map.ends_world[~step.map.tentative].copy())

@@ -1,5 +1,6 @@
 """The keys of summary.json, as DESIGN.md section 6 defines them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +16,18 @@ from slam.geometry.poses import compose, to_world, wrap
 from ..scenario import Scenario
 from .association import Votes, duplicate_lines
 from .corners import corners, label_distances
-from .coverage import NEAR_M, NEAR_NOISY_M, alignment, began, closed_contours, coverage, own_alignment, sample
-from .records import Log
+from .coverage import (
+    NEAR_M,
+    NEAR_NOISY_M,
+    alignment,
+    began,
+    closed_contours,
+    coverage,
+    coverage_curve,
+    own_alignment,
+    sample,
+)
+from .records import Log, Sketch
 from .swept import swept
 
 EXIT_STATUS = {Outcome.FAILED: 1, Outcome.INTERRUPTED: 130}
@@ -96,7 +107,13 @@ def run_keys(scenario: Scenario, ending: Ending) -> dict[str, Any]:
 
 
 def summarise(
-    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, ending: Ending
+    scenario: Scenario,
+    log: Log,
+    votes: Votes,
+    step: Step,
+    joint: Joint | None,
+    ending: Ending,
+    sketches: Sequence[Sketch],
 ) -> dict[str, Any]:
     """Return every key of summary.json; null where there is nothing to measure."""
     config = scenario.config
@@ -113,7 +130,7 @@ def summarise(
             {"wall": int(end.wall), "side": int(end.side), "position_m": end.position_world.tolist(), "why": end.reason}
             for end in step.set_aside
         ],
-        **_map_scores(scenario, log, votes, step, joint),
+        **_map_scores(scenario, log, votes, step, joint, sketches),
         **_pose_scores(log, config.errorless),
         "step_ms": _spread_ms(log.seconds),
         "planning_ms": _spread_ms(log.planning_seconds),
@@ -144,7 +161,9 @@ def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:
     return scores
 
 
-def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None) -> dict[str, Any]:
+def _map_scores(
+    scenario: Scenario, log: Log, votes: Votes, step: Step, joint: Joint | None, sketches: Sequence[Sketch]
+) -> dict[str, Any]:
     truth, walls = votes.truth, step.map
     errorless = scenario.config.errorless
     near = NEAR_M if errorless else NEAR_NOISY_M
@@ -166,6 +185,7 @@ def _map_scores(scenario: Scenario, log: Log, votes: Votes, step: Step, joint: J
         "chains_open": len(step.chains) - int(log.closed_chains[-1]),
         "coverage": coverage(samples, aligned[established], near),
         "coverage_own_frame": coverage(samples, to_world(walls.ends_world[established], own), near),
+        "coverage_curve": coverage_curve(samples, sketches, to_true, near),
         "map_began_step": began_at,
         "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
         "map_anees": None

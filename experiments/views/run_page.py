@@ -6,7 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from sim.logs.archive import regular
+from viz import palette
 from viz.figures.maps import png
+from viz.figures.plots import draw_coverage
+from viz.reports.drawing import PageDrawing, drawing
 from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.maps.mapped import read_corners
@@ -39,6 +43,8 @@ FIGURES: dict[str, tuple[str, float]] = {
 LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
 
 
+LARGEST_PLAN = 20_000_000
+"""Bytes; a floor plan of more would make the page too slow to read."""
 BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start")
 
 
@@ -66,8 +72,12 @@ def run_page(folder: Path) -> Page:
         for home, name in zip(homes, names, strict=True)
         if (home / "map.png").is_file()
     ]
+    plans = tuple(filter(None, map(_plan, homes, names)))
     drawn = draw_all([read_pictured(home) for home in homes if (home / "map.npz").is_file()])
     pictures = tuple(PagePicture(png(draw()), CAPTIONS[kind]) for kind, draw in drawn.items())
+    curves = {name: curve for name, said in zip(names, summaries, strict=True) if (curve := said.get("coverage_curve"))}
+    if curves:
+        pictures = (_coverage(curves), *pictures)
     table = PageTable(
         "The run in numbers", ("what", *names),
         tuple((words, *(_told(s.get(key), scale) for s in summaries)) for key, (words, scale) in FIGURES.items()),
@@ -81,7 +91,7 @@ def run_page(folder: Path) -> Page:
         (*configs[0].versions.items(), ("commit", str(configs[0].commit)[:10])),
         (
             *filled(
-                Section("The map", pictures=tuple(maps)),
+                Section("The map", _PLAN_WORDS if plans else (), pictures=tuple(maps), drawings=plans),
                 Section("In numbers", tables=(table,)),
                 Section("Rooms and islands", _ROOM_WORDS, tuple(filter(None, map(_rooms, homes, names)))),
                 Section("Along the way", pictures=pictures),
@@ -91,10 +101,29 @@ def run_page(folder: Path) -> Page:
     )
 
 
+_PLAN_WORDS = (
+    "The floor plan has the length of each wall and the area of each room, with 95 % intervals. Point at a number to"
+    " see its ends.",
+)
 _ROOM_WORDS = (
     "Areas and lengths of the closed chains, with 95 % intervals through the joint covariance of all walls, as far as"
     " the back end knows it.",
 )
+
+
+def _coverage(curves: dict[str, dict[str, list[float]]]) -> PagePicture:
+    arrays = {name: (np.array(curve["path_length_m"]), np.array(curve["coverage"])) for name, curve in curves.items()}
+    colours = {name: palette.of_backend(name) for name in curves}
+    figure = draw_coverage(arrays, colours, "How much of the reachable contour is mapped")
+    return PagePicture(png(figure), "The share of the reachable contour that the map holds, against the way driven")
+
+
+def _plan(home: Path, name: str) -> PageDrawing | None:
+    """Return the floor plan of a run, if its folder holds one."""
+    path = home / "map.svg"
+    if not path.is_file() or path.stat().st_size > LARGEST_PLAN:
+        return None
+    return drawing(regular(path).read_bytes(), f"Floor plan by {name}, with 95 % intervals as it states them")
 
 
 def _homes(folder: Path) -> list[Path]:

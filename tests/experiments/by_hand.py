@@ -8,7 +8,7 @@ import numpy as np
 from experiments.scenario import Scenario, TrialConfig, build
 from experiments.scoring.association import Votes
 from experiments.scoring.coverage import alignment
-from experiments.scoring.records import Log
+from experiments.scoring.records import Log, Sketch
 from experiments.scoring.summary import Ending, summarise
 from experiments.scoring.truth import truth_of
 from explore.floor.free_space import FreeSpace
@@ -41,9 +41,10 @@ class Run:
     step: Step
     joint: Joint | None
     ending: Ending
+    sketches: tuple[Sketch, ...] = ()
 
     def summary(self):
-        return summarise(self.scenario, self.log, self.votes, self.step, self.joint, self.ending)
+        return summarise(self.scenario, self.log, self.votes, self.step, self.joint, self.ending, self.sketches)
 
 
 def log_of(estimated=None, **changes):

@@ -45,6 +45,25 @@ def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str, dof: in
     return figure
 
 
+def draw_coverage(
+    curves: Mapping[str, tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]],
+    colours: Mapping[str, str],
+    title: str,
+    ways: str = "way driven, m",
+) -> Figure:
+    """Return the share of the reachable contour that is mapped against the metres driven, a curve for each name."""
+    figure, axes = _figure(title, (7.2, 3.2))
+    axes.margins(x=0.01)
+    for name, (metres, share) in curves.items():
+        axes.plot(metres, 100.0 * share, color=colours[name], linewidth=1.4, label=literal(name))
+    axes.set_ylim(0.0, 102.0)
+    axes.grid(color=palette.GRID, linewidth=0.5)
+    axes.set_xlabel(ways)
+    axes.set_ylabel("contour mapped, %")
+    axes.legend(frameon=False, fontsize=8, ncols=6, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure
+
+
 def draw_trajectories(
     true_world: Float[np.ndarray, "s 3"] | None,
     estimated_world: Mapping[str, Float[np.ndarray, "_ 3"]],

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
+from .drawing import PageDrawing
+
 LONG_ROWS = 24
 """A table of more rows is folded up on a screen; on paper it is all there."""
 
@@ -37,12 +39,13 @@ class PagePicture:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands under it, in this order: words, tables, pictures."""
+    """A heading with what stands under it, in this order: words, drawings, tables, pictures."""
 
     title: str
     words: tuple[str, ...] = ()
     tables: tuple[PageTable, ...] = ()
     pictures: tuple[PagePicture, ...] = field(default=())
+    drawings: tuple[PageDrawing, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,9 +65,9 @@ class Page:
 
 
 def filled(*sections: Section) -> tuple[Section, ...]:
-    """Return the sections that have a row or a picture to show, without tables that have no row."""
+    """Return the sections that have a row, a drawing or a picture to show, without tables that have no row."""
     shown = [replace(section, tables=tuple(table for table in section.tables if table.rows)) for section in sections]
-    return tuple(section for section in shown if section.tables or section.pictures)
+    return tuple(section for section in shown if section.tables or section.pictures or section.drawings)
 
 
 def html(page: Page) -> bytes:

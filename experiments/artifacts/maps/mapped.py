@@ -68,7 +68,7 @@ def read_corners(folder: Path) -> MappedCorners:
 
 
 def corners_of(
-    arrays: Mapping[str, np.ndarray], found: Sequence[Mapping[str, Any]], chains: Sequence[Mapping[str, Any]]
+    arrays: Mapping[str, Any], found: Sequence[Mapping[str, Any]], chains: Sequence[Mapping[str, Any]]
 ) -> MappedCorners:
     """Return the corners of a map from what `map.npz` and the features of `map.geojson` hold."""
     row_of = {int(wall): row for row, wall in enumerate(arrays["ids"])}

@@ -16,7 +16,7 @@ from ..merge import union
 from ..plan import CLOSED, Campaign
 from ..store import read_config
 from .finding_words import finding_table
-from .pictures import curve_pictures, map_arm, map_pictures, ratio_pictures
+from .pictures import coverage_pictures, curve_pictures, map_arm, map_pictures, ratio_pictures
 
 ARM_WORDS = {
     CLOSED: "each back end drives",
@@ -48,7 +48,12 @@ def page_of(folder: Path) -> Page:
             Section("Consistency along the way", _BAND_WORDS, pictures=curve_pictures(folder, campaign)),
             Section("Maps", _map_words(campaign), pictures=map_pictures(folder, campaigns)),
             Section("Against the full EKF", _RATIO_WORDS, _differences(said["backends"]), ratio_pictures(said)),
-            Section("Strategies", _STRATEGY_WORDS, (_strategies(said), _interaction(said))),
+            Section(
+                "Strategies",
+                _STRATEGY_WORDS,
+                (_strategies(said), _interaction(said)),
+                coverage_pictures(folder, campaigns),
+            ),
             Section("At equal metres driven", _MARK_WORDS, (_marks(said),)),
         ),
     )

@@ -8,14 +8,17 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
+from explore.strategies import STRATEGIES
+from viz import palette
 from viz.figures.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_figure
 from viz.figures.maps import png
+from viz.figures.plots import draw_coverage
 from viz.reports.report import PagePicture
 
 from ...artifacts.reading import fit, told
 from ...scenario import load_world
 from ...usage import UsageError
-from ..comparison.comparison import BASELINE_STRATEGY
+from ..comparison.comparison import BASELINE_BACKEND, BASELINE_STRATEGY
 from ..comparison.tables import read_rows
 from ..comparison.words import ARMS_SHORT
 from ..plan import CLOSED, Campaign, Trial, trials, world_key
@@ -63,6 +66,34 @@ def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:
         if ratios:
             figure = ratio_figure(label, ratios, "ratio, 95 % interval by run")
             pictures.append(PagePicture(png(figure), f"{label}: right of the line the back end is worse"))
+    return tuple(pictures)
+
+
+def coverage_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[PagePicture, ...]:
+    """Return how much was mapped along the way, a picture for each world: the mean over the trials of each strategy.
+
+    A run that has ended keeps what it had, up to the longest run of the world.
+    """
+    pictures = []
+    for campaign in campaigns:
+        store = Store(folder, campaign)
+        backend = BASELINE_BACKEND if BASELINE_BACKEND in campaign.backends else campaign.backends[0]
+        for world in campaign.worlds:
+            cell = [t for t in trials(campaign) if (t.world, t.backend, t.arm) == (world, backend, CLOSED)]
+            runs = [(t.strategy, store.record(t).arrays) for t in cell]
+            runs = [(strategy, arrays) for strategy, arrays in runs if "coverage" in arrays]
+            if not runs:
+                continue
+            metres = np.linspace(0.0, max(float(arrays["coverage_path_m"][-1]) for _, arrays in runs), 101)
+            shares: dict[str, list[np.ndarray]] = {}
+            for strategy, arrays in runs:
+                share = np.interp(metres, arrays["coverage_path_m"], arrays["coverage"])
+                shares.setdefault(strategy, []).append(share)
+            curves = {strategy: (metres, np.mean(found, axis=0)) for strategy, found in shares.items()}
+            colours = {strategy: palette.of_rank(k) for k, strategy in enumerate(STRATEGIES)}
+            title = f"{world_key(world)}, {backend}: mean of {len(runs) // len(curves)} trials a strategy"
+            caption = f"{world_key(world)}: share of the reachable contour mapped, against the way driven"
+            pictures.append(PagePicture(png(draw_coverage(curves, colours, title)), caption))
     return tuple(pictures)
 
 

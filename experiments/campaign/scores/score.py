@@ -43,7 +43,8 @@ class TrialScores:
 
 def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None) -> TrialScores:
     """Score a trial that was observed."""
-    summary = dict(result.summary)
+    # The curve of a campaign's trials is one of its arrays, where all trials are scored as noisy ones.
+    summary = {key: value for key, value in result.summary.items() if key != "coverage_curve"}
     log, last = result.log, result.last
     if log is None or last is None:
         return TrialScores(summary, {})

@@ -10,6 +10,7 @@ from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
 from experiments.scoring.coverage import alignment
+from experiments.scoring.records import Sketch
 from experiments.scoring.summary import Ending, map_anees, nees_of_poses
 from experiments.scoring.truth import truth_of
 from explore.goal import GivenUp, SetAside
@@ -182,6 +183,14 @@ def test_the_true_map_in_the_frame_of_the_start_is_whole(run):
     assert found["duplicate_lines"] == found["false_matches"] == found["merges"] == found["false_merges"] == 0
     assert found["distances"]["A-B"]["mapped_m"] == pytest.approx(5.0)
     assert found["distances"]["A-B"]["true_m"] == 5.0
+
+
+def test_the_curve_of_coverage_is_that_of_each_sketch_in_the_frame_of_the_start(run):
+    whole = run.step.map.ends_world
+    sketches = (Sketch(0.0, whole[:0]), Sketch(1.2, whole[:1]), Sketch(2.5, whole))
+    curve = replace(run, sketches=sketches).summary()["coverage_curve"]
+    assert curve["path_length_m"] == [0.0, 1.2, 2.5]
+    assert curve["coverage"] == pytest.approx([0.0, 5.0 / 22.4, 1.0], abs=1e-3)
 
 
 @pytest.mark.parametrize(
