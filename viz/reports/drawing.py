@@ -24,7 +24,7 @@ class PageDrawing:
 
 
 def drawing(data: bytes, caption: str) -> PageDrawing | None:
-    """Return what a page can show of an SVG file; None for what is no SVG file with a view box, or is nested too deep."""
+    """Return what a page can show of an SVG file; None for another file, or one nested too deep."""
     try:
         root = defusedxml.ElementTree.fromstring(data)
     except (ParseError, DefusedXmlException, ValueError):
