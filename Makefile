@@ -60,17 +60,17 @@ schools: setup
 	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --out results/schools-short.jsonl
 
 bias: setup
-	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.csv
-	$(BIN)/python -m studies.consistency.bias --association own --out results/bias-own.csv
+	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.jsonl
+	$(BIN)/python -m studies.consistency.bias --association own --out results/bias-own.jsonl
 
 heading: setup
-	$(BIN)/python -m studies.consistency.heading --out results/heading.csv --picture results/heading.png
+	$(BIN)/python -m studies.consistency.heading --out results/heading.jsonl --picture results/heading.png
 
 courts: setup
 	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl
 
 strategies: setup
-	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.csv
+	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.jsonl
 
 .PHONY: counts settings
 

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.sparse.csgraph import connected_components
 
+from experiments.scoring.beam_votes import vote
 from experiments.terminal.console import plain_console
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.worlds import WORLDS, World, WorldError, load
@@ -38,7 +39,7 @@ EXTRACTION = ExtractionConfig()
 
 
 @dataclass(frozen=True)
-class StudyConfig:
+class ExtractionStudy:
     """Which scans the study takes."""
 
     half: Literal["tune", "report"] = "report"
@@ -114,14 +115,10 @@ def join(
 ) -> tuple[Lines, Walls]:
     """Return the extracted lines with their errors, and the walls met, of one scan."""
     wall_of_beam = np.where(face_of_beam >= 0, walls[face_of_beam], -1)
-    k, n = len(face_of_beam), len(segments)
-    label, share, face = np.full(n, -1), np.zeros(n), np.zeros(n, int)
-    for i, (first, last) in enumerate(segments.beams):
-        run = np.arange(first, last + 1 + (k if last < first else 0)) % k
-        run = run[face_of_beam[run] >= 0]
-        seen, votes = np.unique(wall_of_beam[run], return_counts=True)
-        label[i], share[i] = seen[np.argmax(votes)], votes.max() / len(run)
-        face[i] = np.bincount(face_of_beam[run[wall_of_beam[run] == label[i]]]).argmax()
+    k = len(face_of_beam)
+    votes = [vote(span, face_of_beam, walls) for span in segments.beams.tolist()]
+    label, face = np.array([told.winner for told in votes], int), np.array([told.face for told in votes], int)
+    share = np.array([told.on_winner / max(len(told.faces), 1) for told in votes])
     truth = through(to_robot(faces[face], pose))
     e1 = wrap(segments.lines[:, 0] - truth[:, 0])
     t0 = segments.cov[:, 0, 1] / segments.cov[:, 0, 0]
@@ -136,7 +133,7 @@ def join(
         r=segments.lines[:, 1],
         beams=segments.beam_counts,
         share=share,
-        is_double=(label == np.roll(label, 1)) & (gap <= 4) & (n > 1),
+        is_double=(label == np.roll(label, 1)) & (gap <= 4) & (len(segments) > 1),
     )
     met, beams = np.unique(wall_of_beam[wall_of_beam >= 0], return_counts=True)
     return lines, Walls(beams, np.isin(met, label))
@@ -154,7 +151,7 @@ def poses(world: World, count: int, rng: np.random.Generator) -> Iterator[Float[
             yield pose
 
 
-def worlds(config: StudyConfig) -> Iterator[World]:
+def worlds(config: ExtractionStudy) -> Iterator[World]:
     """Yield the bundled worlds and this half of the plans, in random order."""
     plans = sorted(config.plans.glob("*.json"))[{"tune": 0, "report": 1}[config.half] :: 2]
     names = [*WORLDS, *map(str, plans)]
@@ -165,7 +162,7 @@ def worlds(config: StudyConfig) -> Iterator[World]:
             plain_console(stderr=True).print(f"left out: {refusal}")
 
 
-def sample(config: StudyConfig) -> tuple[Lines, Walls]:
+def sample(config: ExtractionStudy) -> tuple[Lines, Walls]:
     """Return the lines and walls of as many scans as the study needs."""
     lidar = LidarConfig(beams=config.beams, fov_rad=np.deg2rad(config.fov_deg), sigma_m=config.sigma_m)
     rng, noise = np.random.default_rng(config.seed), 0.0 if config.errorless else config.sigma_m
@@ -248,10 +245,10 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
         )
 
 
-def main(config: StudyConfig) -> None:
+def main(config: ExtractionStudy) -> None:
     """Take the scans and print the tables."""
     report(*sample(config), plain_console(width=120))
 
 
 if __name__ == "__main__":
-    main(tyro.cli(StudyConfig, description=__doc__))
+    main(tyro.cli(ExtractionStudy, description=__doc__))

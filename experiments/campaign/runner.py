@@ -1,23 +1,17 @@
 """Runs what is missing of a campaign, on the cores of this machine or on a cluster; the results are the same."""
 
-import os
-import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from time import monotonic
 
-from joblib import Parallel, delayed
-from joblib.externals.loky.backend.resource_tracker import ensure_running
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ..terminal.console import plain_console
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform
+from .workers import on_workers
 
-STRIKES = 3
-"""A trial whose process dies this often is recorded as failed."""
 Executor = Callable[[Iterable[Job]], Iterator[Done]]
 """Performs jobs, in any order, taking each one up only when there is room for it."""
 
@@ -87,48 +81,7 @@ def _job(store: Store, trial: Trial) -> Job:
 
 def on_cores(count: int | None) -> Executor:
     """Return an executor over processes of this machine: `count` of them, or one for each core."""
-    workers = count or len(os.sched_getaffinity(0))
-
-    def execute(jobs: Iterable[Job]) -> Iterator[Done]:
-        deaf_tracker()
-        waiting, strikes = iter(jobs), dict[Trial, int]()
-        again: list[Job] = []
-        while True:
-            at_work: dict[Trial, Job] = {}
-
-            def taken(at_work: dict[Trial, Job] = at_work, first: tuple[Job, ...] = tuple(again)) -> Iterator[Job]:
-                for job in (*first, *waiting):
-                    at_work[job.trial] = job
-                    yield job
-
-            try:
-                parallel = Parallel(workers, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-                for done in parallel(delayed(perform)(job) for job in taken()):
-                    del at_work[done.trial]
-                    yield done
-                return
-            except TerminatedWorkerError:
-                again = []
-                for trial, job in at_work.items():
-                    strikes[trial] = strikes.get(trial, 0) + 1
-                    if strikes[trial] < STRIKES:
-                        again.append(job)
-                    else:
-                        yield lost(job, f"its process died {STRIKES} times")
-
-    return execute
-
-
-def deaf_tracker() -> None:
-    """Start loky's resource tracker deaf to SIGHUP, as it is to Ctrl-C and SIGTERM: it cleans up after its parent.
-
-    Killed with its terminal it would be begun anew, and complain about all that it knows nothing of.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGHUP])
-    try:
-        ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return on_workers(perform, lost, count)
 
 
 def lost(job: Job, reason: str) -> Done:

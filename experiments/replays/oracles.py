@@ -16,7 +16,7 @@ from slam.extraction.segments import Segments
 from slam.geometry.poses import compose, inverse
 from slam.robot import Scan
 
-from ..scoring.association import ONE_FACE_SHARE
+from ..scoring.beam_votes import UNLABELLED, vote
 from ..scoring.truth import Truth
 
 MOST_TURN_RAD = 1.0
@@ -36,17 +36,8 @@ class Witness:
     def faces(self, segments: Segments) -> Int[np.ndarray, " n"]:
         """Return the true face of each segment: the one of most beams on its wall; -1 where several walls mixed."""
         beams = self.face_of_beam[self.at]
-        found = np.full(len(segments), -1, dtype=np.int64)
-        for row, (first, last) in enumerate(segments.beams.tolist()):
-            span = np.arange(first, last + 1 + (len(beams) if last < first else 0)) % len(beams)
-            faces = beams[span]
-            faces = faces[faces >= 0]
-            if not len(faces):
-                continue
-            walls = np.bincount(self.truth.walls[faces])
-            if walls.max() >= ONE_FACE_SHARE * len(span):
-                found[row] = np.bincount(faces[self.truth.walls[faces] == walls.argmax()]).argmax()
-        return found
+        votes = (vote(span, beams, self.truth.walls) for span in segments.beams.tolist())
+        return np.array([told.face if told.is_clear else UNLABELLED for told in votes], dtype=np.int64)
 
 
 class TrueAssociation:

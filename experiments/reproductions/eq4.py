@@ -18,7 +18,7 @@ from viz.figures.panels import panels
 
 from ..scenario import P0_SIGMAS
 from .reproduction import Reproduction, Value
-from .runs.origin import Study
+from .runs.origin import ShiftedOrigin
 
 FILTERS: dict[str, type[Any]] = {
     "block-ekf": BlockEkf, "full-ekf": FullEkf, "fej-ekf": FejEkf, "invariant-ekf": InvariantEkf
@@ -36,7 +36,7 @@ def reproduce(seed: int) -> Reproduction:
     """See one wall ever farther from the origin; then ride one ring beside the origin and 100 m from it."""
     ours: dict[str, dict[str, Value]] = {}
     curves: dict[tuple[str, bool], Float[np.ndarray, "d 3"]] = {}
-    study = Study(length_m=RING_M, shift_m=(SHIFT_M, 0.0), p0="large")
+    study = ShiftedOrigin(length_m=RING_M, shift_m=(SHIFT_M, 0.0), p0="large")
     for name, kind in FILTERS.items():
         for at_wall in (False, True):
             found = np.array([sigmas(kind, at_wall, away) for away in AWAY_M])

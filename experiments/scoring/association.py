@@ -9,13 +9,11 @@ from slam.extraction.segments import Segments
 from slam.geometry.lines import directions
 from slam.map.stochastic_map import StochasticMap
 
+from .beam_votes import UNLABELLED, vote
 from .truth import Truth
 
-ONE_FACE_SHARE = 0.8
-"""A segment with this share of its beams on one wall is an observation of that wall."""
 OVERLAP_M = 0.2
 """Two lines of one wall that overlap over this length are one too many."""
-UNLABELLED = -1
 
 
 @dataclass
@@ -35,16 +33,9 @@ class Votes:
         """Count the beams of the segments of one scan; `owners` holds line ids, -1 where one was not used."""
         count = len(self.truth.faces)
         for row in np.flatnonzero(owners >= 0):
-            first, last = (int(beam) for beam in segments.beams[row])
-            span = np.arange(first, last + 1 + (len(face_of_beam) if last < first else 0)) % len(face_of_beam)
-            faces = face_of_beam[span]
-            faces = faces[faces >= 0]
-            owner = int(owners[row])
-            votes = self.beams.setdefault(owner, np.zeros(count, dtype=np.int64))
-            np.add.at(votes, faces, 1)
-            walls = np.bincount(self.truth.walls[faces]) if len(faces) else np.zeros(1)
-            clear = len(faces) > 0 and walls.max() >= ONE_FACE_SHARE * len(span)
-            self.fused.append((owner, int(walls.argmax()) if clear else UNLABELLED))
+            told, owner = vote(segments.beams[row].tolist(), face_of_beam, self.truth.walls), int(owners[row])
+            np.add.at(self.beams.setdefault(owner, np.zeros(count, dtype=np.int64)), told.faces, 1)
+            self.fused.append((owner, told.wall))
 
     def merge(self, keep: int, drop: int) -> None:
         """Count the beams of two lines as one line's from now on, under both ids: the map has made them one."""

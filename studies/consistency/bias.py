@@ -7,10 +7,9 @@ the true association or its own gate; runs are the samples.
 
 import functools
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import tyro
@@ -31,7 +30,7 @@ from slam.evaluation.trajectories import ate
 from slam.geometry.lines import normals
 from slam.geometry.poses import to_world
 
-from ..runner.study_table import Key, Rows, bootstrap, fill
+from ..runner.scores import Key, Scores, bootstrap, fill
 from .faults import Fault, faulty
 
 KEY = ("world", "strategy", "fault", "size", "association", "backend", "seed")
@@ -43,7 +42,7 @@ Kind = Literal["wheel-scale", "heading", "range", "range-noise"]
 
 
 @dataclass(frozen=True)
-class Study:
+class BiasStudy:
     """Send recordings with faults through several back ends, and print what each fault does to each."""
 
     world: str = "paper-fig8"
@@ -72,7 +71,7 @@ class Study:
     """The estimator that explored when the recordings were made, without a fault."""
     jobs: int = 2
     """Number of processes."""
-    out: Path = Path("results/bias.csv")
+    out: Path = Path("results/bias.jsonl")
     """Where each run gets a row as soon as it is done; rows that are there already are not run again."""
     recordings: Path = Path("results/recordings")
     """Where recordings are kept, so that later studies find them."""
@@ -131,11 +130,11 @@ def ratio(first: Float[np.ndarray, " r"], second: Float[np.ndarray, " r"]) -> st
     return f"{np.exp(logs.mean()):.2f} ({low:.2f} to {high:.2f})"
 
 
-def rows_of(study: Study, task: tuple[str, int]) -> Rows:
+def rows_of(study: BiasStudy, task: tuple[str, int]) -> dict[Key, Scores]:
     """Record one drive, or find its recording, and send it with every fault through every back end."""
     strategy, seed = task
     made = record(TrialConfig(study.world, study.driver, strategy, seed, max_steps=study.max_steps), study.recordings)
-    rows: Rows = {}
+    rows: dict[Key, Scores] = {}
     for fault in study.chosen:
         run = faulty(made, fault)
         drive = observations_of(run, False) if study.association == "true" else None
@@ -145,7 +144,7 @@ def rows_of(study: Study, task: tuple[str, int]) -> Rows:
     return rows
 
 
-def ridden_scores(run: RecordedRun, name: str, drive: DriveObservations) -> Sequence[Any]:
+def ridden_scores(run: RecordedRun, name: str, drive: DriveObservations) -> Scores:
     """Return the scores of a back end that is handed what was seen, wall by wall."""
     ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     to_true = alignment(run.start_pose, run.true_poses_world[0])
@@ -159,7 +158,7 @@ def ridden_scores(run: RecordedRun, name: str, drive: DriveObservations) -> Sequ
         return None, None, *off, 0, 0
 
 
-def _replayed(run: RecordedRun, name: str) -> Sequence[Any]:
+def _replayed(run: RecordedRun, name: str) -> Scores:
     result = replay(run, name, ReplayOptions("own"))
     summary, log, last = result.summary, result.log, result.last
     if log is None or last is None:
@@ -176,6 +175,6 @@ def _replayed(run: RecordedRun, name: str) -> Sequence[Any]:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(Study).run()
+        tyro.cli(BiasStudy).run()
     except UsageError as error:
         raise SystemExit(f"bias_study: {error}") from error

@@ -6,10 +6,8 @@ draw): intervals are bootstrapped over runs.
 """
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tyro
@@ -22,14 +20,14 @@ from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees, share_in_band
 
-from ..runner.study_table import Key, Rows, fill, show
+from ..runner.scores import Key, Scores, fill, show
 
 KEY = ("world", "p0", "association", "perfect_extraction", "told_noise", "backend", "seed")
 SCORES = ("pose_anees", "pose_nees_in_band", "map_anees", "pose_rmse_m", "lines", "duplicate_lines")
 
 
 @dataclass(frozen=True)
-class Study:
+class EstimatorStudy:
     """Send recordings of many seeds through several back ends, and print how honest each is."""
 
     world: str = "paper-fig8"
@@ -52,7 +50,7 @@ class Study:
     """Folder in which recordings are kept and looked for; without it they are made anew."""
     jobs: int = 2
     """Number of processes."""
-    out: Path = Path("results/consistency.csv")
+    out: Path = Path("results/consistency.jsonl")
     """Where each replay gets a row as soon as it is done; a seed whose rows are there already is not run again."""
 
     def run(self) -> None:
@@ -81,13 +79,13 @@ class Study:
         return self.world, p0, *settings, name, str(seed)
 
 
-def rows_of(study: Study, seed: int) -> Rows:
+def rows_of(study: EstimatorStudy, seed: int) -> dict[Key, Scores]:
     """Record one seed, or find its recording, and send it through every back end; raises UsageError for a bad one."""
     made = record(TrialConfig(study.world, study.driver, seed=seed), study.recordings)
     drive = (
         observations_of(made, study.perfect_extraction).told(study.told_noise) if study.association == "true" else None
     )
-    rows: Rows = {}
+    rows: dict[Key, Scores] = {}
     for p0 in study.p0:
         pose, cov = start(seed, made.true_poses_world[0], p0)
         run = replace(made, trial=replace(made.trial, p0=p0), start_pose=pose, start_cov=cov)
@@ -98,12 +96,12 @@ def rows_of(study: Study, seed: int) -> Rows:
     return rows
 
 
-def _replayed(run: RecordedRun, name: str, study: Study) -> Sequence[Any]:
+def _replayed(run: RecordedRun, name: str, study: EstimatorStudy) -> Scores:
     summary = replay(run, name, ReplayOptions(study.association, study.perfect_extraction)).summary
     return [summary[key] for key in SCORES]
 
 
-def _ridden(run: RecordedRun, name: str, drive: DriveObservations) -> Sequence[Any]:
+def _ridden(run: RecordedRun, name: str, drive: DriveObservations) -> Scores:
     ridden = ride(BACKENDS[name].make(run.start_pose.copy(), run.start_cov.copy(), run.trial.backend_options), drive)
     off = ridden.estimated_world[:, :2] - ridden.true_poses_world[:, :2]
     rmse, lines = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), len(ridden.true_lines_world)
@@ -116,6 +114,6 @@ def _ridden(run: RecordedRun, name: str, drive: DriveObservations) -> Sequence[A
 
 if __name__ == "__main__":
     try:
-        tyro.cli(Study).run()
+        tyro.cli(EstimatorStudy).run()
     except UsageError as error:
         raise SystemExit(f"consistency_study: {error}") from error

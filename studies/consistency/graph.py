@@ -154,7 +154,7 @@ def differences(graph: Graph) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Study:
+class GraphStudy:
     """Replay one recorded run with the graph and print how far it is from the independent solution."""
 
     world: str = "rooms"
@@ -186,4 +186,4 @@ class Study:
 
 
 if __name__ == "__main__":
-    tyro.cli(Study).run()
+    tyro.cli(GraphStudy).run()

@@ -23,7 +23,7 @@ from slam.backends import BACKENDS
 from viz.figures.anees_map import Field, anees_map
 from viz.figures.maps import saved
 
-from ..runner.study_table import Key, Rows, bootstrap, fill
+from ..runner.scores import Key, Scores, bootstrap, fill
 from .loops import ridden_scores
 
 KEY = ("length_m", "heading_deg", "gap_m", "homings", "p0", "backend", "seed")
@@ -32,7 +32,7 @@ KINDS: dict[str, Literal["png", "svg", "pdf"]] = {".png": "png", ".svg": "svg", 
 
 
 @dataclass(frozen=True)
-class Study:
+class HeadingStudy:
     """Drive rings of several lengths with wheels of several kinds, and draw how honest each back end is."""
 
     backends: tuple[str, ...] = ("block-ekf", "full-ekf", "fej-ekf", "invariant-ekf", "graph")
@@ -51,7 +51,7 @@ class Study:
     """Rings of each kind, with seeds 1 to this."""
     jobs: int = 2
     """Number of processes."""
-    out: Path = Path("results/heading.csv")
+    out: Path = Path("results/heading.jsonl")
     """Where each drive gets a row as soon as it is done; rows that are there already are not run again."""
     picture: Path = Path("results/heading.png")
     """The maps; the suffix says which kind of file: png, svg or pdf."""
@@ -129,7 +129,7 @@ def told(runs: Float[np.ndarray, "r c"]) -> str:
     return words if len(values) == len(runs) else f"{words}; {len(runs) - len(values)} broke down"
 
 
-def rows_of(study: Study, task: tuple[Loop, int]) -> Rows:
+def rows_of(study: HeadingStudy, task: tuple[Loop, int]) -> dict[Key, Scores]:
     """Make one ring and send its drive through every back end."""
     loop, seed = task
     seen = drive(loop, seed)
@@ -138,6 +138,6 @@ def rows_of(study: Study, task: tuple[Loop, int]) -> Rows:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(Study).run()
+        tyro.cli(HeadingStudy).run()
     except UsageError as error:
         raise SystemExit(f"heading_study: {error}") from error

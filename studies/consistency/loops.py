@@ -6,10 +6,8 @@ another ring; every back end meets the same ones.
 
 import functools
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tyro
@@ -21,14 +19,14 @@ from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.geometry.poses import wrap
 
-from ..runner.study_table import Key, Rows, fill, show
+from ..runner.scores import Key, Scores, fill, show
 
 KEY = ("length_m", "heading_deg", "gap_m", "p0", "backend", "seed")
 SCORES = ("pose_anees", "closed_pose_anees", "map_anees", "heading_error_deg", "lines")
 
 
 @dataclass(frozen=True)
-class Study:
+class LoopStudy:
     """Drive rings of corridors with several back ends, and print how honest each is."""
 
     backends: tuple[str, ...] = ("full-ekf", "fej-ekf", "invariant-ekf", "graph")
@@ -45,7 +43,7 @@ class Study:
     """Rings of each kind, with seeds 1 to this."""
     jobs: int = 2
     """Number of processes."""
-    out: Path = Path("results/loops.csv")
+    out: Path = Path("results/loops.jsonl")
     """Where each drive gets a row as soon as it is done; rows that are there already are not run again."""
 
     def run(self) -> None:
@@ -70,14 +68,14 @@ class Study:
         return str(loop.length_m), str(loop.heading_deg), str(loop.gap_m), self.p0, name, str(seed)
 
 
-def rows_of(study: Study, task: tuple[Loop, int]) -> Rows:
+def rows_of(study: LoopStudy, task: tuple[Loop, int]) -> dict[Key, Scores]:
     """Make one ring and send its drive through every back end."""
     loop, seed = task
     seen = drive(loop, seed)
     return {study.key(loop, name, seed): ridden_scores(study.p0, name, loop, seed, seen) for name in study.backends}
 
 
-def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservations) -> Sequence[Any]:
+def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservations) -> Scores:
     """Return the scores of one back end on one ring's drive: None where its covariance is none."""
     ridden = ride(BACKENDS[name].make(*start(seed, seen.true_poses_world[0], p0)), seen)
     heading = np.abs(wrap(ridden.estimated_world[:, 2] - ridden.true_poses_world[:, 2])).max()
@@ -91,6 +89,6 @@ def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservat
 
 if __name__ == "__main__":
     try:
-        tyro.cli(Study).run()
+        tyro.cli(LoopStudy).run()
     except UsageError as error:
         raise SystemExit(f"loop_study: {error}") from error

@@ -15,7 +15,7 @@ from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 
-from ..runner.rows import rows_of
+from ..runner.trials import rows_of
 from .suite import table
 
 

@@ -18,7 +18,7 @@ from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
-from ..runner.rows import rows_of
+from ..runner.trials import rows_of
 
 
 @dataclass(frozen=True)

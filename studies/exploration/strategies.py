@@ -4,15 +4,12 @@
 .venv/bin/python -m studies.exploration.strategies --only-report
 """
 
-import csv
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import tyro
 from jaxtyping import Float
 from rich.console import Console
@@ -30,6 +27,8 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.geometry.poses import to_world
 
+from ..runner.rows import Row, read, rows_of
+
 SHARES = (0.9, 0.99)
 EVERY_STEPS = 10
 """Coverage along the path is scored this often: about a metre."""
@@ -39,7 +38,6 @@ SCORES = (
 )
 KEYS = ("world", "strategy", "seed", "errorless")
 LENGTHS = tuple(f"{what}_{share:g}_m" for what in ("contour", "floor") for share in SHARES)
-COLUMNS = (*KEYS, *SCORES, *LENGTHS, "step_ms_mean")
 BASELINE = "nearest-robot"
 FEWEST_PAIRS = 5
 
@@ -79,7 +77,7 @@ def floor_shares(scenario: Scenario, log: Log) -> Float[np.ndarray, " s"]:
     return np.array(shares) / max(int(np.count_nonzero(target)), 1)
 
 
-def one(config: TrialConfig) -> dict[str, Any]:
+def one(config: TrialConfig) -> Row:
     """Run one trial and return its row."""
     scenario = build(config)
     gauge = Gauge(scenario, sample(truth_of(scenario.world, config.robot)))
@@ -97,7 +95,7 @@ def one(config: TrialConfig) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Study:
+class StrategyStudy:
     """Run every strategy in every world with every seed, a row at a time, and print the comparison."""
 
     worlds: tuple[str, ...] = tuple(WORLDS)
@@ -110,107 +108,97 @@ class Study:
     """Exact ranges and wheels."""
     jobs: int = 1
     """Number of processes."""
-    out: Path = Path("results/strategies.csv")
-    """The table of all trials; rows that are in it already are not run again."""
+    out: Path = Path("results/strategies.jsonl")
+    """A line of JSON for each trial; what it holds of the same code already is not run again."""
     only_report: bool = False
     """Print the comparison of what is there."""
 
-    def trials(self) -> Iterator[TrialConfig]:
-        """Return the trials that are still to be run, seed by seed, so that what is there is balanced."""
-        done = {(row["world"], row["strategy"], int(row["seed"]), row["errorless"]) for row in rows_in(self.out)}
-        for seed in range(1, self.seeds + 1):
-            for world in self.worlds:
-                for strategy in self.strategies:
-                    if (world, strategy, seed, str(self.errorless)) not in done:
-                        yield TrialConfig(world, strategy=strategy, seed=seed, errorless=self.errorless)
+    def trials(self) -> list[TrialConfig]:
+        """Return the trials, seed by seed, so that what is there is balanced."""
+        return [
+            TrialConfig(world, strategy=strategy, seed=seed, errorless=self.errorless)
+            for seed in range(1, self.seeds + 1)
+            for world in self.worlds
+            for strategy in self.strategies
+        ]
 
     def run(self) -> None:
-        """Run what is to be run and print the comparison."""
-        trials = [] if self.only_report else list(self.trials())
+        """Run what is to be run and print the comparison; raises UsageError for bad names and another file."""
+        trials = self.trials()
         for trial in trials:
             check(trial)
-        self.out.parent.mkdir(parents=True, exist_ok=True)
-        for row in self._rows(trials):
-            append(self.out, row)
-        print_report(pd.read_csv(self.out), plain_console(width=160))
-
-    def _rows(self, trials: list[TrialConfig]) -> Iterator[dict[str, Any]]:
-        if self.jobs <= 1:
-            yield from map(one, trials)
-            return
-        with ProcessPoolExecutor(self.jobs) as pool:
-            for future in as_completed(pool.submit(one, trial) for trial in trials):
-                yield future.result()
+        if self.only_report:
+            rows = read(self.out, KEYS)
+        else:
+            tasks = [(k, [tuple(getattr(trial, key) for key in KEYS)]) for k, trial in enumerate(trials)]
+            rows = list(rows_of(self.out, KEYS, tasks, partial(_one_of, tuple(trials)), self.jobs))
+        print_report(rows, plain_console(width=160))
 
 
-def rows_in(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table as text; none where there is no table yet."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def append(path: Path, row: dict[str, Any]) -> None:
-    """Add one row to a table, with its header if it is the first."""
-    is_new = not path.exists()
-    with path.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if is_new:
-            writer.writeheader()
-        writer.writerow(row)
+def _one_of(trials: tuple[TrialConfig, ...], number: int) -> list[Row]:
+    return [one(trials[number])]
 
 
 def ratio(
-    table: pd.DataFrame, strategy: str, column: str, draws: int = 2000
+    rows: Sequence[Row], strategy: str, column: str, draws: int = 2000
 ) -> tuple[dict[str, float], float, float, float]:
     """Return the ratio of mean lengths to the baseline's in each world, and their geometric mean with its interval.
 
     Only seeds that both have reached count. The 95 % interval resamples the pairs within each world; the worlds stay.
     It is NaN where a world has fewer than five pairs.
     """
-    pairs = table[table.strategy == strategy].merge(table[table.strategy == BASELINE], on=["world", "seed"])
-    pairs = pairs.dropna(subset=[f"{column}_x", f"{column}_y"])
-    rng, means, drawn, fewest = np.random.default_rng(0), {}, [], FEWEST_PAIRS
-    for world, rows in pairs.groupby("world", sort=False):
-        values = rows[[f"{column}_x", f"{column}_y"]].to_numpy(float)
-        fewest = min(fewest, len(values))
-        means[str(world)] = float(values[:, 0].mean() / values[:, 1].mean())
+    lengths = {(row["world"], row["strategy"], row["seed"]): row.get(column) for row in rows}
+    pairs: dict[str, list[tuple[float, float]]] = {}
+    for (world, name, seed), length in lengths.items():
+        base = lengths.get((world, BASELINE, seed))
+        if name == strategy and length is not None and base is not None:
+            pairs.setdefault(world, []).append((length, base))
+    if not pairs:
+        return {}, np.nan, np.nan, np.nan
+    rng, drawn = np.random.default_rng(0), []
+    for values in map(np.array, pairs.values()):
         picks = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
         drawn.append(np.log(picks[:, 0] / picks[:, 1]))
-    if not means:
-        return {}, np.nan, np.nan, np.nan
-    if fewest < FEWEST_PAIRS:
-        return means, float(np.exp(np.mean(np.log(list(means.values()))))), np.nan, np.nan
+    means = {world: float(np.divide(*np.mean(found, axis=0))) for world, found in pairs.items()}
+    mean = float(np.exp(np.mean(np.log(list(means.values())))))
+    if min(map(len, pairs.values())) < FEWEST_PAIRS:
+        return means, mean, np.nan, np.nan
     low, high = np.exp(np.quantile(np.mean(drawn, axis=0), [0.025, 0.975]))
-    return means, float(np.exp(np.mean(np.log(list(means.values()))))), float(low), float(high)
+    return means, mean, float(low), float(high)
 
 
-def print_report(table: pd.DataFrame, console: Console) -> None:
+def print_report(rows: Sequence[Row], console: Console) -> None:
     """Print how each strategy ended, and its lengths against those of the baseline."""
-    worlds = list(dict.fromkeys(table.world))
+    worlds, strategies = (list(dict.fromkeys(row[key] for row in rows)) for key in ("world", "strategy"))
     ends = Table(title="complete of trials; mean path m", title_justify="left")
     for name in ("strategy", *worlds, "coverage", "swept min", "collisions", "pose rmse m", "map ANEES"):
         ends.add_column(name, justify="left" if name == "strategy" else "right")
-    for strategy, rows in table.groupby("strategy", sort=False):
+    for strategy in strategies:
+        own = [row for row in rows if row["strategy"] == strategy]
         cells = []
         for world in worlds:
-            here = rows[rows.world == world]
-            cells.append(f"{(here.status == 'complete').sum()}/{len(here)} {here.path_length_m.mean():.0f}")
-        scores = (rows.coverage.mean(), rows.swept.min(), rows.collisions.sum(), rows.pose_rmse_m.mean())
-        words = [f"{scores[0]:.4f}", f"{scores[1]:.4f}", f"{scores[2]:.0f}", f"{scores[3]:.4f}"]
-        ends.add_row(str(strategy), *cells, *words, f"{rows.map_anees.mean():.2f}")
+            here = [row for row in own if row["world"] == world]
+            complete = sum(row["status"] == "complete" for row in here)
+            cells.append(f"{complete}/{len(here)} {np.mean(values(here, 'path_length_m')):.0f}" if here else "-")
+        coverage, swept, rmse, anees = (values(own, key) for key in ("coverage", "swept", "pose_rmse_m", "map_anees"))
+        words = [f"{coverage.mean():.4f}", f"{swept.min():.4f}", f"{values(own, 'collisions').sum():.0f}"]
+        ends.add_row(strategy, *cells, *words, f"{rmse.mean():.4f}", f"{anees.mean():.2f}" if len(anees) else "-")
     console.print(ends)
     for column in ("path_length_m", *LENGTHS):
         shown = Table(title=f"{column}, ratio to {BASELINE}", title_justify="left")
         for name in ("strategy", *worlds, "all", "95 % interval"):
             shown.add_column(name, justify="left" if name == "strategy" else "right")
-        for strategy in dict.fromkeys(table.strategy):
-            means, mean, low, high = ratio(table, strategy, column)
+        for strategy in strategies:
+            means, mean, low, high = ratio(rows, strategy, column)
             by_world = [f"{means[world]:.2f}" if world in means else "-" for world in worlds]
             shown.add_row(strategy, *by_world, f"{mean:.2f}", f"{low:.2f} to {high:.2f}")
         console.print(shown)
 
 
+def values(rows: Sequence[Row], key: str) -> Float[np.ndarray, " n"]:
+    """Return a column of the rows that have it."""
+    return np.array([row[key] for row in rows if row.get(key) is not None], dtype=np.float64)
+
+
 if __name__ == "__main__":
-    tyro.cli(Study).run()
+    tyro.cli(StrategyStudy).run()

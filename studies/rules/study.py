@@ -7,7 +7,6 @@ fork goes on with that rule off: a rule that never makes one costs nothing, and 
 """
 
 import importlib
-import json
 import os
 import sys
 from collections import Counter
@@ -26,14 +25,14 @@ BASELINE = ""
 """Stands in the place of the rule in a row of a run with all rules."""
 SCHOOLS = ("Borchen4", "Franch1", "Lamuniere1", "Milano_1", "Sabadell1")
 KEPT = (
-    "code status reason steps coverage coverage_own_frame contours_closed map_anees pose_anees duplicate_lines"
+    "status reason steps coverage coverage_own_frame contours_closed map_anees pose_anees duplicate_lines"
     " false_matches false_merges collisions path_length_m swept processor_s"
 )
 """What is kept of the row of a trial."""
 
 
 @dataclass(frozen=True)
-class Study:
+class RulesStudy:
     """Drive the plans, with all rules and with each of some rules off."""
 
     plans: Path
@@ -86,22 +85,24 @@ class Watcher:
 
 def main() -> int:
     """Run what the file lacks and return the exit status."""
-    study = tyro.cli(Study, prog="studies.rules.study")
+    study = tyro.cli(RulesStudy, prog="studies.rules.study")
     install(fitting(SWITCHES))
-    study.out.parent.mkdir(parents=True, exist_ok=True)
-    code = importlib.import_module("studies.runner.rows").fingerprint()
+    read = importlib.import_module("studies.runner.rows").read
     used = 0.0
     for file, steps in study.trials():
-        rows = [row for row in read(study.out) if row["code"] == code]
         if used > 60.0 * study.minutes:
             break
-        used += _drive(study, file, steps, rows)
+        used += _drive(study, file, steps, read(study.out, ("rule", "plan")))
     return 0
 
 
-def _drive(study: Study, file: Path, max_steps: int, rows: list[Row]) -> float:
+def _drive(study: RulesStudy, file: Path, max_steps: int, rows: list[Row]) -> float:
     """Drive one plan, with all rules and, forked off, without each of those still in question; return seconds taken."""
-    scenario, trials = (importlib.import_module(name) for name in ("experiments.scenario", "studies.runner.rows"))
+    # The switches are put into the sources as these are imported, so only now.
+    scenario, trials, runner = (
+        importlib.import_module(name)
+        for name in ("experiments.scenario", "studies.runner.trials", "studies.runner.rows")
+    )
     there = {row["rule"]: row for row in rows if row["plan"] == file.stem}
     wanted = {rule for rule in study.rules if rule not in there and not is_clearly_worse(rows, rule)}
     if BASELINE in there:
@@ -115,8 +116,7 @@ def _drive(study: Study, file: Path, max_steps: int, rows: list[Row]) -> float:
     if watcher.rule == BASELINE:
         kept["fires"] = dict(watcher.fires)
     if watcher.rule != BASELINE or BASELINE not in there:
-        with study.out.open("a") as out:
-            out.write(json.dumps(kept) + "\n")
+        runner.append(study.out, [kept])
     if watcher.rule != BASELINE:
         os._exit(0)
     taken = _seconds() - began
@@ -128,11 +128,6 @@ def _seconds() -> float:
     """Return the processor time of this process and of those that it forked, s."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
-
-
-def read(path: Path) -> list[Row]:
-    """Return the rows of a file; none where there is no such file."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 if __name__ == "__main__":

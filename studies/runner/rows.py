@@ -1,100 +1,87 @@
-"""Many trials, a line of JSON for each, written as it comes: begun again, they go on where they were interrupted."""
+"""A file of rows, a line of JSON each, written as they come: a study begun again goes on where it was interrupted."""
 
 import hashlib
 import json
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import os
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import numpy as np
+from rich.progress import track
 
 import explore
 import sim
 import slam
-from experiments.scenario import TrialConfig, check, load_world
-from experiments.scoring.summary import TIMED
-from experiments.trial import run_trial
+from experiments.campaign.workers import on_workers
+from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
-from sim.worlds import World
 
 Row = dict[str, Any]
-PLAIN = (str, int, float, bool)
-PARTS = 10
-"""A run is cut into so many parts of equal numbers of steps, to see whether steps grow slower."""
-SETTINGS = ("seed", "backend", "strategy", "errorless", "p0", "max_steps")
-KEYS = ("code", "file", *SETTINGS)
-"""What makes a trial this one and no other."""
+Key = tuple[Any, ...]
+Task = TypeVar("Task", bound=Hashable)
 
 
-def rows_of(trials: Sequence[TrialConfig], path: Path, jobs: int) -> Iterator[Row]:
-    """Run what the file lacks of the trials, append each row as it comes, and yield the rows of all of them.
+def rows_of(
+    path: Path,
+    names: Sequence[str],
+    tasks: Iterable[tuple[Task, Sequence[Key]]],
+    perform: Callable[[Task], Sequence[Row]],
+    jobs: int,
+) -> Iterator[Row]:
+    """Yield the rows of all tasks: those that the file has, then the others, each written as it comes.
 
-    Rows of other code stay in the file and count for nothing. Raises UsageError for bad names and for a file that
-    holds something else.
+    `names` are what a row is known by; beside each task stand the keys of its rows. Rows of other code stay in the
+    file and count for nothing. Raises UsageError for a file that holds something else.
     """
-    check(trials[0])
-    wanted = {_key(_settings(trial)): trial for trial in trials}
-    kept, rows = _read(path)
-    for row in rows:
-        if wanted.pop(_key(row), None) is not None:
-            yield row
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("ab") as file:
-        file.truncate(kept)
-        for row in results(list(wanted.values()), jobs):
-            file.write(json.dumps(row).encode() + b"\n")
-            file.flush()
-            yield row
+    there = {key_of(row, names): row for row in read(path, names)}
+    missing = []
+    for task, keys in tasks:
+        if all(key in there for key in keys):
+            yield from (there[key] for key in keys)
+        else:
+            missing.append(task)
+    done = map(perform, missing) if jobs <= 1 else on_workers(perform, _lost, jobs)(missing)
+    for rows in track(done, "running", len(missing), console=plain_console(stderr=True), transient=True):
+        yield from append(path, rows)
 
 
-def results(trials: Sequence[TrialConfig], jobs: int) -> Iterator[Row]:
-    """Run trials in several processes and yield the row of each as it ends."""
-    if jobs <= 1:
-        yield from map(one, trials)
-        return
-    with ProcessPoolExecutor(jobs) as pool:
-        for future in as_completed([pool.submit(one, trial) for trial in trials]):
-            yield future.result()
+def key_of(row: Row, names: Sequence[str]) -> Key:
+    """Return what a row is known by; raises KeyError where it lacks a part."""
+    return tuple(row[name] for name in names)
 
 
-def one(config: TrialConfig) -> Row:
-    """Run one trial and return its row: the summary's plain values, distances, step times by name, memory."""
-    began, row = time.process_time(), _settings(config)
-    _forget_peak()
+def read(path: Path, names: Sequence[str] = ()) -> list[Row]:
+    """Return the rows of this code in a file, none where there is none; raises UsageError for a file of other things.
+
+    The last line is left out where it was cut short by a crash.
+    """
+    if not path.exists():
+        return []
+    content = path.read_bytes()
     try:
-        result = run_trial(config, world=_world(config.world))
-    except UsageError as error:
-        return row | {"world": Path(config.world).stem, "status": "not loaded", "reason": str(error)}
-    except Exception as error:  # a trial that cannot even be scored is a row of the table, not the end of it
-        reason = f"{type(error).__name__}: {error}"
-        return row | {"world": Path(config.world).stem, "status": "failed", "reason": reason, "raised": True}
-    summary = result.summary
-    row |= {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
-    for timed in TIMED:
-        row |= {f"{timed}_{key}": value for key, value in (summary[timed] or {}).items()}
-    for pair, distance in summary.get("distances", {}).items():
-        mapped = distance["mapped_m"]
-        row[f"distance_error_{pair}_m"] = None if mapped is None else mapped - distance["true_m"]
-    row["raised"] = bool(result.ending.traceback)
-    row["recoveries"] = getattr(result.scenario.backend, "recoveries", None)
-    row["set_aside"] = len(summary.get("set_aside", []))
-    row["reachable_way"] = summary.get("certificate", {}).get("reachable_way")
-    if result.log is not None:
-        parts = np.array_split(1e3 * result.log.seconds, PARTS)
-        row["step_ms_along"] = [float(part.mean()) if len(part) else None for part in parts]
-    return row | {"processor_s": time.process_time() - began, "peak_mib": _peak_mib()}
+        rows = [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
+        for row in rows:
+            key_of(row, ("code", *names))
+    except (ValueError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"expected rows with {', '.join(names)} in {path}, found {error!r}: name another --out"
+        ) from error
+    return [row for row in rows if row["code"] == fingerprint()]
 
 
-@lru_cache(maxsize=2)
-def _world(name: str) -> World:
-    return load_world(name)
-
-
-def _settings(trial: TrialConfig) -> Row:
-    return {"code": fingerprint(), "file": Path(trial.world).name} | {name: getattr(trial, name) for name in SETTINGS}
+def append(path: Path, rows: Iterable[Row]) -> list[Row]:
+    """Add rows to a file, each with the fingerprint of the code, in place of a line that was cut short; return them."""
+    written = [{"code": fingerprint()} | row for row in rows]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("ab+") as file:
+        if file.tell():
+            file.seek(-1, os.SEEK_END)
+            if file.read() != b"\n":
+                file.seek(0)
+                file.truncate(file.read().rfind(b"\n") + 1)
+        file.writelines(json.dumps(row).encode() + b"\n" for row in written)
+    return written
 
 
 @lru_cache
@@ -108,38 +95,5 @@ def fingerprint() -> str:
     return digest.hexdigest()[:12]
 
 
-def _key(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(row[name] for name in KEYS)
-
-
-def _read(path: Path) -> tuple[int, list[Row]]:
-    """Return the length of the whole lines of a file, and their rows; a line without an end was cut short."""
-    if not path.exists():
-        return 0, []
-    content = path.read_bytes()
-    kept = content.rfind(b"\n") + 1
-    try:
-        rows = [json.loads(line) for line in content[:kept].splitlines()]
-        for row in rows:
-            _key(row)
-    except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"expected rows of trials in {path}, found {error!r}: name another --out") from error
-    return kept, rows
-
-
-def _forget_peak() -> None:
-    """Let Linux count this process's highest resident memory anew: a worker runs one trial after another."""
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return
-
-
-def _peak_mib() -> float | None:
-    """Return the highest resident memory of this process since it was forgotten, MiB; None where nobody tells."""
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    found = [line.split()[1] for line in status.splitlines() if line.startswith("VmHWM:")]
-    return int(found[0]) / 1024 if found else None
+def _lost(task: Task, reason: str) -> Sequence[Row]:
+    raise RuntimeError(f"expected rows of {task}, found none: {reason}")

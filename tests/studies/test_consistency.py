@@ -1,6 +1,6 @@
 """What the studies of back ends rest on: observations told wall by wall, noise as stated, rings of corridors."""
 
-import csv
+import json
 from dataclasses import replace
 
 import jaxtyping
@@ -15,7 +15,7 @@ from experiments.replays.observations import observations_of, ride, start
 from experiments.replays.oracles import as_stated
 from experiments.replays.recordings import record, recorded
 from experiments.replays.replay import ReplayOptions, replay
-from experiments.reproductions.runs.origin import Study as OriginStudy
+from experiments.reproductions.runs.origin import ShiftedOrigin
 from experiments.reproductions.runs.standing import slope, stand
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
@@ -24,11 +24,11 @@ from slam.backends import BACKENDS
 from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations
 from slam.geometry.poses import compose, to_world, wrap
-from studies.consistency.bias import Study as BiasStudy
+from studies.consistency.bias import BiasStudy
 from studies.consistency.faults import Fault, faulty
-from studies.consistency.heading import Study as HeadingStudy
-from studies.consistency.loops import SCORES, Study
-from studies.runner.study_table import bootstrap
+from studies.consistency.heading import HeadingStudy
+from studies.consistency.loops import LoopStudy
+from studies.runner.scores import bootstrap
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 
@@ -129,17 +129,16 @@ def test_the_study_has_teeth():
 
 def test_a_study_goes_on_where_it_was_left(tmp_path):
     def study(seeds, backends=("full-ekf", "block-ekf")):
-        Study(backends, (20.0,), gap_m=(0.0,), seeds=seeds, jobs=1, out=tmp_path / "loops.csv").run()
-        return (tmp_path / "loops.csv").read_text().splitlines()
+        LoopStudy(backends, (20.0,), gap_m=(0.0,), seeds=seeds, jobs=1, out=tmp_path / "loops.jsonl").run()
+        return (tmp_path / "loops.jsonl").read_text().splitlines()
 
     first = study(1)
-    assert len(first) == 3
+    assert len(first) == 2
     both = study(2)
-    assert len(both) == 5
+    assert len(both) == 4
     assert set(first) < set(both)
     assert study(2) == both
-    assert both[0].endswith(",".join(SCORES))
-    (tmp_path / "loops.csv").write_text("a,b\n1,2\n")
+    (tmp_path / "loops.jsonl").write_text("a,b\n1,2\n")
     with pytest.raises(UsageError, match="another"):
         study(1)
 
@@ -147,7 +146,7 @@ def test_a_study_goes_on_where_it_was_left(tmp_path):
 @pytest.mark.parametrize(("p0", "seeds", "least"), [("small", range(1, 9), 1.2), ("large", range(1, 4), 5.0)])
 def test_the_origin_matters_to_lines_that_are_measured_from_it_alone(p0, seeds, least):
     """Equation (4): the same drives, the world put 100 m away."""
-    study = OriginStudy(length_m=20.0, p0=p0)
+    study = ShiftedOrigin(length_m=20.0, p0=p0)
     here, there, apart = study.ridden(FullEkf, True, 1)
     assert apart < 1e-9
     assert there == pytest.approx(here, rel=1e-6)
@@ -200,15 +199,15 @@ def test_the_bias_study_sends_every_fault_through_every_back_end(tmp_path, capsy
     def study(**more):
         BiasStudy(
             world="paper-fig4", seeds=1, backends=("block-ekf", "full-ekf"), faults=("range",), range_m=(0.02,),
-            max_steps=25, jobs=1, out=tmp_path / "bias.csv", recordings=tmp_path / "recordings", **more,
+            max_steps=25, jobs=1, out=tmp_path / "bias.jsonl", recordings=tmp_path / "recordings", **more,
         ).run()  # fmt: skip
-        with (tmp_path / "bias.csv").open() as file:
-            return {(r["association"], r["fault"], r["backend"]): r for r in csv.DictReader(file)}
+        rows = map(json.loads, (tmp_path / "bias.jsonl").read_text().splitlines())
+        return {(r["association"], r["fault"], r["backend"]): r for r in rows}
 
     rows = study()
     assert len(rows) == 4
     for name in ("block-ekf", "full-ekf"):
-        assert float(rows["true", "range", name]["shape_cm"]) > float(rows["true", "none", name]["shape_cm"])
+        assert rows["true", "range", name]["shape_cm"] > rows["true", "none", name]["shape_cm"]
     assert "range 20 mm" in capsys.readouterr().out
     rows = study(association="own")
     assert len(rows) == 8
@@ -236,10 +235,10 @@ def test_a_robot_that_turns_back_comes_home_before_it_closes_the_ring():
 def test_the_map_of_anees_is_drawn_from_rows_that_are_kept(tmp_path, capsys):
     study = HeadingStudy(
         backends=("full-ekf",), length_m=(20.0,), heading_deg=(0.6, 2.4), homings=(0, 1), seeds=1, jobs=1,
-        out=tmp_path / "heading.csv", picture=tmp_path / "heading.svg",
+        out=tmp_path / "heading.jsonl", picture=tmp_path / "heading.svg",
     )  # fmt: skip
     study.run()
-    assert len((tmp_path / "heading.csv").read_text().splitlines()) == 1 + 2 * 2
+    assert len((tmp_path / "heading.jsonl").read_text().splitlines()) == 2 * 2
     assert (tmp_path / "heading.svg").read_bytes().startswith(b"<?xml")
     assert "full-ekf, 1 times back, 20 m, 2.4:" in capsys.readouterr().out
     with pytest.raises(UsageError, match="kind of picture"):

@@ -8,7 +8,8 @@ import pytest
 from experiments.scenario import TrialConfig
 from experiments.usage import UsageError
 from studies.runner import rows
-from studies.runner.rows import PARTS, one, rows_of
+from studies.runner import trials as trial_rows
+from studies.runner.trials import PARTS, one, rows_of
 
 
 def trials(count, **settings):
@@ -22,9 +23,9 @@ def instant(monkeypatch):
 
     def run(config):
         ran.append(config.world)
-        return rows._settings(config)
+        return trial_rows._settings(config)
 
-    monkeypatch.setattr(rows, "one", run)
+    monkeypatch.setattr(trial_rows, "one", run)
     return ran
 
 
@@ -58,7 +59,7 @@ def test_a_row_cut_short_by_a_crash_is_run_again(instant, tmp_path):
 @pytest.mark.parametrize("content", ["walls\n", "[1]\n", "{}\n"])
 def test_a_file_of_something_else_is_told(content, tmp_path):
     (tmp_path / "rows.jsonl").write_text(content)
-    with pytest.raises(UsageError, match="expected rows of trials"):
+    with pytest.raises(UsageError, match="expected rows with file"):
         list(rows_of(trials(1), tmp_path / "rows.jsonl", 1))
     assert (tmp_path / "rows.jsonl").read_text() == content
 

@@ -1,11 +1,12 @@
 """The study of strategies: lengths to a share, ratios with intervals, and going on where it was interrupted."""
 
+from dataclasses import replace
+
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies.exploration import strategies as strategy_study
-from studies.exploration.strategies import BASELINE, COLUMNS, Study, append, length_to, ratio
+from studies.exploration.strategies import BASELINE, LENGTHS, SCORES, StrategyStudy, length_to, ratio
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.0, 0.0), (0.4, 2.0), (0.5, 2.0), (0.9, 5.0), (0.95, None)])
@@ -22,7 +23,7 @@ def table(factor, noise, seeds=20):
             base = length * rng.uniform(0.8, 1.2)
             rows.append({"world": world, "strategy": BASELINE, "seed": seed, "m": base})
             rows.append({"world": world, "strategy": "other", "seed": seed, "m": base * factor * rng.normal(1, noise)})
-    return pd.DataFrame(rows)
+    return rows
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
@@ -41,7 +42,7 @@ def test_a_strategy_against_itself_is_exactly_one():
 
 def test_trials_that_never_reached_the_share_are_left_out_in_pairs():
     rows = table(2.0, 0.0)
-    rows.loc[(rows.strategy == "other") & (rows.seed > 6), "m"] = np.nan
+    rows = [row | {"m": None} if row["strategy"] == "other" and row["seed"] > 6 else row for row in rows]
     _, mean, low, high = ratio(rows, "other", "m")
     assert mean == pytest.approx(2.0)
     assert low == pytest.approx(high)
@@ -53,22 +54,20 @@ def test_a_handful_of_trials_has_no_interval():
     assert np.isnan([low, high]).all()
 
 
-def test_a_study_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
+def test_a_study_goes_on_where_it_was_interrupted_seed_by_seed(tmp_path, monkeypatch):
     ran = []
 
     def one(config):
         ran.append((config.world, config.strategy, config.seed))
-        row = dict.fromkeys(COLUMNS, 1.0) | {"world": config.world, "strategy": config.strategy, "seed": config.seed}
-        return row | {"errorless": config.errorless, "status": "complete"}
+        row = {"world": config.world, "strategy": config.strategy, "seed": config.seed, "errorless": config.errorless}
+        return dict.fromkeys((*SCORES, *LENGTHS), 1.0) | row | {"status": "complete"}
 
     monkeypatch.setattr(strategy_study, "one", one)
-    study = Study(("paper-fig4", "hall"), ("frontier", BASELINE), 2, out=tmp_path / "rows" / "s.csv")
-    trials = list(study.trials())
-    assert [t.seed for t in trials] == [1] * 4 + [2] * 4
-    study.out.parent.mkdir()
-    append(study.out, one(trials[2]))
-    ran.clear()
+    study = StrategyStudy(("paper-fig4", "hall"), ("frontier", BASELINE), 2, out=tmp_path / "rows" / "s.jsonl")
+    assert [trial.seed for trial in study.trials()] == [1] * 4 + [2] * 4
+    replace(study, worlds=("hall",), strategies=("frontier",), seeds=1).run()
     study.run()
-    assert len(ran) == len(set(ran)) == 7
-    assert ("hall", "frontier", 1) not in ran
-    assert list(study.trials()) == []
+    assert len(ran) == len(set(ran)) == 8
+    assert ran[0] == ("hall", "frontier", 1)
+    study.run()
+    assert len(ran) == 8

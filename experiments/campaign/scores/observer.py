@@ -8,12 +8,12 @@ from jaxtyping import Float, Int
 
 from explore.step import Step
 from slam.estimation.backend import Joint
-from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import to_world
 from slam.map.stochastic_map import StochasticMap
 
-from ...scoring.association import ONE_FACE_SHARE, OVERLAP_M, UNLABELLED, Votes
+from ...scoring.association import OVERLAP_M, Votes
+from ...scoring.beam_votes import UNLABELLED, vote
 
 MARKS_M = (10.0, 20.0, 33.0)
 """Metres driven at which runs are compared; the end is the fourth mark (issue: equal metres)."""
@@ -83,19 +83,12 @@ class Observer:
         on = _lying_on(segments.ends[rows], step.pose_world, before)
         fates = []
         for row, lines in zip(rows.tolist(), on, strict=True):
-            wall = self._wall(segments, row, faces_of_beams)
+            wall = vote(segments.beams[row].tolist(), faces_of_beams, self.walls_of_faces).wall
             if wall != UNLABELLED:
                 owner = int(step.walls_of_segments[row])
                 known = bool(np.isin(owner, before.ids))
                 fates.append(Fate(owner, known, wall, tuple(before.ids[lines].tolist())))
         return fates
-
-    def _wall(self, segments: Segments, row: int, face_of_beam: Int[np.ndarray, " k"]) -> int:
-        first, last = segments.beams[row].tolist()
-        span = np.arange(first, last + 1 + (len(face_of_beam) if last < first else 0)) % len(face_of_beam)
-        faces = face_of_beam[span]
-        walls = np.bincount(self.walls_of_faces[faces[faces >= 0]], minlength=1)
-        return int(walls.argmax()) if walls.max() >= ONE_FACE_SHARE * len(span) else UNLABELLED
 
 
 def association_counts(fates: list[Fate], votes: Votes) -> dict[str, int]:

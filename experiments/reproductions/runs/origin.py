@@ -31,7 +31,7 @@ FILTERS: tuple[type[Any], ...] = (BlockEkf, RelocationEkf, FullEkf, FejEkf, Inva
 
 
 @dataclass(frozen=True)
-class Study:
+class ShiftedOrigin:
     """Ride the same loop with the origin beside it and far away, lines anchored at their walls and at the origin."""
 
     shift_m: tuple[float, float] = (100.0, 0.0)
@@ -86,4 +86,4 @@ def moved(seen: DriveObservations, shift: Float[np.ndarray, "2"]) -> DriveObserv
 
 
 if __name__ == "__main__":
-    tyro.cli(Study).run()
+    tyro.cli(ShiftedOrigin).run()

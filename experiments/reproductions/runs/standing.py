@@ -26,7 +26,7 @@ MARKS = (10, 100, 1000)
 
 
 @dataclass(frozen=True)
-class Study:
+class StandingStill:
     """Look at the same walls again and again, and print how sure each back end becomes of its pose."""
 
     backends: tuple[str, ...] = tuple(name for name in BACKENDS if name != "graph-batch")
@@ -90,6 +90,6 @@ def slope(trace: Float[np.ndarray, " n"]) -> float:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(Study).run()
+        tyro.cli(StandingStill).run()
     except UsageError as error:
         raise SystemExit(f"standing_study: {error}") from error

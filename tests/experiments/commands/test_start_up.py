@@ -1,12 +1,16 @@
 """What a command imports before it knows what it is asked: nothing that takes long."""
 
+import ast
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
 from experiments.commands.cli import COMMANDS
 
+ROOT = Path(__file__).parents[3]
 HEAVY = (
     "gtsam",
     "jinja2",
@@ -52,3 +56,15 @@ def test_a_campaigns_worker_imports_nothing_that_draws():
 def test_the_help_says_of_each_command_what_it_says_of_itself(name):
     command = COMMANDS[name].load()
     assert " ".join(command.__doc__.partition("\n\n")[0].split()) == COMMANDS[name].words
+
+
+def test_no_room_imports_pandas():
+    """It is none of the packages that the product asks for."""
+    asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert not [name for name in asked if name.startswith("pandas")]
+    for room in ("slam", "explore", "sim", "viz", "experiments"):
+        for path in (ROOT / room).rglob("*.py"):
+            nodes = list(ast.walk(ast.parse(path.read_text())))
+            names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+            names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+            assert not [name for name in names if name.split(".")[0] == "pandas"], path

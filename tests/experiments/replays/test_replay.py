@@ -18,7 +18,7 @@ from slam.backends.kalman.config import EkfConfig
 from slam.extraction.config import ExtractionConfig
 from slam.geometry.poses import compose
 from slam.robot import MotionCommand
-from studies.runner.study_table import bootstrap
+from studies.runner.scores import bootstrap
 
 
 @pytest.fixture(scope="module")

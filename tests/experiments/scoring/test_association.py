@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scoring.association import OVERLAP_M, UNLABELLED, Votes, duplicate_lines, duplicate_pairs
+from experiments.scoring.association import OVERLAP_M, Votes, duplicate_lines, duplicate_pairs
+from experiments.scoring.beam_votes import UNLABELLED
 from experiments.scoring.truth import truth_of
 from sim.robot import RobotConfig
 from slam.extraction.segments import Segments

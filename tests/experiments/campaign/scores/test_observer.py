@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.campaign.scores.observer import EVERY_M, MARKS_M, Fate, Observer, association_counts
-from experiments.scoring.association import UNLABELLED, Votes
+from experiments.scoring.association import Votes
+from experiments.scoring.beam_votes import UNLABELLED, vote
 from slam.estimation.backend import Joint
 from slam.extraction.segments import Segments
 from slam.geometry.lines import through
@@ -138,8 +139,7 @@ def test_a_segment_is_of_one_wall_by_four_fifths_of_all_its_beams(walls, truth, 
 def test_a_segment_across_the_seam_is_told_by_its_own_beams(walls, truth):
     segments = segments_of([[[1.0, 0.0], [3.0, 0.0]], [[1.0, 0.0], [3.0, 0.0]]], [[34, 9], [9, 34]])
     assert [fate.wall for fate in fates_of(walls, truth, segments, [2, 2])] == [int(truth.walls[0])]
-    nothing = Observer(truth.walls, lambda index: FACES)
-    assert nothing._wall(segments_of([[[1.0, 0.0], [3.0, 0.0]]], [[25, 30]]), 0, FACES) == UNLABELLED
+    assert vote((25, 30), FACES, truth.walls).wall == UNLABELLED
 
 
 def lies_on(walls, truth, first, last):

@@ -1,0 +1,68 @@
+"""Scores of many runs by several back ends: gathered row by row, with the intervals of their means."""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import Float
+from rich.table import Table
+
+from experiments.terminal.console import plain_console
+
+from .rows import Row, key_of, rows_of
+
+Key = tuple[str, ...]
+Scores = Sequence[float | None]
+Task = TypeVar("Task", bound=Hashable)
+
+
+def fill(
+    path: Path,
+    columns: tuple[tuple[str, ...], tuple[str, ...]],
+    tasks: Mapping[Task, Sequence[Key]],
+    run: Callable[[Task], Mapping[Key, Scores]],
+    jobs: int,
+) -> dict[Key, Float[np.ndarray, " c"]]:
+    """Return the scores under every key that the tasks are to give; NaN for what could not be scored.
+
+    `columns` names the parts of a key and the scores. Tasks run in `jobs` processes, those excepted whose rows the
+    file at `path` has already. Raises UsageError for a file of something else.
+    """
+    names, scores = columns
+    perform = partial(_rows, columns, run)
+    found = rows_of(path, names, tasks.items(), perform, jobs)
+    return {
+        key_of(row, names): np.array([np.nan if row[name] is None else row[name] for name in scores], dtype=np.float64)
+        for row in found
+    }
+
+
+def _rows(
+    columns: tuple[tuple[str, ...], tuple[str, ...]], run: Callable[[Task], Mapping[Key, Scores]], task: Task
+) -> list[Row]:
+    names, scores = columns
+    return [dict(zip((*names, *scores), (*key, *values), strict=True)) for key, values in run(task).items()]
+
+
+def bootstrap(values: Float[np.ndarray, " n"], draws: int = 2000, seed: int = 0) -> tuple[float, float]:
+    """Return the 95 % interval of the mean, by resampling whole runs."""
+    rng = np.random.default_rng(seed)
+    means = rng.choice(values, (draws, len(values))).mean(axis=1)
+    return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
+
+
+def show(title: str, runs: Mapping[str, Float[np.ndarray, "r c"]], scores: Sequence[str]) -> None:
+    """Print for each back end the mean of each score over its runs, the 95 % interval of that mean, and the median."""
+    table = Table("back end", *scores, "failed", title=title, caption="mean (95 % interval), median")
+    for name, values in runs.items():
+        sound = values[np.isfinite(values).all(axis=1)]
+        cells = [_summary(column) for column in sound.T] if len(sound) else ["-"] * len(scores)
+        table.add_row(name, *cells, str(len(values) - len(sound)))
+    plain_console(width=max(plain_console().width, 140)).print(table)
+
+
+def _summary(values: Float[np.ndarray, " n"]) -> str:
+    low, high = bootstrap(values)
+    return f"{values.mean():.3f} ({low:.3f} to {high:.3f}), {np.median(values):.3f}"

@@ -1,0 +1,93 @@
+"""Many trials, a row for each with all that was scored of it."""
+
+import time
+from collections.abc import Iterator, Sequence
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from experiments.scenario import TrialConfig, check, load_world
+from experiments.scoring.summary import TIMED
+from experiments.trial import run_trial
+from experiments.usage import UsageError
+from sim.worlds import World
+
+from . import rows
+from .rows import Row
+
+PLAIN = (str, int, float, bool)
+PARTS = 10
+"""A run is cut into so many parts of equal numbers of steps, to see whether steps grow slower."""
+SETTINGS = ("seed", "backend", "strategy", "errorless", "p0", "max_steps")
+KEYS = ("file", *SETTINGS)
+"""What makes a trial this one and no other."""
+
+
+def rows_of(trials: Sequence[TrialConfig], path: Path, jobs: int) -> Iterator[Row]:
+    """Run what the file lacks of the trials, append each row as it comes, and yield the rows of all of them.
+
+    Raises UsageError for bad names and for a file that holds something else.
+    """
+    check(trials[0])
+    numbered = [(number, [rows.key_of(_settings(trial), KEYS)]) for number, trial in enumerate(trials)]
+    return rows.rows_of(path, KEYS, numbered, partial(_one_of, tuple(trials)), jobs)
+
+
+def _one_of(trials: Sequence[TrialConfig], number: int) -> Sequence[Row]:
+    return [one(trials[number])]
+
+
+def one(config: TrialConfig) -> Row:
+    """Run one trial and return its row: the summary's plain values, distances, step times by name, memory."""
+    began, row = time.process_time(), _settings(config)
+    _forget_peak()
+    try:
+        result = run_trial(config, world=_world(config.world))
+    except UsageError as error:
+        return row | {"world": Path(config.world).stem, "status": "not loaded", "reason": str(error)}
+    except Exception as error:  # a trial that cannot even be scored is a row of the table, not the end of it
+        reason = f"{type(error).__name__}: {error}"
+        return row | {"world": Path(config.world).stem, "status": "failed", "reason": reason, "raised": True}
+    summary = result.summary
+    row |= {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
+    for timed in TIMED:
+        row |= {f"{timed}_{key}": value for key, value in (summary[timed] or {}).items()}
+    for pair, distance in summary.get("distances", {}).items():
+        mapped = distance["mapped_m"]
+        row[f"distance_error_{pair}_m"] = None if mapped is None else mapped - distance["true_m"]
+    row["raised"] = bool(result.ending.traceback)
+    row["recoveries"] = getattr(result.scenario.backend, "recoveries", None)
+    row["set_aside"] = len(summary.get("set_aside", []))
+    row["reachable_way"] = summary.get("certificate", {}).get("reachable_way")
+    if result.log is not None:
+        parts = np.array_split(1e3 * result.log.seconds, PARTS)
+        row["step_ms_along"] = [float(part.mean()) if len(part) else None for part in parts]
+    return row | {"processor_s": time.process_time() - began, "peak_mib": _peak_mib()}
+
+
+@lru_cache(maxsize=2)
+def _world(name: str) -> World:
+    return load_world(name)
+
+
+def _settings(trial: TrialConfig) -> Row:
+    return {"file": Path(trial.world).name} | {name: getattr(trial, name) for name in SETTINGS}
+
+
+def _forget_peak() -> None:
+    """Let Linux count this process's highest resident memory anew: a worker runs one trial after another."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return
+
+
+def _peak_mib() -> float | None:
+    """Return the highest resident memory of this process since it was forgotten, MiB; None where nobody tells."""
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    found = [line.split()[1] for line in status.splitlines() if line.startswith("VmHWM:")]
+    return int(found[0]) / 1024 if found else None
