@@ -48,6 +48,10 @@ class Graph:
         """How often a solution did not hold and everything was solved anew."""
         self._version = 0
         self._belief: Belief | None = None
+        self._held: Belief | None = None
+        """The last belief of a solution that held."""
+        self._is_lost = False
+        """Whether there was no solution even without the last scan: nothing can be entered any more."""
         self._record = Record(np.array(pose_world, dtype=np.float64), np.array(pose_cov, dtype=np.float64))
         self._holds = 0, 0
         """Observations and ids of which a solution was found."""
@@ -57,13 +61,16 @@ class Graph:
 
     @property
     def belief(self) -> Belief:
-        """The estimate now."""
+        """The estimate now; where no solution is left, the last one that held, without its joint covariance."""
+        if self._is_lost and self._held is not None:
+            return self._held
         if self._belief is None:
             self._settle()
             version = self._version
             self._belief = believe(
                 self._solver, self._record, self._anchors, self._inner_anchors, lambda: version == self._version
             )
+            self._held = self._belief
         return self._belief
 
     def predict(self, odometry: Odometry) -> None:
@@ -160,8 +167,11 @@ class Graph:
         return np.stack([numbers, self._record.steps_of(numbers)], axis=-1)
 
     def trajectory(self) -> Float[np.ndarray, "n 3"]:
-        """Return the present estimates of the pose at the start and after every prediction, world frame (smoothed)."""
-        return self._record.path_world(self._all_entered().poses())
+        """Return the present estimates of the pose at the start and after every prediction, world frame (smoothed).
+
+        Where no solution is left they are where it was linearised last, within `GraphConfig.relinearise_place_m` of it.
+        """
+        return self._record.path_world(self._last_known()[0] if self._is_lost else self._all_entered().poses())
 
     def relinearise(self) -> None:
         """Linearise everything anew at the present estimates."""
@@ -170,8 +180,10 @@ class Graph:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return prior, odometry, observations and the points of linearisation as plain arrays, for `numpy.savez`."""
-        solver = self._all_entered()
-        return {**self._record.arrays(), "poses": solver.poses(True), "lines": solver.all_lines(True)}
+        if not self._is_lost:
+            self._all_entered()
+        poses, lines = self._last_known()
+        return {**self._record.arrays(), "poses": poses, "lines": lines}
 
     @classmethod
     def from_arrays(cls: type[G], arrays: Mapping[str, np.ndarray], config: GraphConfig = DEFAULTS) -> G:
@@ -197,6 +209,8 @@ class Graph:
         Raises UnsolvableError where that fails too: the observations since the last solution are then taken out, and
         the graph is as it was before them.
         """
+        if self._is_lost:
+            raise UnsolvableError("expected a graph with a solution, found one that lost its last: begin a new one")
         try:
             self._solver.settle()
         except FAULTS as error:
@@ -225,8 +239,14 @@ class Graph:
         try:
             self._solver = solve_anew(self._config, self._record, poses, lines[known])
         except FAULTS as error:
+            self._solver, self._is_lost = Solver(self._config, self._record, poses, lines[known]), True
             raise UnsolvableError(f"expected a solution without the last scan, found {error}") from error
         self._anchor_shown()
+
+    def _last_known(self) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
+        """Return where all that was entered is linearised, the predictions that wait entered too."""
+        self._solver.enter_poses()
+        return self._solver.start()
 
     def _move_on(self) -> None:
         self._version += 1

@@ -215,6 +215,33 @@ def test_a_scan_that_no_solver_takes_is_taken_out_again_and_the_rest_holds(monke
     assert len(everything(backend).anchors) == 10
 
 
+def test_where_no_solution_is_left_the_last_one_is_still_told(monkeypatch):
+    trip = Trip.record(6, steps=20)
+    backend = Graph(START, P0)
+    Trip(trip.start, trip.motions[:14], trip.seen[:15], trip.walls, trip.odometry_cov).run(backend)
+    backend.relinearise()
+    before, path, told = backend.belief, backend.trajectory(), len(backend.arrays()["seen"])
+    failing(monkeypatch, lambda isam, count: True)
+    backend.predict(Odometry(trip.motions[14], trip.odometry_cov))
+    _, line, cov, centre = trip.seen[15][0]
+    backend.grow(line[None], cov[None], centre[None])
+    with pytest.raises(UnsolvableError, match="expected a solution without the last scan"):
+        backend.trajectory()
+    after = backend.belief
+    np.testing.assert_array_equal(after.ids, before.ids)
+    np.testing.assert_array_equal(after.means, before.means)
+    found = backend.trajectory()
+    np.testing.assert_allclose(found[:-1], path, atol=1e-3)
+    np.testing.assert_allclose(found[-1], compose(path[-1], trip.motions[14]), atol=1e-3)
+    with pytest.raises(UnsolvableError, match="begin a new one"):
+        backend.remove(before.ids[:1])
+    monkeypatch.undo()
+    arrays = backend.arrays()
+    assert len(arrays["seen"]) == told
+    again = Graph.from_arrays(arrays)
+    np.testing.assert_allclose(again.trajectory(), found, atol=1e-3)
+
+
 def test_what_gtsam_raises_is_what_is_recovered_from():
     """A graph that GTSAM refuses raises an error of the kinds that `Graph` catches."""
     isam = gtsam.ISAM2()
