@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 import shapely
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
@@ -20,13 +20,7 @@ class Floor:
     """The cells of a building's free floor, and which of them were seen."""
 
     def __init__(self, free: shapely.Polygon) -> None:
-        low = np.array(free.bounds[:2])
-        count = np.ceil((np.array(free.bounds[2:]) - low) / CELL_M).astype(int)
-        self._x = low[0] + (np.arange(count[0]) + 0.5) * CELL_M
-        self._y = low[1] + (np.arange(count[1]) + 0.5) * CELL_M
-        grid_x, grid_y = np.meshgrid(self._x, self._y)
-        shapely.prepare(free)
-        self.free: Bool[np.ndarray, "h w"] = np.asarray(shapely.contains_xy(free, grid_x, grid_y))
+        self._x, self._y, self.free = _free_cells(free)
         self.seen: Bool[np.ndarray, "h w"] = np.zeros_like(self.free)
 
     def cover(self, region: shapely.Geometry) -> None:
@@ -34,6 +28,19 @@ class Floor:
         grid_x, grid_y = np.meshgrid(self._x, self._y)
         shapely.prepare(region)
         self.seen |= self.free & shapely.contains_xy(region, grid_x, grid_y)
+
+    def is_seen_around(self, pose_world: Float[np.ndarray, "3"], range_max_m: float) -> bool:
+        """Return whether no cell is left that a look from here could mark."""
+        return not len(self._unseen_around(pose_world, range_max_m)[0])
+
+    def _unseen_around(
+        self, pose_world: Float[np.ndarray, "3"], range_max_m: float
+    ) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " c"]]:
+        """Return rows and columns of the free cells near a pose, in a square, that were not seen yet."""
+        columns = slice(*np.searchsorted(self._x, [pose_world[0] - range_max_m, pose_world[0] + range_max_m]))
+        rows = slice(*np.searchsorted(self._y, [pose_world[1] - range_max_m, pose_world[1] + range_max_m]))
+        row, column = np.nonzero(self.free[rows, columns] & ~self.seen[rows, columns])
+        return row + rows.start, column + columns.start
 
     def look(
         self,
@@ -43,10 +50,7 @@ class Floor:
         range_max_m: float,
     ) -> None:
         """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor."""
-        columns = slice(*np.searchsorted(self._x, [pose_world[0] - range_max_m, pose_world[0] + range_max_m]))
-        rows = slice(*np.searchsorted(self._y, [pose_world[1] - range_max_m, pose_world[1] + range_max_m]))
-        row, column = np.nonzero(self.free[rows, columns] & ~self.seen[rows, columns])
-        row, column = row + rows.start, column + columns.start
+        row, column = self._unseen_around(pose_world, range_max_m)
         dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
         step = (bearings_rad[-1] - bearings_rad[0]) / (len(bearings_rad) - 1)
         turn = wrap_positive(np.arctan2(dy, dx) - pose_world[2] - bearings_rad[0] + 0.5 * step)
@@ -56,6 +60,20 @@ class Floor:
         reach = np.append(reach, np.full(max(int(beam.max(initial=0)) + 1 - len(reach), 0), -1.0))
         visible = np.hypot(dx, dy) <= reach[beam]
         self.seen[row[visible], column[visible]] = True
+
+
+@lru_cache(maxsize=4)
+def _free_cells(
+    free: shapely.Polygon,
+) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"], Bool[np.ndarray, "h w"]]:
+    """Return the middles of columns and rows, and which cells are free; not to be written to."""
+    low = np.array(free.bounds[:2])
+    count = np.ceil((np.array(free.bounds[2:]) - low) / CELL_M).astype(int)
+    x, y = (low[axis] + (np.arange(count[axis]) + 0.5) * CELL_M for axis in (0, 1))
+    shapely.prepare(free)
+    is_free = np.asarray(shapely.contains_xy(free, *np.meshgrid(x, y)))
+    is_free.flags.writeable = False
+    return x, y, is_free
 
 
 @lru_cache(maxsize=4)
@@ -77,6 +95,8 @@ def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
         keep = np.append(True, np.diff(np.floor(way / LOOKOUT_M)) > 0)
         for x, y in places[keep]:
             pose = np.array([x, y, 0.0])
+            if floor.is_seen_around(pose, config.lidar.range_max_m):
+                continue
             floor.look(pose, finder.bearings_rad, finder.cast(pose)[0], config.lidar.range_max_m)
     return floor.seen
 
