@@ -24,7 +24,8 @@ SHARED = ("driver", "p0", "max_steps", "settings")
 def merge(folders: Sequence[Path], out: Path) -> None:
     """Write the folder of all trials of some campaigns; raises UsageError where they do not belong together.
 
-    A trial that several of them have must have come out the same in all, times apart.
+    A trial that several of them have must have come out the same in all, times apart. A merge that was killed goes on
+    when it is begun again.
     """
     if len(folders) < 2:
         raise UsageError(f"expected two or more campaigns to merge, found {len(folders)}: name another")
@@ -47,14 +48,14 @@ def merge(folders: Sequence[Path], out: Path) -> None:
     for store in stores:
         for trial in trials(store.campaign):
             _take(found, trial, store)
-    with opened_anew(out):
+    config = {**stamp(CONFIG), MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
+    config |= {"from": [read_config(folder).said for folder in folders]}
+    with opened_anew(out, json_bytes(config)):
         merged = Store(out, levels)
         for trial, store in found.items():
             copy = merged.path(trial)
             copy.parent.mkdir(parents=True, exist_ok=True)
             write(copy, store.path(trial).read_bytes())
-        config = {**stamp(CONFIG), MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
-        write(out / CONFIG, json_bytes(config | {"from": [read_config(folder).said for folder in folders]}))
         write_tables(out, levels, in_order(found, levels), merged.record)
 
 

@@ -70,12 +70,20 @@ class Store:
 
 
 @contextmanager
-def opened_anew(folder: Path) -> Iterator[None]:
-    """Make a folder that must be empty, and keep it to this process; raises UsageError."""
+def opened_anew(folder: Path, config: bytes | None = None) -> Iterator[None]:
+    """Make a folder that must be empty, and keep it to this process; raises UsageError.
+
+    With `config`, which is written first, the folder may also hold what was begun with that very config.
+    """
     prepare(folder)
     with held(folder):
-        if any(child.name != LOCK for child in folder.iterdir()):
+        begun = config is not None and (folder / CONFIG).is_file() and (folder / CONFIG).read_bytes() == config
+        if begun:
+            clear_leftovers(folder, "**/.*")
+        elif any(child.name != LOCK for child in folder.iterdir()):
             raise UsageError(f"expected an empty folder, found files in {folder}: name another with --out")
+        if config is not None:
+            write(folder / CONFIG, config)
         yield
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.campaign import merge as merging
 from experiments.campaign.merge import merge
 from experiments.campaign.plan import Campaign
 from experiments.campaign.store import read_campaigns
@@ -53,3 +54,22 @@ def test_what_does_not_belong_together_is_refused(folders, tmp_path):
         merge([folders["first"]], tmp_path / "out")
     with pytest.raises(UsageError, match="empty folder"):
         merge([folders["first"], folders["later"]], folders["whole"])
+
+
+def test_a_merge_that_was_killed_goes_on_when_it_is_begun_again(folders, tmp_path, monkeypatch):
+    def killed(path, content):
+        if path.suffix == ".npz":
+            raise KeyboardInterrupt
+        write(path, content)
+
+    out, parts = tmp_path / "out", [folders["first"], folders["later"]]
+    write = merging.write
+    with monkeypatch.context() as patch:
+        patch.setattr(merging, "write", killed)
+        with pytest.raises(KeyboardInterrupt):
+            merge(parts, out)
+    assert [path.name for path in out.iterdir() if path.is_file() and path.suffix == ".json"] == ["config.json"]
+    merge(parts, out)
+    assert untimed(out) == untimed(folders["whole"])
+    with pytest.raises(UsageError, match="empty folder"):
+        merge(parts[::-1], out)
