@@ -63,15 +63,19 @@ RENAMED: dict[str, str | None] = {
 None stands where a setting said nothing of its own."""
 
 
+DROPPED = ("mission.mapper.change_points.most_rad",)
+"""Settings of format 2 whose rules are no more."""
+
+
 def renamed(key: str) -> str | None:
-    """Return today's key of a setting of format 1; None where there is none."""
+    """Return today's key of a setting of an older format; None where there is none."""
     parts = key.split(".")
     for count in range(len(parts), 0, -1):
         group = ".".join(parts[:count])
         if group in RENAMED:
             now = RENAMED[group]
-            return None if now is None else now + key[len(group) :]
-    return key
+            return None if now is None or now + key[len(group) :] in DROPPED else now + key[len(group) :]
+    return None if key in DROPPED else key
 
 
 def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:

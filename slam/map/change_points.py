@@ -36,8 +36,6 @@ class ChangePointsConfig:
     thousands of times."""
     least_rad: float = float(np.deg2rad(0.2))
     """Smaller turns are none: over thousands of beams every real wall shows one."""
-    most_rad: float = float(np.deg2rad(10.0))
-    """A sharper bend is seen in every scan; what seems to be one are beams of a short face in the next corner."""
     gate_sigmas: float = 4.0
     """Beams farther off the line belong to something else ..."""
     ends: int = 1
@@ -108,7 +106,7 @@ class ChangePoints:
         turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of, self._config.least_beams)
         information, sums = self._add(pairs[:, 1], place, place_of, turns)
         turn = -sums / np.maximum(information, 1e-9)
-        is_bend = (np.abs(turn) > self._config.least_rad) & (np.abs(turn) < self._config.most_rad)
+        is_bend = np.abs(turn) > self._config.least_rad
         sure = turn**2 * information * is_bend * (turns[0] > 0.0)
         best = int(np.argmax(sure))
         if sure[best] <= self._config.sigmas**2:
