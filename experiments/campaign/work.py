@@ -70,7 +70,9 @@ LAYOUTS = {
     "nis": "float q",
     "nis_dof": "float q",
 }
-"""Of a trial's arrays; any of them may be missing."""
+"""Of a trial's arrays."""
+HEARD = ("nis", "nis_dof")
+"""There only where innovations were listened to; the others are all there, or none of them for a trial that failed."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,10 @@ def unpack(content: bytes, trial: Trial) -> TrialScores:
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
     summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), RECORD, SHAPE)
     arrays.pop("format", None)
+    for group in (HEARD, tuple(name for name in LAYOUTS if name not in HEARD)):
+        missing = [name for name in group if name not in arrays]
+        if missing and len(missing) < len(group):
+            raise UnfitError(f"no {missing[0]}")
     for name, value in _names(trial).items():
         if summary[name] != value:
             raise UnfitError(f"the result of another {name}")
