@@ -70,7 +70,7 @@ def over_truth(
         chains=chains,
         path_world=estimated_world,
         title=f"{world.name}   {config.backend}, {how}, {noise}",
-        subtitle="grid 1 m;  " + ";  ".join(words),
+        subtitle=";  ".join(words),
         set_aside=set_aside,
         true_path_world=np.array([compose(to_estimate, pose) for pose in true_world]),
         corners_world=np.array([place for place, _ in corners_with_covs]).reshape(-1, 2),

@@ -39,6 +39,12 @@ LETTER_INCH = 0.072
 TITLE_LETTER_INCH = 0.115
 """... and of the title."""
 LEAST_WIDTH_INCH = 5.0
+LARGEST_INCH = 30.0
+"""The longer side of a map of hundreds of metres, 4,500 pixels."""
+GRID_M = (1.0, 5.0, 10.0, 50.0, 100.0, 500.0, 1e3, 5e3, 1e4, 5e4, 1e5)
+"""Distances of the lines of the grid ..."""
+GRID_LINES = 45
+"""... of which the first is taken that needs at most so many."""
 LEGEND_INCH = 2.3
 """Width of a column of the legend."""
 
@@ -65,7 +71,8 @@ class Picture:
 def draw_map(picture: Picture) -> Figure:
     """Return the picture as a figure of one set of axes."""
     low, high = _extent(picture)
-    inch_per_m = float(np.clip(9.0 / (high - low).max(), 0.05, 0.9))
+    span = float((high - low).max())
+    inch_per_m = min(float(np.clip(9.0 / span, 0.05, 0.9)), LARGEST_INCH / span)
     width, height = np.maximum((high - low) * inch_per_m, (LEAST_WIDTH_INCH, 0.0)).tolist()
     low[0], high[0] = 0.5 * (low[0] + high[0]) + np.array([-0.5, 0.5]) * width / inch_per_m
     figure = Figure(dpi=150, facecolor=palette.PAGE)
@@ -81,7 +88,7 @@ def draw_map(picture: Picture) -> Figure:
         *_robot(axes, picture),
     ]
     title = wrap(picture.title, int(width / TITLE_LETTER_INCH))
-    words = wrap(picture.subtitle, int(width / LETTER_INCH))
+    words = wrap(";  ".join(filter(None, (f"grid {_grid_m(span):g} m", picture.subtitle))), int(width / LETTER_INCH))
     columns = int(width // LEGEND_INCH)
     below, above = 0.45 + 0.17 * -(-len(handles) // columns), 0.4 + 0.16 * len(words) + 0.24 * len(title)
     whole = np.array([width + 0.8, height + below + above])
@@ -124,7 +131,7 @@ def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set_facecolor(palette.PAGE)
-    step = 1.0 if (high - low).max() <= 45 else 5.0
+    step = _grid_m(float((high - low).max()))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MultipleLocator(step))
         axis.set_major_formatter(lambda value, _: f"{value:.0f}" if round(value / step) % 2 == 0 else "")
@@ -135,6 +142,10 @@ def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2
     axes.tick_params(length=0, labelsize=7, labelcolor="#8A8A8A")
     for spine in axes.spines.values():
         spine.set_visible(False)
+
+
+def _grid_m(span_m: float) -> float:
+    return next((step for step in GRID_M if span_m <= GRID_LINES * step), GRID_M[-1])
 
 
 def _floor(axes: Axes, picture: Picture, points_per_m: float) -> list[Patch | Line2D]:

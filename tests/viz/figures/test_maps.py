@@ -78,3 +78,13 @@ def test_all_that_is_written_lies_on_the_page(width, height):
         assert all(figure.bbox.fully_contains(*corner) for corner in artist.get_window_extent(renderer).corners()), (
             artist
         )
+
+
+@pytest.mark.parametrize(("size", "grid"), [(2.0, "grid 1 m"), (80.0, "grid 5 m"), (6000.0, "grid 500 m")])
+def test_a_map_of_any_size_fits_a_page_with_a_grid_that_can_be_told_apart(size, grid):
+    figure = draw_map(picture(closed=True, size=size))
+    (axes,) = figure.axes
+    figure.canvas.draw()
+    assert max(figure.get_size_inches()) < 36.0
+    assert grid in " ".join(text.get_text() for text in axes.texts)
+    assert len(axes.xaxis.get_ticklocs()) < 50
