@@ -17,6 +17,7 @@ from .formats import CONFIG
 from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
+NAVIGATION = "mission.explorer.following.navigation"
 SEE = "config.json of any run names all"
 Record = dict[str, Any]
 

@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..artifacts.settings import asked, differing, trial_of
+from explore.planning.navigators import Navigation
+
+from ..artifacts.settings import NAVIGATION, asked, differing, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.tables import write_tables
 from ..campaign.comparison.words import left_out
@@ -62,6 +64,8 @@ class Compare:
     """Covariance of the start."""
     max_steps: int | None = None
     """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
+    navigation: Navigation = "floor"
+    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls."""
     config: Path | None = None
     """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
     itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
@@ -86,6 +90,8 @@ class Compare:
         """The campaign that the options describe; raises UsageError where they leave something open."""
         given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
         settings = asked(self.config, self.set, DECIDED)
+        if "navigation" in self.given or self.navigation != Compare.navigation:
+            settings = over(settings, nested([(NAVIGATION, self.navigation)]))
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
         ruled |= {"p0": self.p0} if "p0" in self.given or self.p0 != Compare.p0 else {}
         named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}

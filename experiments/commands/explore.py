@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from explore.planning.navigators import Navigation
 from explore.step import Step
 from sim.worlds import World
 
@@ -13,7 +14,7 @@ from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
-from ..artifacts.settings import nested, parse_setting, read_settings, trial_of
+from ..artifacts.settings import NAVIGATION, nested, parse_setting, read_settings, trial_of
 from ..scenario import P0, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -31,9 +32,23 @@ KEYS = {
     "time_limit": "time_limit_s",
     "sweep": "mission.explorer.sweep",
     "return_to_start": "mission.return_to_start",
+    "navigation": NAVIGATION,
 }
 """Options that decide a run, and their keys in `config.json`."""
-SETTLED = ("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "start", "scale", "config", "set")
+SETTLED = (
+    "world",
+    "backend",
+    "strategy",
+    "seed",
+    "p0",
+    "errorless",
+    "sweep",
+    "navigation",
+    "start",
+    "scale",
+    "config",
+    "set",
+)
 """What a saved run has settled; only its limits may be others when it goes on."""
 
 
@@ -55,6 +70,8 @@ class Explore:
     """Exact ranges and wheels, the estimate started at the truth; the models keep the stated noise."""
     sweep: bool = True
     """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
+    navigation: Navigation = "floor"
+    """How the robot finds its way: over the floor seen free, or by sequences of walls, as the paper's did."""
     max_steps: int | None = None
     """The run is stopped after this many scans; 100,000 where no number is named."""
     max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None

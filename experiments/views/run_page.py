@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from explore.following.wall_following import FollowingConfig
 from sim.logs.archive import regular
 from viz import palette
 from viz.figures.maps import png
@@ -15,7 +16,7 @@ from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.maps.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
-from ..artifacts.settings import differing, options_of
+from ..artifacts.settings import NAVIGATION, differing, options_of
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..usage import UsageError
@@ -45,7 +46,7 @@ LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_pat
 
 LARGEST_PLAN = 20_000_000
 """Bytes; a floor plan of more would make the page too slow to read."""
-BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start")
+BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start", NAVIGATION)
 
 
 def is_run(folder: Path) -> bool:
@@ -209,6 +210,8 @@ def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> st
     words += [] if trial.start is None else ["--start", *map(str, trial.start)]
     words += [] if mission.explorer.sweep else ["--no-sweep"]
     words += ["--return-to-start"] if mission.return_to_start else []
+    navigation = mission.explorer.following.navigation
+    words += [] if navigation == FollowingConfig.navigation else ["--navigation", navigation]
     for option, name in LIMITS.items():
         value = getattr(trial, name)
         words += [] if value == getattr(plain, name) else [option, str(value)]

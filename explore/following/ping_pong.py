@@ -35,7 +35,7 @@ class WallErrand(Errand):
             turned_back, part = divmod(self._stage, len(ROUNDING))
             side = self._first if not turned_back else TAIL + HEAD - self._first
             self.doing = f"along wall {self._wall} {('towards', 'past', 'round')[part]} its {('tail', 'head')[side]}"
-            if self._drive(planner, self._places(part, OpenEnd(self._wall, side, ends[side]), around, planner)):
+            if self._drive(around, planner, self._places(part, OpenEnd(self._wall, side, ends[side]), around, planner)):
                 return True
             self._stage += 1
         return False
@@ -44,10 +44,10 @@ class WallErrand(Errand):
         """Return where to go for one part of the rounding; towards the end, as far along the wall as there is a way."""
         config = self._config.viewpoints
         places = places_near(ideal_places(end, around.walls, config)[part], end, around.free_space, planner, config)
-        if part > 0 or planner.to(places) is not None:
+        if part > 0 or self._way(around, planner, places) is not None:
             return places
         along = lane(self._wall, around.walls, config.standoff_m)
         for place in along[:: -1 if end.side == HEAD else 1]:
-            if planner.to(place[None]) is not None:
+            if self._way(around, planner, place[None]) is not None:
                 return place[None]
         return places

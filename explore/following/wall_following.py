@@ -4,9 +4,12 @@ Approach a wall from anywhere, follow it at a set distance to its open end, roun
 always over floor that was seen free; the stand-off yields in narrow passages, the clearance of the body does not.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 
+import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
@@ -15,6 +18,7 @@ from slam.map.stochastic_map import StochasticMap
 from slam.robot import MotionCommand, Scan
 
 from ..floor.free_space import FreeSpace
+from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
 from ..planning.paths import PathConfig, Planner
 from ..survey.viewpoints import LOOKS, ViewpointsConfig, ideal_places, lane, places_beyond, places_near, places_that_see
 from .driving import DrivingConfig, Pilot
@@ -24,6 +28,8 @@ from .driving import DrivingConfig, Pilot
 class FollowingConfig:
     """The rules of the lowest layer."""
 
+    navigation: Navigation = "floor"
+    """How the robot finds its way: over the floor seen free, or by sequences of walls."""
     paths: PathConfig = field(default_factory=PathConfig)
     driving: DrivingConfig = field(default_factory=DrivingConfig)
     viewpoints: ViewpointsConfig = field(default_factory=ViewpointsConfig)
@@ -56,11 +62,16 @@ class Surroundings:
     """What the scans before this one hit nearby, m, in the robot's frame of now."""
     touched_robot: Float[np.ndarray, "t 2"] = field(default_factory=lambda: np.zeros((0, 2)))
     """What the body touched, likewise."""
+    graph: nx.DiGraph[int] = field(default_factory=nx.DiGraph)
+    """The visibility graph of the walls."""
 
     @property
-    def pose_world(self) -> Float[np.ndarray, "3"]:
+    def pose_world(self) -> Float[np.ndarray, 3]:
         """The estimated pose."""
         return self.walls.belief.pose_world
+
+
+NO_PLACE = np.zeros((0, 2))
 
 
 class Errand(ABC):
@@ -76,6 +87,9 @@ class Errand(ABC):
         self.looks_done = 0
         self.trouble = ""
         self.doing = ""
+        self.walls_to_follow: tuple[int, ...] = ()
+        """Where the navigator leads along walls, these, in order."""
+        self._no_way = ""
 
     def command(self, around: Surroundings) -> MotionCommand | None:
         """Return the next step, or None when nothing is left to do; then `trouble` says what was in the way."""
@@ -144,11 +158,22 @@ class Errand(ABC):
         wider = replace(paths, margin_m=margin, squeeze_m=squeeze)
         return Planner(around.free_space, around.pose_world[:2], wider, window_m)
 
-    def _drive(self, planner: Planner, places: Float[np.ndarray, "n 2"]) -> bool:
-        path = planner.to(places) if len(places) else None
-        if path is not None:
-            self._pilot = Pilot(path, planner, self._config.driving)
-        return path is not None
+    def _way(self, around: Surroundings, planner: Planner, places: Float[np.ndarray, "n 2"]) -> Way | None:
+        """Return the way that the navigator takes to one of some places, or None."""
+        navigator = NAVIGATORS[self._config.navigation]
+        standoff_m, reach_m = self._config.viewpoints.standoff_m, around.scan.range_max_m
+        way = navigator.way(planner, places, Surveyed(around.walls, around.graph, standoff_m, reach_m))
+        if way is None and len(places):
+            self._no_way = navigator.no_way
+        return way
+
+    def _drive(self, around: Surroundings, planner: Planner, places: Float[np.ndarray, "n 2"]) -> bool:
+        way = self._way(around, planner, places)
+        if way is None:
+            return False
+        self.walls_to_follow, self._no_way = way.walls, ""
+        self._pilot = Pilot(way.path, way.planner, self._config.driving)
+        return True
 
 
 class EndErrand(Errand):
@@ -186,7 +211,7 @@ class EndErrand(Errand):
                 places_near(ideal[self._stage], self.end, around.free_space, planner, self._config.viewpoints)
             )
             self.doing = f"to look {LOOKS[self._stage]} the open end of wall {self.end.wall}"
-            if self._drive(planner, places):
+            if self._drive(around, planner, places):
                 return self._note()
             if self._stage == 0 and self._follow_route(around, planner):
                 return True
@@ -194,7 +219,7 @@ class EndErrand(Errand):
             places = self._fresh(
                 places_near(ideal[self._stage], self.end, around.free_space, whole, self._config.viewpoints)
             )
-            if self._drive(whole, places) or self._plan_beyond(around, whole):
+            if self._drive(around, whole, places) or self._plan_beyond(around, whole):
                 return self._note()
             self._stage += 1
         return self.looks_done == 0 and self._plan_anywhere(around, whole or self._planner(around, None))
@@ -214,7 +239,8 @@ class EndErrand(Errand):
         """Approach the wall farthest along the route to which a way is known nearby."""
         present = set(around.walls.ids.tolist())
         for wall in reversed(self.route[1:]):
-            if wall in present and self._drive(planner, lane(wall, around.walls, self._config.viewpoints.standoff_m)):
+            along = lane(wall, around.walls, self._config.viewpoints.standoff_m) if wall in present else NO_PLACE
+            if self._drive(around, planner, along):
                 self._on_route = True
                 self.route = self.route[self.route.index(wall) :]
                 self.doing = f"along wall {wall} towards wall {self.end.wall}"
@@ -226,16 +252,16 @@ class EndErrand(Errand):
         if LOOKS[self._stage] not in ("past", "round"):
             return False
         places = places_beyond(self.end, around.walls, around.free_space, planner, self._config.viewpoints)
-        return self._drive(planner, self._fresh(places))
+        return self._drive(around, planner, self._fresh(places))
 
     def _plan_anywhere(self, around: Surroundings, planner: Planner) -> bool:
         """No ideal place can be reached: any place that sees the end will do."""
         for reach in (self._config.viewpoints.near_m, self._config.viewpoints.far_m):
             places = places_that_see(self.end, around.free_space, planner, reach, self._config.viewpoints)
-            if self._drive(planner, self._fresh(places)):
+            if self._drive(around, planner, self._fresh(places)):
                 self.doing = f"to where the open end of wall {self.end.wall} can be seen"
                 return self._note()
-        self.trouble = self.trouble or "no place that the robot can reach sees it"
+        self.trouble = self.trouble or self._no_way or "no place that the robot can reach sees it"
         return False
 
 
@@ -251,6 +277,6 @@ class PlaceErrand(Errand):
         if self._stage > 0:
             return False
         windows = (self._config.window_m, None)
-        found = any(self._drive(self._planner(around, window), self._places) for window in windows)
-        self.trouble = self.trouble if found else self.trouble or "no way leads there"
+        found = any(self._drive(around, self._planner(around, window), self._places) for window in windows)
+        self.trouble = self.trouble if found else self.trouble or self._no_way or "no way leads there"
         return found

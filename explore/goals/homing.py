@@ -12,7 +12,7 @@ from slam.map.chains import Chain
 
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from ..goal import Goal
-from ..planning.paths import cells_within
+from ..planning.sight import cells_within
 from .decider import Decision
 from .explorer import Explorer
 

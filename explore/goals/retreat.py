@@ -18,7 +18,8 @@ from ..following.driving import keeps_clear
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..outcome import Outcome
 from ..planning.driving_field import DrivingField
-from ..planning.paths import Planner, cells_within
+from ..planning.paths import Planner
+from ..planning.sight import cells_within
 from .decider import Decider, Decision
 
 

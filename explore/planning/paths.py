@@ -1,5 +1,6 @@
 """Collision-free paths for the robot's disc over floor that was seen free."""
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -178,6 +179,49 @@ class Planner:
     def _passable_blocks(self) -> Bool[np.ndarray, "p q"]:
         return blocks_with_any(self._passable)
 
+    def within(self, cells: Bool[np.ndarray, "h w"]) -> "Planner":
+        """Return a planner that keeps to some cells of the window, as it is now, and to what is around the robot."""
+        kept = copy(self)
+        for name in ("_is_connected", "_roomy_blocks", "_passable_blocks"):
+            kept.__dict__.pop(name, None)
+        start = np.zeros_like(self._escape)
+        start[tuple(self._start)] = True
+        cells = cells | self._escape | start
+        kept._passable, kept._roomy = self._passable & cells, self._roomy & cells
+        return kept
+
+    @property
+    def nowhere(self) -> Bool[np.ndarray, "h w"]:
+        """No cell of the window."""
+        return np.zeros_like(self._passable)
+
+    def rows_and_columns(self, places_world: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "n 2"]:
+        """Return the cells of the window (row, column) in which places lie; those outside of it have others."""
+        return self._free_space.cells(places_world) - self._corner
+
+    def passable_box(
+        self, low_world: Float[np.ndarray, "2"], high_world: Float[np.ndarray, "2"]
+    ) -> tuple[Int[np.ndarray, "2"], Bool[np.ndarray, "h w"]]:
+        """Return the first cell of the part of the window between two corners, and where in it the body fits."""
+        first, end = np.clip(self.rows_and_columns(np.stack([low_world, high_world])), 0, self._passable.shape)
+        return first, self._passable[first[0] : end[0] + 1, first[1] : end[1] + 1]
+
+    def centres(self, first: Int[np.ndarray, "2"], shape: tuple[int, ...]) -> Float[np.ndarray, "h w 2"]:
+        """Return the centres of the cells of a part of the window, m."""
+        return self._free_space.points(np.moveaxis(np.indices(shape), 0, -1) + first + self._corner)
+
+    def passable_lines(
+        self, starts_world: Float[np.ndarray, "n 2"], ends_world: Float[np.ndarray, "n 2"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Return which straight ways lead over cells in which the body fits only."""
+        length = float(np.hypot(*(ends_world - starts_world).T).max(initial=0.0))
+        share = np.linspace(0.0, 1.0, int(np.ceil(length / (0.7 * self._free_space.config.cell_m))) + 2)[:, None, None]
+        cells = self.rows_and_columns((starts_world + share * (ends_world - starts_world)).reshape(-1, 2))
+        inside = np.all((cells >= 0) & (cells < self._passable.shape), axis=-1)
+        fits = np.zeros(len(cells), dtype=bool)
+        fits[inside] = self._passable[tuple(cells[inside].T)]
+        return np.asarray(fits.reshape(len(share), -1).all(axis=0))
+
     def passable_points(self, cells: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Return the centres of those cells (row, column of the whole grid) where the robot's centre may stay, m."""
         local = cells - self._corner
@@ -254,27 +298,3 @@ def metre_costs(
     least = config.radius_m + config.margin_m
     tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
     return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)
-
-
-def sees(
-    free_space: FreeSpace, places_world: Float[np.ndarray, "n 2"], target_world: Float[np.ndarray, "2"], short_m: float
-) -> Bool[np.ndarray, " n"]:
-    """Return from which places no occupied cell stands between there and `short_m` before the target."""
-    way = target_world - places_world
-    length = np.hypot(way[:, 0], way[:, 1])
-    steps = int(np.ceil(length.max(initial=0.0) / free_space.config.cell_m)) + 1
-    share = np.linspace(0.0, 1.0, steps + 1) * np.clip(1.0 - short_m / np.maximum(length, 1e-9), 0.0, 1.0)[:, None]
-    cells = free_space.cells(places_world[:, None] + share[..., None] * way[:, None])
-    inside = free_space.inside(cells)
-    blocked = np.zeros(inside.shape, dtype=bool)
-    blocked[inside] = free_space.evidence[tuple(cells[inside].T)] > 0
-    return ~np.any(blocked | ~inside, axis=1)
-
-
-def cells_within(free_space: FreeSpace, centre_world: Float[np.ndarray, "2"], reach_m: float) -> Int[np.ndarray, "n 2"]:
-    """Return the cells of the grid whose centres lie within reach of a place."""
-    reach = int(np.ceil(reach_m / free_space.config.cell_m))
-    offsets = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-    cells = free_space.cells(centre_world[None])[0] + offsets
-    cells = cells[free_space.inside(cells)]
-    return cells[np.hypot(*(free_space.points(cells) - centre_world).T) <= reach_m]

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from ..floor.free_space import FreeSpace
 from ..planning.driving_field import DrivingField
-from ..planning.paths import sees
+from ..planning.sight import sees
 from .trusted_walls import TrustedWalls
 
 DISTANCES = 6

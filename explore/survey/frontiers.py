@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..floor.free_space import FreeSpace
 from ..planning.driving_field import DrivingField
-from ..planning.paths import cells_within
+from ..planning.sight import cells_within
 
 LEAST_CELLS = 4
 """Narrower borders are not worth a visit: they are gaps between beams."""

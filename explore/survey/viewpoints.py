@@ -10,7 +10,8 @@ from slam.map.chains import HEAD, OpenEnd
 from slam.map.stochastic_map import StochasticMap
 
 from ..floor.free_space import FreeSpace
-from ..planning.paths import Planner, cells_within, sees
+from ..planning.paths import Planner
+from ..planning.sight import cells_within, sees
 
 
 @dataclass(frozen=True)

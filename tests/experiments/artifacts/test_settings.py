@@ -35,7 +35,9 @@ def another(value):
         return not value
     if isinstance(value, list):
         return [another(each) for each in value]
-    return {"small": "large"}.get(value, value + "x") if isinstance(value, str) else 1.5 if value is None else value + 1
+    if isinstance(value, str):
+        return {"small": "large", "floor": "visibility"}.get(value, value + "x")
+    return 1.5 if value is None else value + 1
 
 
 def test_every_setting_stands_in_the_config_and_is_reached_by_its_key():

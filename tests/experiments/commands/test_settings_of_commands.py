@@ -43,6 +43,21 @@ def test_a_campaign_takes_from_a_file_what_no_option_says(tmp_path):
     assert campaign(*file).settings == (("time_limit_s", 9.0),)
 
 
+def test_navigation_is_a_setting_of_runs_and_campaigns(run, tmp_path, capsys):
+    key, words = "mission.explorer.following.navigation", ("--navigation", "visibility")
+    out = tmp_path / "walls"
+    assert main(["explore", "paper-fig4", "--max-steps", "2", *words, "--out", str(out)]) == 0
+    assert read_trial(out / "config.json").mission.explorer.following.navigation == "visibility"
+    assert " --navigation visibility " in run_page(out).command
+    assert read_trial(run / "config.json").mission.explorer.following.navigation == "floor"
+    assert campaign(*words).settings == campaign("--set", f"{key}=visibility").settings == ((key, "visibility"),)
+    assert campaign(*words, "--set", f"{GATE}=0.9").settings == ((key, "visibility"), (GATE, 0.9))
+    assert campaign("--set", f"{key}=visibility", "--navigation", "floor").settings == ()
+    capsys.readouterr()
+    assert main(["explore", "paper-fig4", "--set", f"{key}=stars", "--out", str(tmp_path / "none")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
 def test_a_group_that_may_be_none_is_switched_off_and_stays_so():
     settled = campaign("--set", "mission.mapper.merging=null", "--set", f"{GATE}=0.9")
     trial = config_of(settled, Trial("paper-fig8", "nearest-robot", "graph", CLOSED, 1))

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.mission import explore_mission
+from explore.following.wall_following import FollowingConfig
+from explore.goals.explorer import ExplorerConfig
+from explore.mission import MissionConfig, explore_mission
+from explore.outcome import Outcome
 from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
 from explore.planning.wall_routes import route
 from explore.strategies import STRATEGIES
@@ -132,3 +135,18 @@ def test_the_robots_own_graph_of_figure_4_leads_from_wall_8_to_wall_16():
             assert last.graph.has_edge(b, a)
     for a, b in pairwise((2, 6, 8, 10)):
         assert last.graph.edges[ids[a], ids[b]]["kind"] == last.graph.edges[ids[b], ids[a]]["kind"] == NEIGHBOUR
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_by_sequences_of_walls_the_robot_explores_figure_4():
+    """It says along which walls it goes, in half of its steps or more, and these lead to where it looks."""
+    world, _ = figure_4()
+    robot = SimulatedRobot(world, 1, errorless=True)
+    backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
+    config = MissionConfig(explorer=ExplorerConfig(following=FollowingConfig(navigation="visibility")))
+    *steps, last = explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make(), config)
+    assert last.outcome is Outcome.ALL_CLOSED
+    assert robot.record.collisions == 0
+    led = [step.decision.walls_to_follow for step in steps if step.decision.walls_to_follow]
+    assert len(led) > 0.5 * len(steps)
+    assert max(map(len, led)) > 1

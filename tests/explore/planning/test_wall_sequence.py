@@ -1,0 +1,97 @@
+"""Sequences of walls: each wall is seen from the one before, and what no sequence leads to is told."""
+
+from dataclasses import replace
+from itertools import pairwise, permutations
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
+from explore.planning.paths import PathConfig, Planner
+from slam.robot import Scan
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+
+STANDOFF_M, REACH_M = 0.35, 1.0
+NOTHING_SEEN = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.nan), 0.01, REACH_M, 0.0)
+
+
+def around_room(scene):
+    """Return the graph in which each face leads to the two that it meets, and to no other."""
+    joined = [
+        (a, b)
+        for a, b in permutations(range(len(scene.faces)), 2)
+        if np.allclose(scene.faces[a, 1], scene.faces[b, 0]) or np.allclose(scene.faces[a, 0], scene.faces[b, 1])
+    ]
+    return nx.DiGraph(joined)
+
+
+def ways(scene, graph, navigator, count=30):
+    """Return from where to where a way was sought, and the way, None where there is none."""
+    for start, goal in zip(scene.places[:count], scene.places[40 : 40 + count], strict=True):
+        planner = Planner(scene.grid, start, PathConfig())
+        known = Surveyed(scene.walls(np.append(start, 0.0)), graph, STANDOFF_M, REACH_M)
+        yield start, goal, navigator.way(planner, goal[None], known)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_each_wall_of_a_sequence_is_joined_to_the_one_before_and_the_first_is_in_sight(scene_of, seed):
+    scene = scene_of(seed)
+    graph, longest = around_room(scene), 0
+    for start, _, way in ways(scene, graph, WallNavigator()):
+        if way is None or not way.walls:
+            continue
+        walls = scene.walls(np.append(start, 0.0))
+        assert walls.distances_m[walls.belief.rows([way.walls[0]])[0]] <= REACH_M
+        assert all(graph.has_edge(a, b) for a, b in pairwise(way.walls))
+        longest = max(longest, len(way.walls))
+    assert longest >= 2
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_way_by_walls_ends_at_the_goal_and_keeps_to_floor_on_which_the_body_fits(scene_of, seed):
+    scene = scene_of(seed)
+    found = [(start, goal, way) for start, goal, way in ways(scene, around_room(scene), WallNavigator()) if way]
+    assert len(found) >= 3
+    for start, goal, way in found:
+        points = way.path.points_world
+        assert np.hypot(*(points[-1] - goal)) < 0.05
+        assert np.hypot(*(points[0] - start)) < 0.05
+        assert way.planner.passable_lines(points[1:], points[1:]).all()
+        assert np.all(np.hypot(*np.diff(points, axis=0).T) < 0.08)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_without_the_graph_the_floor_leads_on_where_walls_do_not(scene_of, seed):
+    scene = scene_of(seed)
+    by_floor = [way is not None for _, _, way in ways(scene, nx.DiGraph(), FloorNavigator())]
+    by_walls = [way is not None for _, _, way in ways(scene, nx.DiGraph(), WallNavigator())]
+    by_graph = [way is not None for _, _, way in ways(scene, around_room(scene), WallNavigator())]
+    assert sum(by_walls) < sum(by_graph) <= sum(by_floor)
+
+
+@pytest.mark.parametrize("navigation", list(NAVIGATORS))
+def test_an_errand_tells_that_no_sequence_of_walls_leads_there(scene_of, navigation):
+    """With no wall in sight and no edge in the graph, only what lies straight ahead can be gone to by walls."""
+    scene = scene_of(0)
+    config = replace(FollowingConfig(), navigation=navigation)
+    start, hidden = next((a, b) for a, b, way in ways(scene, nx.DiGraph(), WallNavigator()) if way is None)
+    errand = PlaceErrand(hidden[None], "there", config)
+    command = errand.command(Surroundings(scene.walls(np.append(start, 0.0)), scene.grid, NOTHING_SEEN))
+    if navigation == "floor":
+        assert command is not None
+        assert not errand.walls_to_follow
+    else:
+        assert command is None
+        assert errand.trouble == "no sequence of walls leads there"
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_planner_that_keeps_to_no_cells_leads_nowhere(scene_of, seed):
+    scene = scene_of(seed)
+    planner = Planner(scene.grid, scene.places[0], PathConfig())
+    goals = next(goal[None] for goal in scene.places[1:] if planner.to(goal[None]) is not None)
+    assert planner.within(planner.nowhere).to(goals) is None
+    assert planner.to(goals) is not None
