@@ -72,7 +72,11 @@ courts: setup
 strategies: setup
 	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.jsonl
 
-.PHONY: counts settings
+# Both navigations in the bundled worlds and in 160 apartments; begun again, it goes on where it was.
+navigation: setup
+	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
+
+.PHONY: navigation counts settings
 
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup

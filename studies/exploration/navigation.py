@@ -1,0 +1,129 @@
+"""What it costs to go by sequences of walls, as the paper's robot did, in place of all the floor that was seen free.
+
+.venv/bin/python -m studies.exploration.navigation --plans DIR      # goes on where it was interrupted
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import tyro
+from rich.table import Table
+
+from experiments.artifacts.settings import NAVIGATION, nested, record_of, trial_of
+from experiments.scenario import TrialConfig, check
+from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
+from explore.planning.navigators import NAVIGATORS
+from explore.strategies import STRATEGIES
+from sim.worlds import WORLDS
+
+from ..runner.rows import Row, key_of, rows_of
+from ..runner.trials import KEYS, one
+
+NAMES = (*KEYS, "navigation")
+
+
+@dataclass(frozen=True)
+class NavigationStudy:
+    """Explore each world with each navigation, strategy and seed, and each plan errorless, and print a row for each."""
+
+    worlds: tuple[str, ...] = tuple(WORLDS)
+    """Bundled names or files; none without a name behind the option."""
+    strategies: tuple[str, ...] = tuple(STRATEGIES)
+    """Names or schedules, for the worlds; plans are explored by the first."""
+    seeds: int = 20
+    """Trials for each world and strategy, with seeds 1 to this."""
+    errorless: bool = False
+    """Exact ranges and wheels in the worlds, too."""
+    plans: Path | None = None
+    """A folder of plans."""
+    named: str = "lifull_*.json"
+    """Which files of the folder, as the shell would write it."""
+    every: int = 1
+    """Every so many of the plans."""
+    max_steps: int = 5000
+    """A run is stopped after this many scans."""
+    jobs: int = 1
+    """Number of processes."""
+    out: Path = Path("results/navigation.jsonl")
+    """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
+
+    def trials(self) -> list[TrialConfig]:
+        """Return the trials, seed by seed, each with every navigation; raises UsageError for a folder without plans."""
+        found = [
+            TrialConfig(world, strategy=strategy, seed=seed, errorless=self.errorless, max_steps=self.max_steps)
+            for seed in range(1, self.seeds + 1)
+            for world in self.worlds
+            for strategy in self.strategies
+        ]
+        if self.plans is not None:
+            names = sorted(str(path) for path in self.plans.glob(self.named) if path.is_file())
+            if not names:
+                raise UsageError(f"expected a folder of plans, found no file {self.named} in {self.plans}: check it")
+            plain = TrialConfig("", strategy=self.strategies[0], errorless=True, max_steps=self.max_steps)
+            found += [replace(plain, world=name) for name in names[:: self.every]]
+        return [trial_of(record_of(trial), nested([(NAVIGATION, name)])) for trial in found for name in NAVIGATORS]
+
+    def run(self) -> None:
+        """Run what is to be run and print the comparison; raises UsageError for bad names and another file."""
+        trials = self.trials()
+        for trial in trials:
+            check(trial)
+        tasks = [(k, [key_of(_known_by(trial), NAMES)]) for k, trial in enumerate(trials)]
+        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
+        plain_console(width=140).print(table(rows))
+
+
+def _known_by(trial: TrialConfig) -> Row:
+    named = {name: getattr(trial, name) for name in KEYS if name != "file"}
+    return named | {"file": Path(trial.world).name, "navigation": trial.mission.explorer.following.navigation}
+
+
+def _one_of(trials: Sequence[TrialConfig], number: int) -> list[Row]:
+    return [one(trials[number]) | {"navigation": trials[number].mission.explorer.following.navigation}]
+
+
+def table(rows: Sequence[Row]) -> Table:
+    """Return how the runs of each group of worlds ended with each navigation, and what they took.
+
+    Metres, steps and time of planning are means over the runs that were completed with every navigation.
+    """
+    shown = Table(title=f"{len(rows)} runs", title_justify="left")
+    for column in ("worlds", "navigation"):
+        shown.add_column(column)
+    for column in ("runs", "complete", "ends left", "coverage", "swept", "collisions", "m", "steps", "planning ms"):
+        shown.add_column(column, justify="right")
+    groups = dict.fromkeys(_group(row) for row in rows)
+    for group in groups:
+        own = [row for row in rows if _group(row) == group]
+        sound = [_run(row) for row in own if row["status"] == "complete"]
+        paired = {run for run in sound if sound.count(run) == len(NAVIGATORS)}
+        for name in NAVIGATORS:
+            here = [row for row in own if row["navigation"] == name]
+            both = [row for row in here if _run(row) in paired]
+            done = sum(row["status"] == "complete" for row in here)
+            scores = [_mean(here, "set_aside", 2), _mean(here, "coverage", 4), _mean(here, "swept", 4)]
+            scores.append(str(sum(row.get("collisions") or 0 for row in here)))
+            scores += [_mean(both, "path_length_m", 1), _mean(both, "steps", 0), _mean(both, "planning_ms_mean", 1)]
+            shown.add_row(group, name, str(len(here)), str(done), *scores)
+    return shown
+
+
+def _group(row: Row) -> str:
+    return "plans, errorless" if row["file"].endswith(".json") else str(row["file"])
+
+
+def _run(row: Row) -> tuple[object, ...]:
+    return key_of(row, KEYS)
+
+
+def _mean(rows: Sequence[Row], key: str, digits: int) -> str:
+    found = [row[key] for row in rows if row.get(key) is not None]
+    return f"{np.mean(found):.{digits}f}" if found else "-"
+
+
+if __name__ == "__main__":
+    tyro.cli(NavigationStudy).run()
