@@ -87,8 +87,8 @@ class Errand(ABC):
         self.looks_done = 0
         self.trouble = ""
         self.doing = ""
-        self.walls_to_follow: tuple[int, ...] = ()
-        """Where the navigator leads along walls, these, in order."""
+        self.walls_to_follow: tuple[int, ...] | None = None
+        """The walls along which the navigator leads, in order; None where it asks for none."""
         self._no_way = ""
 
     def command(self, around: Surroundings) -> MotionCommand | None:

@@ -101,9 +101,9 @@ class Explorer:
         if command is not None:
             if task is None:
                 return Decision(command, "", given_up=given_up)
-            return Decision(
-                command, task.doing, task.goal, task.errand.walls_to_follow or task.walls_to_follow, given_up
-            )
+            led = task.errand.walls_to_follow
+            walls = task.walls_to_follow if led is None else led
+            return Decision(command, task.doing, task.goal, walls, given_up)
         left = len(given_up.keys & ends.keys())
         words = "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
         outcome = Outcome.ENDS_LEFT if left else Outcome.ALL_CLOSED

@@ -38,8 +38,8 @@ class Way:
     path: Path
     planner: Planner
     """Of the floor to which the way keeps."""
-    walls: tuple[int, ...] = ()
-    """Ids of the walls along which it leads, in order; none where the floor alone decided or no wall is needed."""
+    walls: tuple[int, ...] | None = None
+    """Ids of the walls along which it leads, in order, none where it is straight; None where no wall counted."""
 
 
 class Navigator(Protocol):

@@ -82,7 +82,7 @@ def test_an_errand_tells_that_no_sequence_of_walls_leads_there(scene_of, navigat
     command = errand.command(Surroundings(scene.walls(np.append(start, 0.0)), scene.grid, NOTHING_SEEN))
     if navigation == "floor":
         assert command is not None
-        assert not errand.walls_to_follow
+        assert errand.walls_to_follow is None
     else:
         assert command is None
         assert errand.trouble == "no sequence of walls leads there"
