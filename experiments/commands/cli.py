@@ -136,6 +136,11 @@ def _tell(message: object) -> None:
 def _parse(arguments: Sequence[str] | None) -> Command:
     """Return the command that the arguments name; raises UsageError, in one line, where they make none."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    if words == ["--version"]:
+        from importlib.metadata import version  # takes as long as the rest of the help
+
+        print(f"chainslam {version('chainslam')}")
+        raise SystemExit(0)
     if words and not words[0].startswith("-"):
         # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
         choose("command", words[0], COMMANDS)
@@ -145,7 +150,8 @@ def _parse(arguments: Sequence[str] | None) -> Command:
             command: Any = tyro.extras.subcommand_cli_from_dict(
                 {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()},
                 prog="chainslam",
-                description="Explore a building by wall following and map it as chains of line segments.",
+                description="Explore a building by wall following and map it as chains of line segments."
+                " --version tells which version this is.",
                 args=words,
             )
         asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command

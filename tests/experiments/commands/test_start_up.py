@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands.cli import COMMANDS
+from experiments.commands.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[3]
 HEAVY = (
@@ -68,3 +68,11 @@ def test_no_room_imports_pandas():
             names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
             names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
             assert not [name for name in names if name.split(".")[0] == "pandas"], path
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as leaving:
+        main(["--version"])
+    assert leaving.value.code == 0
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert capsys.readouterr().out == f"chainslam {told}\n"
