@@ -47,7 +47,10 @@ class _Visit:
 
 @dataclass
 class WallSearch:
-    """Looks for the shortest way along lanes; an edge of the graph is taken where the body fits straight across."""
+    """Looks for the shortest way along lanes; an edge of the graph is taken where the body fits straight across.
+
+    The search is A*, with the straight line to the nearest goal as its bound.
+    """
 
     graph: nx.DiGraph[int]
     walls: StochasticMap
@@ -66,10 +69,10 @@ class WallSearch:
         if not len(goals):
             return None
         number = count()
-        queue = [(0.0, next(number), _Visit(None, self._here))]
+        queue = [(0.0, next(number), 0.0, _Visit(None, self._here))]
         done: set[Lane | None] = set()
         while queue:
-            metres, _, visit = heapq.heappop(queue)
+            _, _, metres, visit = heapq.heappop(queue)
             if visit.before is not None and visit.lane is None:
                 return self._sequence(visit)
             if visit.lane in done:
@@ -81,7 +84,9 @@ class WallSearch:
                     leg = np.hypot(*(reached.leaves_world - visit.at_world)) + np.hypot(
                         *(reached.at_world - reached.leaves_world)
                     )
-                heapq.heappush(queue, (metres + float(leg), next(number), reached))
+                driven = metres + float(leg)
+                straight = float(np.hypot(*(goals - reached.at_world).T).min())
+                heapq.heappush(queue, (driven + straight, next(number), driven, reached))
         return None
 
     @property

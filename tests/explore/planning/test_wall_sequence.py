@@ -10,6 +10,7 @@ import pytest
 from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
 from explore.planning.paths import PathConfig, Planner
+from explore.planning.wall_sequence import WallSearch
 from slam.robot import Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
@@ -95,3 +96,24 @@ def test_a_planner_that_keeps_to_no_cells_leads_nowhere(scene_of, seed):
     goals = next(goal[None] for goal in scene.places[1:] if planner.to(goal[None]) is not None)
     assert planner.within(planner.nowhere).to(goals) is None
     assert planner.to(goals) is not None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_where_the_goal_lies_straight_ahead_no_wall_is_looked_at(scene_of, seed, monkeypatch):
+    scene, looked_at, straight = scene_of(seed), [], 0
+    plain = WallSearch._from
+    monkeypatch.setattr(
+        WallSearch, "_from", lambda self, visit, *rest: looked_at.append(visit) or plain(self, visit, *rest)
+    )
+    for start, goal in zip(scene.places[:60], scene.places[60:], strict=False):
+        planner = Planner(scene.grid, start, PathConfig())
+        if not planner.passable_lines(start[None], goal[None])[0]:
+            continue
+        looked_at.clear()
+        search = WallSearch(around_room(scene), scene.walls(np.append(start, 0.0)), planner, STANDOFF_M, REACH_M)
+        found = search.to(goal[None])
+        assert found is not None
+        assert found.walls == ()
+        assert len(looked_at) == 1
+        straight += 1
+    assert straight >= 3
