@@ -10,7 +10,7 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.backends import BACKENDS
 
-from ..artifacts.settings import nested, trial_of
+from ..artifacts.settings import NAVIGATION, nested, trial_of
 from ..replays.replay import Association
 from ..scenario import P0, TrialConfig, check
 from ..usage import UsageError, choose
@@ -98,6 +98,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "trials": 20,
         # Four times the longest run that is not lost; a lost one would go round to the default limit.
         "max_steps": 2500,
+        "settings": ((NAVIGATION, "visibility"),),
     },
     "full": {
         "worlds": tuple(WORLDS),

@@ -65,7 +65,8 @@ class Compare:
     max_steps: int | None = None
     """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
     navigation: Navigation = "floor"
-    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls."""
+    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Preset paper goes
+    by walls."""
     config: Path | None = None
     """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
     itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
@@ -89,14 +90,15 @@ class Compare:
     def campaign(self) -> Campaign:
         """The campaign that the options describe; raises UsageError where they leave something open."""
         given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
-        settings = asked(self.config, self.set, DECIDED)
+        preset = dict(PRESETS[self.preset]) if self.preset else {}
+        settings = over(nested(preset.pop("settings", ())), asked(self.config, self.set, DECIDED))
         if "navigation" in self.given or self.navigation != Compare.navigation:
             settings = over(settings, nested([(NAVIGATION, self.navigation)]))
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
         ruled |= {"p0": self.p0} if "p0" in self.given or self.p0 != Compare.p0 else {}
         named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
         named = ruled | named
-        chosen = {"max_steps": MAX_STEPS} | (PRESETS[self.preset] if self.preset else {}) | named
+        chosen = {"max_steps": MAX_STEPS} | preset | named
         missing = [f"--{name}" for name in given if name not in chosen]
         if missing:
             raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")

@@ -2,15 +2,14 @@
 
 from viz.figures.panels import map_panels
 
-from ..scenario import TrialConfig
 from .reproduction import Reproduction
-from .runs.drives import PAPER, last_map
+from .runs.drives import PAPER, drive_by_walls, last_map
 from .runs.maps import compared, map_numbers, map_words, mark
 
 
 def reproduce(seed: int) -> Reproduction:
     """Explore the world of figure 8 by the nearest open end, and map its scans with each back end."""
-    results = compared(TrialConfig("paper-fig8", PAPER, seed=seed))
+    results = compared(drive_by_walls("paper-fig8", seed=seed))
     maps = [last_map(result, f"{name}: {map_words(result)}") for name, result in results.items()]
     figure, axes = map_panels(f"Figure 8, seed {seed}: the same scans through four back ends", maps, 2)
     mark(axes[0], results[PAPER])

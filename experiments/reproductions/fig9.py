@@ -9,7 +9,7 @@ from viz.figures.panels import map_panels
 from ..scenario import TrialConfig
 from ..trial import TrialResult, run_trial
 from .reproduction import Reproduction
-from .runs.drives import PAPER, last_map, log_of, small_map
+from .runs.drives import PAPER, drive_by_walls, last_map, log_of, small_map
 from .runs.maps import compared, map_numbers, map_words, mark
 
 STAGES_M = (4.0, 12.0)
@@ -18,7 +18,7 @@ STAGES_M = (4.0, 12.0)
 
 def reproduce(seed: int) -> Reproduction:
     """Explore the world of figure 9, show the map as it grows, and map its scans with each back end."""
-    config = TrialConfig("paper-fig9", PAPER, seed=seed)
+    config = drive_by_walls("paper-fig9", seed=seed)
     results = compared(config)
     maps = _stages(config, results[PAPER])
     maps += [last_map(result, f"{name}: {map_words(result)}") for name, result in results.items()]

@@ -5,10 +5,9 @@ from matplotlib.figure import Figure
 
 from viz.figures.panels import paint_intervals, panels
 
-from ..scenario import TrialConfig
 from ..scoring.measurements import Z_95
 from .reproduction import Reproduction, Value
-from .runs.drives import BESIDE, PAPER, driven, replayed
+from .runs.drives import BESIDE, PAPER, drive_by_walls, driven, replayed
 
 DRIVES = 5
 BY_HAND = {"A-B": 6.50, "A-C": 8.35, "B-C": 7.60}
@@ -17,7 +16,7 @@ IN_ITS_MAP = {"A-B": 6.50, "A-C": 8.30, "B-C": 7.65}
 
 def reproduce(seed: int) -> Reproduction:
     """Measure the three distances in the maps of several drives, by each back end."""
-    configs = [TrialConfig("paper-fig8", PAPER, seed=seed + k) for k in range(DRIVES)]
+    configs = [drive_by_walls("paper-fig8", seed=seed + k) for k in range(DRIVES)]
     found = {name: [replayed(config, name).summary["distances"] for config in configs] for name in BESIDE}
     true = {pair: distance["true_m"] for pair, distance in driven(configs[0]).summary["distances"].items()}
     pairs = tuple(true)

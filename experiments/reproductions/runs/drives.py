@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +12,7 @@ from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 from viz.figures.curves import SmallMap
 
+from ...artifacts.settings import NAVIGATION, nested, trial_of
 from ...replays.recordings import recorded
 from ...replays.replay import replay
 from ...scenario import TrialConfig
@@ -38,9 +40,15 @@ def replayed(config: TrialConfig, backend: str) -> TrialResult:
     return made if backend == config.backend else replay(recorded(made), backend, world=made.scenario.world)
 
 
+def drive_by_walls(world: str, **settings: Any) -> TrialConfig:
+    """Return a drive of the paper's robot: by its estimator, along sequences of walls."""
+    by_walls = trial_of(nested([(NAVIGATION, "visibility")]))
+    return replace(by_walls, world=world, backend=PAPER, **settings)
+
+
 def there_and_back(seed: int) -> TrialConfig:
     """Return the drive of figures 10 and 11: the world of figure 9 from an uncertain start, and back there."""
-    config = TrialConfig("paper-fig9", PAPER, seed=seed, p0="large")
+    config = drive_by_walls("paper-fig9", seed=seed, p0="large")
     return replace(config, mission=replace(config.mission, return_to_start=True))
 
 

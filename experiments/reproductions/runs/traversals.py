@@ -15,9 +15,9 @@ from ...scenario import TrialConfig
 from ...trial import TrialResult
 from ...views.timelines import true_rings
 from ..reproduction import Value
-from .drives import PAPER, driven, log_of
+from .drives import PAPER, drive_by_walls, driven, log_of
 
-NEAREST_ROBOT = TrialConfig("paper-fig5", PAPER, "nearest-robot", errorless=True)
+NEAREST_ROBOT = drive_by_walls("paper-fig5", errorless=True)
 NEAREST_START = replace(NEAREST_ROBOT, strategy="nearest-start")
 RIDERS = (PAPER, "full-ekf", "invariant-ekf")
 """The graph keeps every pose of some thousand and would take minutes."""

@@ -27,7 +27,8 @@ def run(tmp_path_factory):
 
 
 def campaign(*words):
-    return _parse(["compare", "--preset", "smoke", "--out", "DIR", *words]).campaign
+    preset = () if "--preset" in words else ("--preset", "smoke")
+    return _parse(["compare", *preset, "--out", "DIR", *words]).campaign
 
 
 def test_a_campaign_takes_from_a_file_what_no_option_says(tmp_path):
@@ -41,6 +42,15 @@ def test_a_campaign_takes_from_a_file_what_no_option_says(tmp_path):
     typed = campaign(*file, "--set", "p0=zero", "--p0", "small", "--max-steps", "5000")
     assert (typed.p0, typed.max_steps) == ("small", 5000)
     assert campaign(*file).settings == (("time_limit_s", 9.0),)
+
+
+def test_the_campaign_of_the_paper_goes_by_walls_unless_told_otherwise():
+    key = "mission.explorer.following.navigation"
+    paper = ("--preset", "paper")
+    assert campaign(*paper).settings == ((key, "visibility"),)
+    assert campaign(*paper, "--set", f"{GATE}=0.9").settings == ((key, "visibility"), (GATE, 0.9))
+    assert campaign(*paper, "--set", f"{key}=floor").settings == ()
+    assert campaign(*paper, "--navigation", "floor").settings == ()
 
 
 def test_navigation_is_a_setting_of_runs_and_campaigns(run, tmp_path, capsys):
