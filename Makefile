@@ -76,7 +76,15 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation counts settings
+.PHONY: navigation paper paper-check counts settings
+
+# The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
+paper: setup
+	$(BIN)/python -m studies.paper.study --seeds 20
+
+# Which tables of docs/paper.md are of other code than this?
+paper-check: setup
+	$(BIN)/python -m studies.paper.page --check
 
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup

@@ -1,5 +1,6 @@
 """Equation (4): r is measured from the world's origin, so that its uncertainty grows with the way to there."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from viz import palette
 from viz.figures.panels import panels
 
 from ..scenario import P0_SIGMAS
-from .reproduction import Reproduction, Value
+from .reproduction import Numbers, Reproduction, Said, Value
 from .runs.origin import ShiftedOrigin
 
 FILTERS: dict[str, type[Any]] = {
@@ -28,33 +29,44 @@ SEEN = np.array([[0.5 * np.pi, 2.0]])
 """A wall 2 m to the left, along the way from the origin: the lever arm to the origin is the whole distance."""
 SEEN_COV = np.diag([np.deg2rad(0.3), 0.003])[None] ** 2
 SHIFT_M = 100.0
+PREDICTED = f"sigma of r predicted for the sensor, variances alone, {AWAY_M[-1]:g} m, mm"
+SAID: Said = {PREDICTED: "grows with x and y"}
 RINGS = 2
 RING_M = 40.0
+VARIANTS = tuple((name, at_wall) for name in FILTERS for at_wall in (False, True))
+
+
+def numbers(seed: int) -> Numbers:
+    """Return the sigmas of one wall, and what one ring ridden here and there gives."""
+    return {_variant(*variant): _numbers(variant, [seed]) for variant in VARIANTS}
+
+
+def _curve(name: str, at_wall: bool) -> Float[np.ndarray, "d 3"]:
+    return np.array([sigmas(FILTERS[name], at_wall, away) for away in AWAY_M])
+
+
+def _numbers(variant: tuple[str, bool], seeds: Iterable[int]) -> dict[str, Value]:
+    found, (name, at_wall) = _curve(*variant), variant
+    study = ShiftedOrigin(length_m=RING_M, shift_m=(SHIFT_M, 0.0), p0="large")
+    rides = np.array([study.ridden(FILTERS[name], at_wall, seed) for seed in seeds])
+    return {
+        f"sigma of r in the map, {AWAY_M[0]:g} m from the origin, mm": float(found[0, 0]),
+        f"sigma of r in the map, {AWAY_M[-1]:g} m, mm": float(found[-1, 0]),
+        PREDICTED: float(found[-1, 1]),
+        f"the same with covariances, {AWAY_M[-1]:g} m, mm": float(found[-1, 2]),
+        f"a ring {SHIFT_M:g} m away: path differs by, m": _worst(rides[:, 2]),
+        "pose ANEES beside the origin": _mean(rides[:, 0]),
+        f"pose ANEES {SHIFT_M:g} m away": _mean(rides[:, 1]),
+    }
 
 
 def reproduce(seed: int) -> Reproduction:
     """See one wall ever farther from the origin; then ride one ring beside the origin and 100 m from it."""
-    ours: dict[str, dict[str, Value]] = {}
-    curves: dict[tuple[str, bool], Float[np.ndarray, "d 3"]] = {}
-    study = ShiftedOrigin(length_m=RING_M, shift_m=(SHIFT_M, 0.0), p0="large")
-    for name, kind in FILTERS.items():
-        for at_wall in (False, True):
-            found = np.array([sigmas(kind, at_wall, away) for away in AWAY_M])
-            curves[name, at_wall] = found
-            rides = np.array([study.ridden(kind, at_wall, seed + k) for k in range(RINGS)])
-            ours[_variant(name, at_wall)] = {
-                f"sigma of r in the map, {AWAY_M[0]:g} m from the origin, mm": float(found[0, 0]),
-                f"sigma of r in the map, {AWAY_M[-1]:g} m, mm": float(found[-1, 0]),
-                f"sigma of r predicted for the sensor, variances alone, {AWAY_M[-1]:g} m, mm": float(found[-1, 1]),
-                f"the same with covariances, {AWAY_M[-1]:g} m, mm": float(found[-1, 2]),
-                f"a ring {SHIFT_M:g} m away: path differs by, m": _worst(rides[:, 2]),
-                "pose ANEES beside the origin": _mean(rides[:, 0]),
-                f"pose ANEES {SHIFT_M:g} m away": _mean(rides[:, 1]),
-            }
+    curves = {variant: _curve(*variant) for variant in VARIANTS}
     return Reproduction(
         "Equation (4): r and the way to the world's origin",
-        {f"sigma of r predicted for the sensor, variances alone, {AWAY_M[-1]:g} m, mm": "grows with x and y"},
-        ours,
+        SAID,
+        {_variant(*variant): _numbers(variant, range(seed, seed + RINGS)) for variant in VARIANTS},
         _figure(curves),
         (
             "Anchor `origin` is the paper's line (alpha, r), `wall` attaches r to the wall. One wall is seen once from"

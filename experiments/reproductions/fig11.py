@@ -8,14 +8,23 @@ from viz.figures.panels import paint_uncertain_path, panels
 
 from ..trial import TrialResult
 from ..views.timelines import true_rings
-from .reproduction import Reproduction, Value
+from .reproduction import Numbers, Reproduction, Said, Value
 from .runs.drives import PAPER, log_of, replayed, there_and_back, to_true, trace_over_start
 
 COMPARED = (PAPER, "full-ekf", "fej-ekf", "invariant-ekf", "graph")
 REPASSED_M = 0.5
 AWAY_M = 1.5
+REPASSING = "trace on repassing the start, over the start's"
+LARGEST = "largest trace on the way, over the start's"
+SAID: Said = {REPASSING: "below 1", LARGEST: "above that of the repassing"}
 EVERY = 12
 """An ellipse at every so many steps."""
+
+
+def numbers(seed: int) -> Numbers:
+    """Return what each back end makes of one drive there and back."""
+    config = there_and_back(seed)
+    return {name: _numbers(replayed(config, name)) for name in COMPARED}
 
 
 def reproduce(seed: int) -> Reproduction:
@@ -24,15 +33,11 @@ def reproduce(seed: int) -> Reproduction:
     results = {name: replayed(config, name) for name in COMPARED}
     return Reproduction(
         "Figure 11: uncertainty on coming back to the start",
-        {REPASSING: "below 1", LARGEST: "above that of the repassing"},
-        {name: _numbers(result) for name, result in results.items()},
+        SAID,
+        numbers(seed),
         _figure(results, seed),
         (f"One drive by {PAPER} in paper-fig9 with --p0 large and --return-to-start, replayed with own gates.",),
     )
-
-
-REPASSING = "trace on repassing the start, over the start's"
-LARGEST = "largest trace on the way, over the start's"
 
 
 def repassed(result: TrialResult) -> int | None:

@@ -1,8 +1,15 @@
 """Figure 5: the nearest open end from where the robot is, a search depth first."""
 
-from .reproduction import Reproduction
+from .reproduction import Numbers, Reproduction, Said
 from .runs.drives import driven
-from .runs.traversals import NEAREST_ROBOT, NOTES, traversal_figure, traversal_numbers
+from .runs.traversals import NEAREST_ROBOT, NOTES, noisy, traversal_figure, traversal_numbers
+
+SAID: Said = {"passes by the start": 1}
+
+
+def numbers(seed: int) -> Numbers:
+    """Return what one drive with noise gives."""
+    return traversal_numbers(noisy(NEAREST_ROBOT, seed))
 
 
 def reproduce(_seed: int) -> Reproduction:
@@ -11,7 +18,7 @@ def reproduce(_seed: int) -> Reproduction:
     length = made.summary["path_length_m"]
     return Reproduction(
         "Figure 5: next to actual position",
-        {"passes by the start": 1},
+        SAID,
         traversal_numbers(NEAREST_ROBOT),
         traversal_figure(f"Figure 5: nearest-robot, errorless, {length:.0f} m", made),
         NOTES,

@@ -1,22 +1,32 @@
 """Figure 6: the open end nearest to the start, a pendulum about it."""
 
-from .reproduction import Reproduction, Value
+from ..scenario import TrialConfig
+from .reproduction import Numbers, Reproduction, Said
 from .runs.drives import driven
-from .runs.traversals import NEAREST_ROBOT, NEAREST_START, NOTES, traversal_figure, traversal_numbers
+from .runs.traversals import NEAREST_ROBOT, NEAREST_START, NOTES, noisy, traversal_figure, traversal_numbers
 
 RATIO = "path over that of figure 5"
+SAID: Said = {RATIO: "about 3", "passes by the start": "regularly"}
+
+
+def numbers(seed: int) -> Numbers:
+    """Return what one drive with noise gives, beside figure 5's with the same seed."""
+    return _numbers(noisy(NEAREST_START, seed), noisy(NEAREST_ROBOT, seed))
+
+
+def _numbers(config: TrialConfig, other: TrialConfig) -> Numbers:
+    times = driven(config).summary["path_length_m"] / driven(other).summary["path_length_m"]
+    return {name: {RATIO: times, **values} for name, values in traversal_numbers(config).items()}
 
 
 def reproduce(_seed: int) -> Reproduction:
     """Explore the world of figure 5 by `nearest-start`, without errors, and compare the way driven."""
     made = driven(NEAREST_START)
-    length = made.summary["path_length_m"]
-    times = length / driven(NEAREST_ROBOT).summary["path_length_m"]
-    ratio: dict[str, Value] = {RATIO: times}
-    ours = {name: ratio | values for name, values in traversal_numbers(NEAREST_START).items()}
+    ours = _numbers(NEAREST_START, NEAREST_ROBOT)
+    length, times = made.summary["path_length_m"], next(iter(ours.values()))[RATIO]
     return Reproduction(
         "Figure 6: next to start position",
-        {RATIO: "about 3", "passes by the start": "regularly"},
+        SAID,
         ours,
         traversal_figure(f"Figure 6: nearest-start, errorless, {length:.0f} m, {times:.2f} times figure 5", made),
         NOTES,

@@ -2,9 +2,20 @@
 
 from viz.figures.panels import map_panels
 
-from .reproduction import Reproduction
+from .reproduction import Numbers, Reproduction, Said
 from .runs.drives import PAPER, drive_by_walls, last_map
 from .runs.maps import compared, map_numbers, map_words, mark
+
+SAID: Said = {
+    "path, m": 33.0,
+    "contours closed": "the cycle",
+    "error of named corners' distances, worst, cm": "5 (Table 1, rounded to 5)",
+}
+
+
+def numbers(seed: int) -> Numbers:
+    """Return what each back end makes of one drive."""
+    return {name: map_numbers(result) for name, result in compared(drive_by_walls("paper-fig8", seed=seed)).items()}
 
 
 def reproduce(seed: int) -> Reproduction:
@@ -15,12 +26,8 @@ def reproduce(seed: int) -> Reproduction:
     mark(axes[0], results[PAPER])
     return Reproduction(
         "Figure 8: the cyclic environment of 7 m x 7 m",
-        {
-            "path, m": 33.0,
-            "contours closed": "the cycle",
-            "error of named corners' distances, worst, cm": "5 (Table 1, rounded to 5)",
-        },
-        {name: map_numbers(result) for name, result in results.items()},
+        SAID,
+        numbers(seed),
         figure,
         (f"One drive by {PAPER}, nearest-robot; the others map its scans with their own gate.",),
     )

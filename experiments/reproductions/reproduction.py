@@ -8,6 +8,10 @@ from matplotlib.figure import Figure
 
 Value = float | int | str | None
 """None where there is nothing to measure."""
+Numbers = dict[str, dict[str, Value]]
+"""For each back end (or variant of one) its quantities."""
+Said = Mapping[str, Value]
+"""What the paper says, for those quantities of which it says something."""
 
 
 @dataclass(frozen=True)
@@ -15,8 +19,7 @@ class Reproduction:
     """Numbers by quantity (its unit in its name) and the picture."""
 
     title: str
-    paper: Mapping[str, Value]
-    """What the paper says, for those quantities of which it says something."""
+    paper: Said
     ours: Mapping[str, Mapping[str, Value]]
     """For each back end (or variant of one) its quantities."""
     figure: Figure
@@ -45,4 +48,7 @@ class Entry:
     """How to reproduce a figure with a seed, and what it shows."""
 
     make: Callable[[int], Reproduction]
+    numbers: Callable[[int], Numbers]
+    """What one drive with a seed gives, for tables over many seeds."""
+    paper: Said
     about: str

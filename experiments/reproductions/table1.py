@@ -6,12 +6,33 @@ from matplotlib.figure import Figure
 from viz.figures.panels import paint_intervals, panels
 
 from ..scoring.measurements import Z_95
-from .reproduction import Reproduction, Value
+from .reproduction import Numbers, Reproduction, Said, Value
 from .runs.drives import BESIDE, PAPER, drive_by_walls, driven, replayed
 
 DRIVES = 5
 BY_HAND = {"A-B": 6.50, "A-C": 8.35, "B-C": 7.60}
 IN_ITS_MAP = {"A-B": 6.50, "A-C": 8.30, "B-C": 7.65}
+SAID: Said = {f"{pair}, m": f"{IN_ITS_MAP[pair]:.2f} (by hand {BY_HAND[pair]:.2f})" for pair in BY_HAND} | {
+    "worst error, mm": "50 (rounded to 50)"
+}
+
+
+def numbers(seed: int) -> Numbers:
+    """Return each distance in the map of one drive, its error and its interval."""
+    config = drive_by_walls("paper-fig8", seed=seed)
+    ours: Numbers = {}
+    for name in BESIDE:
+        ours[name] = {}
+        for pair, distance in replayed(config, name).summary["distances"].items():
+            mapped, sigma = distance["mapped_m"], distance["sigma_m"]
+            error = None if mapped is None else mapped - distance["true_m"]
+            ours[name] |= {
+                f"{pair}, m": mapped,
+                f"{pair}, error, mm": None if error is None else 1e3 * error,
+                f"{pair}, half of the 95 % interval, mm": None if sigma is None else 1e3 * Z_95 * sigma,
+                f"{pair} in its interval": None if error is None or sigma is None else abs(error) <= Z_95 * sigma,
+            }
+    return ours
 
 
 def reproduce(seed: int) -> Reproduction:
@@ -33,11 +54,9 @@ def reproduce(seed: int) -> Reproduction:
             "intervals (95 %) that hold the truth": f"{held[seen].sum()} of {seen.sum()}",
             "not measured": int((~seen).sum()),
         }
-    paper: dict[str, Value] = {f"{pair}, m": f"{IN_ITS_MAP[pair]:.2f} (by hand {BY_HAND[pair]:.2f})" for pair in pairs}
-    paper["worst error, mm"] = "50 (rounded to 50)"
     return Reproduction(
         "Table 1: distances between corners A, B and C of figure 8",
-        paper,
+        SAID,
         ours,
         _figure(pairs, errors, {name: 1e3 * half for name, half in halves.items()}),
         (

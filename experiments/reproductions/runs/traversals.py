@@ -14,7 +14,7 @@ from ...replays.recordings import recorded
 from ...scenario import TrialConfig
 from ...trial import TrialResult
 from ...views.timelines import true_rings
-from ..reproduction import Value
+from ..reproduction import Numbers, Value
 from .drives import PAPER, drive_by_walls, driven, log_of
 
 NEAREST_ROBOT = drive_by_walls("paper-fig5", errorless=True)
@@ -29,7 +29,12 @@ NEAR_START_M = 1.0
 AWAY_M = 1.5
 
 
-def traversal_numbers(config: TrialConfig) -> dict[str, dict[str, Value]]:
+def noisy(config: TrialConfig, seed: int) -> TrialConfig:
+    """Return the same drive with noise."""
+    return replace(config, errorless=False, seed=seed)
+
+
+def traversal_numbers(config: TrialConfig) -> Numbers:
     """Return the path's numbers, which no back end changes, and for each back end how uncertain it became."""
     made = driven(config)
     log = log_of(made)

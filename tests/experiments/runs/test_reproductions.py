@@ -28,7 +28,7 @@ def test_all_figures_that_the_design_names_are_in_the_registry():
 
 
 def test_the_command_writes_picture_and_numbers_and_the_same_bytes_again(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(reproductions.REPRODUCTIONS, "eq4", Entry(stub, "a stub"))
+    monkeypatch.setitem(reproductions.REPRODUCTIONS, "eq4", Entry(stub, dict, {}, "a stub"))
     for folder in ("a", "b"):
         assert main(["reproduce", "eq4", "eq4", "--out", str(tmp_path / folder), "--seed", "3"]) == 0
     said = capsys.readouterr().out

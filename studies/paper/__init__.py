@@ -1,0 +1,1 @@
+"""The paper's figures over many seeds: their numbers, and the page that shows them."""

@@ -1,0 +1,123 @@
+"""The page of the paper's figures: a table of each, from the stored numbers of all drives.
+
+.venv/bin/python -m studies.paper.page              # writes docs/paper.md anew
+.venv/bin/python -m studies.paper.page --check      # says which tables are of other code than this; status 1 for any
+"""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.reproductions import REPRODUCTIONS
+from experiments.reproductions.reproduction import Value
+
+from ..runner.rows import Row, fingerprint
+
+ROWS, PAGE = Path("studies/paper/rows.jsonl"), Path("docs/paper.md")
+HEAD = """# The paper's figures
+
+This page is made by `make paper` from the rows in `studies/paper/rows.jsonl`. For each figure the paper's filter,
+`block-ekf`, drives the robot along sequences of walls, as in the paper. The other back ends map the same scans, and
+each matches with its own gate. `chainslam reproduce NAME --seed N` draws the picture of one drive.
+
+A cell holds the median over the drives, and in brackets the least and the largest value. Counts have their mean
+in place of the median. Of what is either so or not, a cell holds the share of the drives in which it is so.
+"""
+NOTES = {
+    "table1": "Lengths are in metres, as measured between mapped corners.",
+    "fig5": "In the paper motion and perception are without error. Here they have noise, a drive for each seed."
+    " Sigmas are of each back end on the same observations, with the true association.",
+    "fig6": "As figure 5. The ratio is that of two drives with one seed.",
+    "fig10": "The robot starts with an uncertainty of 0.1 m and 2 degrees, and drives back to its start in the end.",
+    "fig11": "The drives of figure 10.",
+    "eq4": "`wall` attaches r to the wall, `origin` to the world's origin, as the paper does. A ring of 40 m is driven"
+    " twice, the second time 100 m away from the origin. A drive that broke down is left out.",
+}
+
+
+def read_rows(path: Path = ROWS) -> list[Row]:
+    """Return all stored rows, of whatever code; the last of each figure and seed."""
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    return list({(row["figure"], row["seed"]): row for row in rows}.values())
+
+
+def stale(rows: Iterable[Row]) -> list[str]:
+    """Return the figures that some code has made that is not this."""
+    return sorted({row["figure"] for row in rows if row["code"] != fingerprint()})
+
+
+def page_of(rows: Sequence[Row]) -> str:
+    """Return the whole page."""
+    parts = [HEAD]
+    for name, entry in REPRODUCTIONS.items():
+        own = sorted((row for row in rows if row["figure"] == name), key=lambda row: row["seed"])
+        if own:
+            parts.append(f"## {_title(name)}: {entry.about}\n")
+            parts.append(f"{NOTES[name]}\n" if name in NOTES else "")
+            made = ", ".join(sorted({row["commit"] for row in own}))
+            parts.append(f"Drives with seeds {own[0]['seed']} to {own[-1]['seed']}, made at {made}.\n")
+            parts.append(table_of([row["numbers"] for row in own], entry.paper))
+    return "\n".join(part for part in parts if part)
+
+
+def table_of(drives: Sequence[Mapping[str, Mapping[str, Value]]], paper: Mapping[str, Value]) -> str:
+    """Return a table with a row for each quantity, and a column for the paper and for each back end."""
+    names = list(drives[0])
+    quantities = list(dict.fromkeys(key for drive in drives for name in names for key in drive[name]))
+    head = ["quantity", *(["the paper"] if paper else []), *(f"`{name}`" for name in names)]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for quantity in quantities:
+        said = [str(paper.get(quantity, ""))] if paper else []
+        cells = [cell([drive[name].get(quantity) for drive in drives]) for name in names]
+        lines.append(_line([quantity, *said, *cells]))
+    return "\n".join(lines) + "\n"
+
+
+def cell(values: Sequence[Value]) -> str:
+    """Return one quantity over all drives in words; None counts as not measured."""
+    there: list[Any] = [value for value in values if value is not None]
+    lacking = f"; {len(values) - len(there)} without" if 0 < len(there) < len(values) else ""
+    if not there:
+        return "-"
+    if all(isinstance(value, bool) for value in there):
+        return f"{sum(there)} of {len(there)}{lacking}"
+    if all(isinstance(value, str) for value in there):
+        counts = Counter(there).most_common()
+        return ("; ".join(f"{value} in {count}" for value, count in counts) if len(counts) > 1 else there[0]) + lacking
+    middle = np.mean(there) if all(isinstance(value, int) for value in there) else np.median(there)
+    if min(there) == max(there):
+        return f"{there[0]:.3g}{lacking}"
+    return f"{middle:.3g} ({min(there):.3g} to {max(there):.3g}){lacking}"
+
+
+def write_page(rows: Sequence[Row], page: Path) -> None:
+    """Write the page of the tables."""
+    page.write_text(page_of(rows))
+
+
+def _title(name: str) -> str:
+    return {"table1": "Table 1", "eq4": "Equation 4"}.get(name, name.replace("fig", "Figure "))
+
+
+def _line(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> int:
+    """Write the page, or say which of its tables are stale, and return the exit status."""
+    rows = read_rows()
+    if "--check" in sys.argv[1:]:
+        old = stale(rows)
+        print("stale: " + ", ".join(old) if old else "all tables of docs/paper.md are of this code")
+        return int(bool(old))
+    write_page(rows, PAGE)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

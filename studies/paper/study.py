@@ -1,0 +1,73 @@
+"""The numbers of the paper's figures, one drive for each seed, and the page of their tables.
+
+.venv/bin/python -m studies.paper.study --seeds 20      # goes on where it was interrupted
+"""
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from experiments.reproductions import REPRODUCTIONS
+from experiments.usage import UsageError, choose
+
+from ..runner.rows import Row, rows_of
+from .page import PAGE, ROWS, write_page
+
+NAMES = ("figure", "seed")
+TOGETHER = (("table1", "fig8"), ("fig9",), ("fig10", "fig11"), ("fig5", "fig6"), ("eq4",))
+"""Figures of one drive, which is made once for all of them."""
+
+
+@dataclass(frozen=True)
+class PaperStudy:
+    """Drive for each of the paper's figures with each seed, store the numbers, and write the page of their tables."""
+
+    figures: tuple[str, ...] = tuple(REPRODUCTIONS)
+    """Names as of `chainslam reproduce`."""
+    seeds: int = 20
+    """Drives for each figure, with seeds 1 to this."""
+    jobs: int = 2
+    """Number of processes."""
+    out: Path = ROWS
+    """A line of JSON for each figure and seed, as it comes. What it holds of the same code is not run again."""
+    page: Path = PAGE
+
+    def run(self) -> None:
+        """Run what is to be run and write the page; raises UsageError for bad names and another file."""
+        for name in self.figures:
+            choose("figure", name, REPRODUCTIONS)
+        groups = [tuple(name for name in group if name in self.figures) for group in TOGETHER]
+        tasks = [
+            ((group, seed), [(name, seed) for name in group])
+            for seed in range(1, self.seeds + 1)
+            for group in groups
+            if group
+        ]
+        rows = list(rows_of(self.out, NAMES, tasks, numbers_of, self.jobs))
+        write_page(rows, self.page)
+        print(f"{len(rows)} rows in {self.out}, their tables in {self.page}")
+
+
+def numbers_of(task: tuple[tuple[str, ...], int]) -> Sequence[Row]:
+    """Return a row for each figure of a group: the numbers of one drive by each back end."""
+    group, seed = task
+    return [
+        {"figure": name, "seed": seed, "commit": _commit(), "numbers": REPRODUCTIONS[name].numbers(seed)}
+        for name in group
+    ]
+
+
+def _commit() -> str:
+    """Return the commit of the checkout, with a plus where files differ from it; empty outside of one."""
+    said = subprocess.run(("git", "describe", "--always", "--dirty=+"), capture_output=True, text=True, check=False)
+    return said.stdout.strip()
+
+
+if __name__ == "__main__":
+    try:
+        tyro.cli(PaperStudy, prog="studies.paper.study").run()
+    except UsageError as error:
+        raise SystemExit(f"paper_study: {error}") from error

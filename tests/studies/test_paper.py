@@ -1,0 +1,77 @@
+"""The page of the paper's figures says what the stored drives say, of each figure and back end."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.reproductions import REPRODUCTIONS, fig8, table1
+from experiments.reproductions.runs import maps
+from studies.paper import page, study
+from studies.runner.rows import fingerprint
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def row(figure, seed, **numbers):
+    return {"code": "none", "figure": figure, "seed": seed, "commit": "abc", "numbers": numbers}
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([1.0, 3.0, 8.0], "3 (1 to 8)"),
+        ([0, 0, 3], "1 (0 to 3)"),
+        ([2.5, 2.5], "2.5"),
+        ([True, False, True], "2 of 3"),
+        (["2 of 2", "2 of 2"], "2 of 2"),
+        (["2 of 2", "1 of 2", "2 of 2"], "2 of 2 in 2; 1 of 2 in 1"),
+        ([4.0, None], "4; 1 without"),
+        ([None, None], "-"),
+    ],
+)
+def test_a_cell_says_middle_range_and_what_lacks(values, words):
+    assert page.cell(values) == words
+
+
+def test_a_table_has_the_papers_value_beside_each_back_end():
+    drives = [
+        {"a": {"path, m": 1.0}, "b": {"path, m": 2.0, "walls": 1}},
+        {"a": {"path, m": 3.0}, "b": {"path, m": 4.0}},
+    ]
+    lines = page.table_of(drives, {"path, m": 33.0}).splitlines()
+    assert lines[0] == "| quantity | the paper | `a` | `b` |"
+    assert lines[2] == "| path, m | 33.0 | 2 (1 to 3) | 3 (2 to 4) |"
+    assert lines[3] == "| walls |  | - | 1; 1 without |"
+
+
+def test_stale_tables_are_those_of_other_code():
+    fresh = row("fig8", 1) | {"code": fingerprint()}
+    assert page.stale([fresh, row("fig9", 1)]) == ["fig9"]
+    assert page.stale([fresh, row("fig8", 2)]) == ["fig8"]
+    assert page.stale([fresh]) == []
+
+
+def test_the_page_is_what_the_stored_rows_give():
+    rows = page.read_rows(ROOT / page.ROWS)
+    assert {each["figure"] for each in rows} == set(REPRODUCTIONS)
+    assert (ROOT / page.PAGE).read_text() == page.page_of(rows)
+
+
+def test_a_row_holds_the_numbers_of_one_drive_by_each_back_end(monkeypatch):
+    monkeypatch.setattr(table1, "DRIVES", 1)
+    for module in (table1, maps):
+        monkeypatch.setattr(module, "BESIDE", ("block-ekf", "full-ekf"))
+    rows = study.numbers_of((("table1", "fig8"), 2))
+    assert [(each["figure"], each["seed"]) for each in rows] == [("table1", 2), ("fig8", 2)]
+    distances, drawn = rows[0]["numbers"], fig8.reproduce(2)
+    assert json.loads(json.dumps(rows[1]["numbers"])) == drawn.ours
+    whole = table1.reproduce(2)
+    for name, own in distances.items():
+        for pair in table1.BY_HAND:
+            assert own[f"{pair}, m"] == whole.ours[name][f"{pair}, m"]
+            error = 1e3 * (own[f"{pair}, m"] - whole.ours["true"][f"{pair}, m"])
+            np.testing.assert_allclose(own[f"{pair}, error, mm"], error)
+            inside = abs(error) <= own[f"{pair}, half of the 95 % interval, mm"]
+            assert own[f"{pair} in its interval"] is bool(inside)
