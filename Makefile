@@ -76,11 +76,15 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check counts settings
+.PHONY: navigation paper paper-check intervals counts settings
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
 	$(BIN)/python -m studies.paper.study --seeds 20
+
+# Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
+intervals: setup
+	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out results/intervals.jsonl
 
 # Which tables of docs/paper.md are of other code than this?
 paper-check: setup
