@@ -76,11 +76,15 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check intervals counts settings
+.PHONY: navigation paper paper-check study intervals counts settings
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
 	$(BIN)/python -m studies.paper.study --seeds 20
+
+# Campaign, bias, heading, strategies, intervals, the paper's figures, and one report; hours, goes on where it was. TRIALS=...
+study: setup
+	$(BIN)/python -m studies.whole --trials $(or $(TRIALS),20) --out results/study
 
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup

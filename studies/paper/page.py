@@ -15,6 +15,7 @@ import numpy as np
 
 from experiments.reproductions import REPRODUCTIONS
 from experiments.reproductions.reproduction import Value
+from viz.reports.report import PageTable
 
 from ..runner.rows import Row, fingerprint
 
@@ -54,28 +55,43 @@ def stale(rows: Iterable[Row]) -> list[str]:
 def page_of(rows: Sequence[Row]) -> str:
     """Return the whole page."""
     parts = [HEAD]
-    for name, entry in REPRODUCTIONS.items():
-        own = sorted((row for row in rows if row["figure"] == name), key=lambda row: row["seed"])
-        if own:
-            parts.append(f"## {_title(name)}: {entry.about}\n")
-            parts.append(f"{NOTES[name]}\n" if name in NOTES else "")
-            made = ", ".join(sorted({row["commit"] for row in own}))
-            parts.append(f"Drives with seeds {own[0]['seed']} to {own[-1]['seed']}, made at {made}.\n")
-            parts.append(table_of([row["numbers"] for row in own], entry.paper))
-    return "\n".join(part for part in parts if part)
+    for name, own in _by_figure(rows).items():
+        parts.append(f"## {_title(name)}\n")
+        parts += [f"{NOTES[name]}\n"] if name in NOTES else []
+        made = ", ".join(sorted({row["commit"] for row in own}))
+        parts.append(f"Drives with seeds {own[0]['seed']} to {own[-1]['seed']}, made at {made}.\n")
+        header, *lines = table_of([row["numbers"] for row in own], REPRODUCTIONS[name].paper)
+        parts += map(_line, (header, ["---"] * len(header), *lines))
+        parts.append("")
+    return "\n".join(parts)
 
 
-def table_of(drives: Sequence[Mapping[str, Mapping[str, Value]]], paper: Mapping[str, Value]) -> str:
-    """Return a table with a row for each quantity, and a column for the paper and for each back end."""
+def tables_of(rows: Sequence[Row]) -> list[PageTable]:
+    """Return the tables for a report."""
+    found = []
+    for name, own in _by_figure(rows).items():
+        header, *lines = map(tuple, table_of([row["numbers"] for row in own], REPRODUCTIONS[name].paper))
+        note = f"{NOTES.get(name, '')} {len(own)} drives: median, least and largest; of counts the mean."
+        found.append(PageTable(_title(name), header, tuple(lines), note.strip()))
+    return found
+
+
+def _by_figure(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Return the rows of each figure that has any, by seed."""
+    ordered = sorted(rows, key=lambda row: row["seed"])
+    found = {name: [row for row in ordered if row["figure"] == name] for name in REPRODUCTIONS}
+    return {name: own for name, own in found.items() if own}
+
+
+def table_of(drives: Sequence[Mapping[str, Mapping[str, Value]]], paper: Mapping[str, Value]) -> list[list[str]]:
+    """Return the header and a row for each quantity, with a column for the paper and for each back end."""
     names = list(drives[0])
-    quantities = list(dict.fromkeys(key for drive in drives for name in names for key in drive[name]))
-    head = ["quantity", *(["the paper"] if paper else []), *(f"`{name}`" for name in names)]
-    lines = [_line(head), _line(["---"] * len(head))]
+    quantities = dict.fromkeys(key for drive in drives for name in names for key in drive[name])
+    lines = [["quantity", *(["the paper"] if paper else []), *names]]
     for quantity in quantities:
         said = [str(paper.get(quantity, ""))] if paper else []
-        cells = [cell([drive[name].get(quantity) for drive in drives]) for name in names]
-        lines.append(_line([quantity, *said, *cells]))
-    return "\n".join(lines) + "\n"
+        lines.append([quantity, *said, *(cell([drive[name].get(quantity) for drive in drives]) for name in names)])
+    return lines
 
 
 def cell(values: Sequence[Value]) -> str:
@@ -101,7 +117,8 @@ def write_page(rows: Sequence[Row], page: Path) -> None:
 
 
 def _title(name: str) -> str:
-    return {"table1": "Table 1", "eq4": "Equation 4"}.get(name, name.replace("fig", "Figure "))
+    title = {"table1": "Table 1", "eq4": "Equation 4"}.get(name, name.replace("fig", "Figure "))
+    return f"{title}: {REPRODUCTIONS[name].about}"
 
 
 def _line(cells: Iterable[str]) -> str:

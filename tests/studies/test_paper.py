@@ -40,10 +40,13 @@ def test_a_table_has_the_papers_value_beside_each_back_end():
         {"a": {"path, m": 1.0}, "b": {"path, m": 2.0, "walls": 1}},
         {"a": {"path, m": 3.0}, "b": {"path, m": 4.0}},
     ]
-    lines = page.table_of(drives, {"path, m": 33.0}).splitlines()
-    assert lines[0] == "| quantity | the paper | `a` | `b` |"
-    assert lines[2] == "| path, m | 33.0 | 2 (1 to 3) | 3 (2 to 4) |"
-    assert lines[3] == "| walls |  | - | 1; 1 without |"
+    lines = page.table_of(drives, {"path, m": 33.0})
+    assert lines[0] == ["quantity", "the paper", "a", "b"]
+    assert lines[1] == ["path, m", "33.0", "2 (1 to 3)", "3 (2 to 4)"]
+    assert lines[2] == ["walls", "", "-", "1; 1 without"]
+    rows = [row("fig8", 2, **drives[1]), row("fig8", 1, **drives[0])]
+    assert "| path, m | 33.0 | 2 (1 to 3) | 3 (2 to 4) |" in page.page_of(rows).splitlines()
+    assert page.tables_of(rows)[0].rows[0] == ("path, m", "33.0", "2 (1 to 3)", "3 (2 to 4)")
 
 
 def test_stale_tables_are_those_of_other_code():

@@ -39,13 +39,15 @@ class PagePicture:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands under it, in this order: words, drawings, tables, pictures."""
+    """A heading with what stands under it, in this order: words, drawings, tables, what was printed, pictures."""
 
     title: str
     words: tuple[str, ...] = ()
     tables: tuple[PageTable, ...] = ()
     pictures: tuple[PagePicture, ...] = field(default=())
     drawings: tuple[PageDrawing, ...] = ()
+    printed: str = ""
+    """What a command said, shown as it stands."""
 
 
 @dataclass(frozen=True)
