@@ -12,8 +12,9 @@ from explore.planning.navigators import Navigation
 
 from ..artifacts.settings import NAVIGATION, asked, differing, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
+from ..campaign.comparison.story import decisive_arm, story_of
 from ..campaign.comparison.tables import write_tables
-from ..campaign.comparison.words import left_out
+from ..campaign.comparison.words import ARMS_SHORT, left_out
 from ..campaign.contrast import contrast, read_contrast
 from ..campaign.merge import merge
 from ..campaign.pages.contrast_page import verdict
@@ -25,6 +26,7 @@ from ..replays.replay import Association
 from ..scenario import P0, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED
+from ..terminal.progress import print_pooled
 from ..usage import UsageError
 from .echo import echo_world
 
@@ -138,6 +140,10 @@ class Compare:
                 return FAILED
             said = write_tables(self.out, campaign, trials(campaign), store.record)
         print(tally.words())
+        arm = decisive_arm(campaign)
+        print_pooled([row for row in said["pooled"] if row["arm"] == arm], f"means over the runs, {ARMS_SHORT[arm]}")
+        for words in story_of(campaign, said).verdict:
+            say(words)
         for words in left_out(said):
             print(words)
         say(f"results in {self.out}")

@@ -110,7 +110,7 @@ def _number(value: float | None) -> str:
 
 
 def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
-    """Print one row for each of several replays of one recording on standard output."""
+    """Print one column for each of several replays of one recording on standard output."""
     table = Table(title=title, title_justify="left")
     columns = {
         "pose ANEES": "pose_anees",
@@ -122,13 +122,25 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
         "double": "duplicate_lines",
         "false": "false_matches",
     }
-    table.add_column("back end")
-    for title_of_column in columns:
-        table.add_column(title_of_column, justify="right")
+    table.add_column("", no_wrap=True)
     for summary in summaries:
-        table.add_row(summary["backend"], *(_short(summary[key]) for key in columns.values()))
+        table.add_column(summary["backend"], justify="right", overflow="fold")
+    for name, key in columns.items():
+        table.add_row(name, *(_short(summary[key]) for summary in summaries))
     plain_console().print(table)
 
 
 def _short(value: Any) -> str:
     return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def print_pooled(rows: Sequence[dict[str, Any]], title: str) -> None:
+    """Print one row for each back end of a campaign, pooled over its worlds and strategies, on standard output."""
+    table = Table(title=title, title_justify="left")
+    for name in ("back end", "complete", "pose ANEES", "map ANEES", "walls cm", "path cm"):
+        table.add_column(name, justify="left" if name == "back end" else "right")
+    for row in rows:
+        anees = [_short(row[name] and row[name]["mean"]) for name in ("pose_anees", "map_anees")]
+        errors = [_short(row[name] and 100.0 * row[name]["mean"]) for name in ("wall_rmse_m", "ate_m")]
+        table.add_row(row["backend"], f"{row['complete']} of {row['trials']}", *anees, *errors)
+    plain_console().print(table)

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ...scoring.statistics import FEW_RUNS
+
 Row = dict[str, Any]
 Judge = Callable[[Row], tuple[Row, bool | None]]
 PAPER, BASELINE = "block-ekf", "full-ekf"
@@ -109,8 +111,8 @@ def _doubles(row: Row) -> tuple[Row, bool | None]:
 
 
 def _inside(estimate: Row | None, aim: tuple[float, float]) -> bool | None:
-    """Return whether an interval lies within the aim; None where partly: more runs would tell."""
-    if estimate is None:
+    """Return whether an interval lies within the aim; None where partly, or of few runs: more would tell."""
+    if estimate is None or estimate["runs"] < FEW_RUNS:
         return None
     if aim[0] <= estimate["low"] and estimate["high"] <= aim[1]:
         return True

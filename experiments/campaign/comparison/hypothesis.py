@@ -14,8 +14,9 @@ MATCHES_WITHIN = 1.1
 DECIDING = ("wall_rmse_m", "wall_shape_m")
 """Where the walls of the map lie, and its shape alone: the full EKF moves its map as a whole, which says nothing of
 how well the walls lie to each other (docs/results.md, "Bias and the precision of the scanner")."""
-DECISIVE = "33"
-"""Metres driven at which the verdict is taken: the length of the paper's first experiment."""
+MARKS = ("10", "20", "33")
+"""Metres driven at which both are compared; the last that any run reached decides. 33 m is the length of the paper's
+first experiment."""
 MEASURES = (
     Measure("wall_rmse_m", True),
     Measure("wall_shape_m", True),
@@ -36,17 +37,17 @@ def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
         "contender": "{} with {}".format(*CONTENDER),
         "baseline": f"{BASELINE_STRATEGY} with {BASELINE_BACKEND}",
         "matches_within": MATCHES_WITHIN,
-        "decisive_mark": DECISIVE,
+        "decisive_mark": _last_reached(contender + baseline),
         "marks": {},
     }
-    for mark in ("10", "20", "33", END):
+    for mark in (*MARKS, END):
         first, second = (_alive(select(rows, metres=mark)) for rows in (contender, baseline))
         found["marks"][mark] = {
             "contender": _states(contender, mark),
             "baseline": _states(baseline, mark),
             **{m.name: difference(first, second, m) for m in MEASURES},
         }
-    ratios = [found["marks"][DECISIVE][name] for name in DECIDING]
+    ratios = [found["marks"][found["decisive_mark"]][name] for name in DECIDING]
     enough = min(ratio["runs"] for ratio in ratios) >= FEW_RUNS
     found["verdict"] = verdict([(ratio["low"], ratio["high"]) for ratio in ratios]) if enough else "undecided"
     return found
@@ -61,6 +62,11 @@ def verdict(intervals: Sequence[tuple[float | None, float | None]]) -> str:
     if any(low > MATCHES_WITHIN for low, _ in known):
         return "does not match"
     return "matches" if len(known) == len(intervals) and all(h <= MATCHES_WITHIN for _, h in known) else "undecided"
+
+
+def _last_reached(rows: Sequence[Row]) -> str:
+    """Return the last mark at which a run still drives; the end of the runs where none comes to the first."""
+    return next((mark for mark in reversed(MARKS) if _states(rows, mark)["driving"]), END)
 
 
 def _alive(rows: Sequence[Row]) -> list[Row]:

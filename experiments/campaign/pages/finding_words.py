@@ -6,7 +6,7 @@ from typing import Any
 from viz.reports.report import PageTable
 
 from ...views.numbers import NONE, number, percent
-from ..comparison.words import ARMS_SHORT, interval
+from ..comparison.words import ARMS_SHORT, within
 from ..plan import Campaign
 
 Row = dict[str, Any]
@@ -58,14 +58,14 @@ def _below(found: Row) -> str:
 
 def _anees(found: Row) -> str:
     left_out = f"; {number(found['without'])} complete runs have none" if found["without"] else ""
-    return (f"{number(found['mean'])} ({interval(found)})" if "mean" in found else NONE) + left_out
+    return (within(number(found["mean"]), found) if "mean" in found else NONE) + left_out
 
 
 def _held(found: Row) -> str:
     if "mean" not in found:
         return NONE
     counted = f"{number(found['distances'])} distances in {number(found['replays'])} runs"
-    return f"{percent(found['mean'])} % ({interval(found, 100.0)}; {counted})"
+    return within(f"{percent(found['mean'])} %", found, 100.0, counted)
 
 
 def _doubles(found: Row) -> str:

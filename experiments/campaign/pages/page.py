@@ -11,9 +11,11 @@ from ...artifacts.reading import read_json
 from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import NONE, number, percent
 from ..comparison.shapes import COMPARISON
-from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, command_of, interval, mean, share, verdict
+from ..comparison.story import story_of
+from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, command_of, interval, mean, share, within
 from ..merge import union
 from ..plan import CLOSED, Campaign
+from ..scores.score import END
 from ..store import read_config
 from .finding_words import finding_table
 from .pictures import coverage_pictures, curve_pictures, map_arm, map_pictures, ratio_pictures
@@ -23,11 +25,6 @@ ARM_WORDS = {
     "replay-own": "one recording, each back end matches for itself",
     "replay-true": "one recording, matches told by the truth: the algebra alone",
 }
-QUESTION = (
-    "A robot maps a building by following walls. The paper's filter (block-ekf) keeps only the diagonal blocks of its"
-    " map's covariance and hopes that a careful exploration strategy (nearest-start) makes up for that. Here the same"
-    " robot does the same with rigorous estimators."
-)
 
 
 def page_of(folder: Path) -> Page:
@@ -36,10 +33,11 @@ def page_of(folder: Path) -> Page:
     campaigns = config.campaigns
     campaign = union(campaigns)
     said = read_json(folder / "comparison.json", COMPARISON, "run the same `compare` to its end")
+    story = story_of(campaign, said)
     return Page(
-        "What neglecting the cross-correlations costs",
-        QUESTION,
-        verdict(said["hypothesis"]),
+        story.title,
+        story.question,
+        story.verdict,
         "; ".join(command_of(each) for each in campaigns),
         (*config.versions.items(), ("commit", str(config.commit)[:10])),
         filled(
@@ -54,7 +52,7 @@ def page_of(folder: Path) -> Page:
                 (_strategies(said), _interaction(said)),
                 coverage_pictures(folder, campaigns),
             ),
-            Section("At equal metres driven", _MARK_WORDS, (_marks(said),)),
+            Section("At equal metres driven", _MARK_WORDS, (marks_table(said),)),
         ),
     )
 
@@ -71,7 +69,10 @@ _STRATEGY_WORDS = (
     "Paired by run, against nearest-robot. The interaction tells how much more a back end gains by a strategy than"
     " the full EKF does: 1 is no interaction.",
 )
-_MARK_WORDS = ("Closed loop. A run drives on, has finished before (its last state counts) or has failed.",)
+_MARK_WORDS = (
+    "Closed loop. A run drives on, has finished before (its last state counts) or has failed. Lengths that no run"
+    " reached are left out.",
+)
 
 
 def _map_words(campaign: Campaign) -> tuple[str, ...]:
@@ -136,7 +137,7 @@ def _honesty_row(row: dict[str, Any]) -> tuple[str, ...]:
     return (
         row["backend"],
         f"{row['complete']} of {row['trials']}",
-        *((f"{number(pose['mean'])} ({interval(pose)})", number(pose["median"])) if pose else (NONE, NONE)),
+        *((within(number(pose["mean"]), pose), number(pose["median"])) if pose else (NONE, NONE)),
         mean(row["map_anees"]),
         ", ".join(number(row["without"].get(name, 0)) for name in ("pose_anees", "map_anees")),
         percent(row["steps_outside_band"]),
@@ -212,11 +213,13 @@ def _interaction(said: dict[str, Any]) -> PageTable:
     return PageTable("Interaction of strategy and back end, closed loop", header, rows)
 
 
-def _marks(said: dict[str, Any]) -> PageTable:
+def marks_table(said: dict[str, Any]) -> PageTable:
+    """Return the means at equal metres driven, at the lengths that some run reached."""
     header = (
         *("world", "strategy", "back end", "metres", "driving", "finished", "failed", "pose, cm", "walls, cm"),
         *("pose ANEES so far", "without: walls, ANEES", "coverage %"),
     )
+    reached = {END, *(row["metres"] for row in said["marks"] if row["arm"] == CLOSED and row["driving"])}
     rows = tuple(
         (
             *(row[key] for key in ("world", "strategy", "backend", "metres")),
@@ -227,6 +230,6 @@ def _marks(said: dict[str, Any]) -> PageTable:
             number(None if row["coverage"] is None else 100 * row["coverage"]),
         )
         for row in said["marks"]
-        if row["arm"] == CLOSED
+        if row["arm"] == CLOSED and row["metres"] in reached
     )
     return PageTable("Means over the runs that drive on or have finished", header, rows)

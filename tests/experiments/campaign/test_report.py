@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.comparison.words import command_of, interval, verdict
-from experiments.campaign.pages.page import page_of
+from experiments.campaign.comparison.story import answer, story_of
+from experiments.campaign.comparison.words import command_of, interval, within
+from experiments.campaign.pages.page import marks_table, page_of
 from experiments.campaign.plan import Campaign
 from experiments.commands.cli import main
 from experiments.views.numbers import number
@@ -163,19 +164,75 @@ def test_the_verdict_says_answer_interval_and_failures():
         "decisive_mark": "33", "marks": {"33": at | {"uncovered": {"value": 0.02}}}, "matches_within": 1.1,
         "contender": "A", "baseline": "B", "verdict": "does not match",
     }  # fmt: skip
-    words = verdict(said)
+    words = answer(said)
     assert words[0].startswith("No: after 33 m driven, A does not match B")
-    assert "95 % interval 1.5 to 2.5" in words[0]
+    assert "2 times (1.5 to 2.5)" in words[0]
     assert "its shape alone" in words[0]
     assert "1 have failed" in words[2]
     assert "2.0 percentage points more" in words[2]
-    assert "not tested" in verdict(None)[0]
 
 
 def test_numbers_are_short_and_never_in_powers_of_ten():
     assert [number(v) for v in (-5.2e-14, 0.0000123, -4.56e-7)] == ["0", "0.0000123", "-0.000000456"]
     assert [number(v) for v in (None, 3, 0.0, 0.012345, 123.4, 123456.0)] == ["–", "3", "0", "0.0123", "123", "123,000"]
-    assert interval({"low": 0.5, "high": 2.0}, 100.0) == "50 to 200"
+    assert interval({"low": 0.5, "high": 2.0, "runs": 2}, 100.0) == "50 to 200"
+
+
+def test_one_run_has_no_interval():
+    one = {"low": 0.5, "high": 0.5, "runs": 1}
+    assert interval(one) == "–"
+    assert within("0.5", one) == "0.5"
+    assert within("0.5", one, more="3 distances") == "0.5 (3 distances)"
+    assert within("0.5", one | {"runs": 2, "high": 0.7}, more="3 distances") == "0.5 (0.5 to 0.7; 3 distances)"
+
+
+def pooled(backend, **changes):
+    pose = {"mean": 1.2, "low": 1.0, "high": 1.4, "runs": 12}
+    row = {"backend": backend, "arm": "closed", "complete": 12, "trials": 12, "pose_anees": pose, "map_anees": pose}
+    return row | {"wall_rmse_m": pose | {"mean": 0.012}} | changes
+
+
+def against(first, second, measure, value):
+    told = {"first": first, "second": second, "arm": "closed", "measure": measure, "value": value, "runs": 12}
+    return told | {"low": 0.9 * value, "high": 1.1 * value}
+
+
+def test_the_story_is_that_of_the_campaign():
+    plain = Campaign(("rooms",), ("graph", "full-ekf"), ("nearest-robot",), 12, arms=("closed",))
+    said = {"hypothesis": None, "pooled": [pooled("graph"), pooled("full-ekf")], "strategies": []}
+    said["backends"] = [
+        against("graph", "full-ekf", "wall_rmse_m", 0.8),
+        against("graph", "full-ekf", "pose_anees", 2.0),
+    ]
+    story = story_of(plain, said)
+    assert story.title == "Estimators compared: graph and full-ekf"
+    assert "cross-correlations" not in story.title + story.question
+    assert len(story.verdict) == 1
+    assert "walls 0.8 times (0.72 to 0.88)" in story.verdict[0]
+    assert "pose ANEES 2 times (1.8 to 2.2)" in story.verdict[0]
+
+    strategies = replace(plain, backends=("graph",), strategies=("frontier", "nearest-robot"), trials=3)
+    said |= {"pooled": [pooled("graph")], "backends": []}
+    said["strategies"] = [against("frontier", "nearest-robot", "path_length_m", 1.5)]
+    story = story_of(strategies, said)
+    assert story.title == "Strategies compared: frontier and nearest-robot"
+    assert "way driven 1.5 times (1.35 to 1.65)" in story.verdict[0]
+    assert story.verdict[1].startswith("3 runs a cell: too few")
+
+    one = replace(plain, backends=("graph",), trials=1)
+    story = story_of(one, said | {"strategies": []})
+    assert story.title == "graph by nearest-robot"
+    assert story.question.startswith("A robot maps rooms, one run each.")
+    assert "graph: 12 of 12 runs complete, pose ANEES 1.2 (1 to 1.4)" in story.verdict[0]
+
+
+def test_lengths_that_no_run_reached_are_left_out():
+    row = dict.fromkeys(("pose_error_m", "wall_rmse_m", "pose_anees_so_far", "coverage"), 0.5) | {"without": {}}
+    row |= {"world": "w", "strategy": "s", "arm": "closed", "finished": 1, "failed": 0}
+    cells = (("a", "10", 0), ("b", "10", 1), ("a", "20", 0), ("b", "20", 0), ("a", "end", 0))
+    rows = [row | {"backend": name, "metres": metres, "driving": driving} for name, metres, driving in cells]
+    table = marks_table({"marks": rows})
+    assert [(cells[2], cells[3]) for cells in table.rows] == [("a", "10"), ("b", "10"), ("a", "end")]
 
 
 def test_the_command_on_the_page_runs_the_campaign_again():

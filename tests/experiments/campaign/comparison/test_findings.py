@@ -13,7 +13,7 @@ ARMS = ("closed", "replay-true")
 
 
 def told(mean, low=None, high=None):
-    return {"mean": mean, "low": low or mean, "high": high or mean, "low_buildings": None}
+    return {"mean": mean, "low": low or mean, "high": high or mean, "low_buildings": None, "runs": 20}
 
 
 def row(backend, arm="closed", **scores):

@@ -51,6 +51,15 @@ def test_what_is_held_against_what_is_told():
     assert list(found["marks"]) == list(MARKS)
 
 
+def test_the_last_mark_that_a_run_reached_decides():
+    def reached(*marks):
+        return [each | {"state": "driving" if each["metres"] in marks else "finished"} for each in campaign()]
+
+    assert hypothesis(reached("10", "20"))["decisive_mark"] == "20"
+    assert hypothesis(reached("10"))["decisive_mark"] == "10"
+    assert hypothesis(reached())["decisive_mark"] == "end"
+
+
 @pytest.mark.parametrize("metres", MARKS)
 def test_at_each_mark_the_contender_is_so_many_times_as_wrong(metres):
     at = hypothesis(campaign())["marks"][metres]
