@@ -113,7 +113,14 @@ rules-held: setup
 rules-table: setup
 	$(BIN)/python -m studies.rules.report
 
+.PHONY: pictures
+
+# The site, in docs/_build/index.html: it needs no network, and every warning is an error.
 docs: setup
+	$(BIN)/sphinx-build -q -W --keep-going docs docs/_build
+
+# Every picture of the documentation, from runs made now.
+pictures: setup
 	docs/make-pictures
 
 smoke: setup

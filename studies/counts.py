@@ -167,7 +167,7 @@ def page(numbers: Iterable[Number]) -> str:
     """Return a page in Markdown: the numbers of each file, with their values and what they are."""
     lines = [PREFACE]
     for file, own in groupby(numbers, lambda each: each.file):
-        lines += [f"### `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
+        lines += [f"## `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
         lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in own]
         lines.append("")
     return "\n".join(lines)
