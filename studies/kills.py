@@ -1,6 +1,6 @@
 """Is anything lost when a run or a campaign is killed? Each is killed at random moments and goes on till it ends.
 
-What it has left then is held, byte by byte and times apart, against what it leaves undisturbed. Where it could not
+What it has left then is held, byte by byte timings excepted, against what it leaves undisturbed. Where it could not
 yet write its settings the same command is given again; otherwise `explore --resume`, or the same `compare`. A third
 are killed once more while they go on. The moments come from a seed, how far a process is by then does not.
 """

@@ -29,7 +29,7 @@ def write(path: Path, content: bytes) -> None:
             os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
-        # A full disk names no file, and the temporary name is nobody's business.
+        # A full disk names no file, and users should not see the temporary name.
         error.filename, error.filename2 = str(path), None
         raise
     finally:

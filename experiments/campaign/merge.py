@@ -24,8 +24,8 @@ SHARED = ("driver", "p0", "max_steps", "settings")
 def merge(folders: Sequence[Path], out: Path) -> None:
     """Write the folder of all trials of some campaigns; raises UsageError where they do not belong together.
 
-    A trial that several of them have must have come out the same in all, times apart. A merge that was killed goes on
-    when it is begun again.
+    A trial that several of them have must have come out the same in all, timings excepted. A merge that was killed
+    goes on when it is begun again.
     """
     if len(folders) < 2:
         raise UsageError(f"expected two or more campaigns to merge, found {len(folders)}: name another")
@@ -91,13 +91,13 @@ def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
 
 
 def same(first: TrialScores, second: TrialScores) -> bool:
-    """Return whether two results are the same, times apart."""
+    """Return whether two results are the same, timings excepted."""
     keys = [record.summary.keys() - TIMED for record in (first, second)]
     return keys[0] == keys[1] and first.arrays.keys() == second.arrays.keys() and agree(first, second)
 
 
 def agree(first: TrialScores, second: TrialScores) -> bool:
-    """Return whether two results are the same in all that both hold, times apart: a later version may keep more."""
+    """Return whether two results are the same in all that both hold, but for timings: later versions may keep more."""
     keys, names = first.summary.keys() & second.summary.keys() - TIMED, first.arrays.keys() & second.arrays.keys()
     return all(first.summary[key] == second.summary[key] for key in keys) and all(
         np.array_equal(first.arrays[name], second.arrays[name], equal_nan=True) for name in names

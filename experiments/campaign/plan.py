@@ -28,7 +28,7 @@ PAPER_STRATEGIES = ("nearest-robot", "same-chain", "nearest-start")
 
 @dataclass(frozen=True)
 class Campaign:
-    """All that decides the tables of a campaign: the same values give the same bytes, times apart."""
+    """All that decides the tables of a campaign: the same values give the same bytes, timings excepted."""
 
     worlds: tuple[str, ...]
     backends: tuple[str, ...]

@@ -36,7 +36,7 @@ FIGURES: dict[str, tuple[str, float]] = {
     "pose_rmse_m": ("pose error, cm rms", 100.0), "heading_rmse_rad": ("heading error, degrees rms", 180.0 / np.pi),
     "odometry_max_m": ("odometry alone, worst, m", 1.0), "pose_anees": ("pose ANEES (1 is ideal)", 1.0),
     "pose_nees_in_band": ("steps in the 95 % band, %", 100.0), "map_anees": ("map ANEES (1 is ideal)", 1.0),
-    "false_matches": ("false matches", 1.0), "duplicate_lines": ("walls twice in the map", 1.0),
+    "false_matches": ("false matches", 1.0), "duplicate_lines": ("duplicate walls", 1.0),
     "collisions": ("collisions", 1.0),
 }  # fmt: skip
 """What the table tells: the key of summary.json, words, and what it is multiplied by."""

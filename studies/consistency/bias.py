@@ -36,7 +36,7 @@ from .faults import Fault, faulty
 KEY = ("world", "strategy", "fault", "size", "association", "backend", "seed")
 SCORES = ("pose_anees", "map_anees", "ate_cm", "walls_cm", "shape_cm", "duplicate_lines", "false_matches")
 SHOWN = ("pose ANEES", "map ANEES", "path, cm", "walls, cm", "shape of the map, cm")
-BY_OWN_GATE = ("walls twice in the map", "false matches")
+BY_OWN_GATE = ("duplicate walls", "false matches")
 RELOCATING = (("block-ekf", "joint-block-ekf"), ("relocation-ekf", "full-ekf"))
 Kind = Literal["wheel-scale", "heading", "range", "range-noise"]
 

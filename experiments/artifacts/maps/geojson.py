@@ -1,5 +1,6 @@
 """The map as GeoJSON, in local metres: walls and corners with covariances, chains, what is left open or unseen."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
             *_wall_features(walls, chains, joint),
             *(_corner_feature(k, corner, joint) for k, corner in enumerate(found)),
             *(_open_end_feature(end) for end in certificate.open_ends),
-            *(_frontier_feature(border) for border in certificate.frontiers or ()),
-            *(_obstacle_feature(thing) for thing in certificate.obstacles or ()),
+            *_numbered(_frontier_feature(border) for border in certificate.frontiers or ()),
+            *_numbered(_obstacle_feature(thing) for thing in certificate.obstacles or ()),
             _trajectory_feature(log),
             _start_feature(log),
         ],
@@ -49,11 +50,23 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
 
 
 def _feature(geometry: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    """Return a feature whose id is unique in the file: its kind with its number, where it has one."""
     return {
         "type": "Feature",
+        "id": _id_of(properties),
         "geometry": {"type": geometry, "coordinates": coordinates},
         "properties": properties,
     }
+
+
+def _id_of(properties: dict[str, Any]) -> str:
+    kind = str(properties["kind"])
+    numbers = {"wall": ("id",), "corner": ("id",), "chain": ("chain",), "open-end": ("wall", "side")}.get(kind, ())
+    return "-".join([kind, *(str(properties[name]) for name in numbers)])
+
+
+def _numbered(features: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [feature | {"id": f"{feature['id']}-{number}"} for number, feature in enumerate(features)]
 
 
 def _wall_features(walls: StochasticMap, chains: tuple[Chain, ...], joint: Joint | None) -> list[dict[str, Any]]:

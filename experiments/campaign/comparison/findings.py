@@ -38,7 +38,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
         ("anees", "graph", f"interval of the mean pose ANEES within {anees}", _anees),
         ("held", "graph", f"95 % intervals of distances hold the truth in {held}", _held),
         ("held", PAPER, "95 % intervals of distances hold the truth: how rarely", lambda row: (_held(row)[0], None)),
-        *(("doubles", name, f"no more walls twice than the {refused} that its gate must refuse", _doubles)
+        *(("doubles", name, f"no more duplicate walls than the {refused} that its gate must refuse", _doubles)
           for name in names),
     ]  # fmt: skip
     found = []

@@ -46,7 +46,7 @@ def verdict(said: dict[str, Any]) -> tuple[str, ...]:
     """Return the answer, a paragraph each."""
     count = said["trials"]
     if not count["different"]:
-        return (f"No: all {count['shared']} trials that both have came out the same, times apart.",)
+        return (f"No: all {count['shared']} trials that both have came out the same, timings excepted.",)
     told = [row for row in said["differences"] if row["value"] is not None]
     firm = [row for row in told if row["runs"] >= FEW_RUNS]
     clear = [row for row in firm if _is_clear(row)]

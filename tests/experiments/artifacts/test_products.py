@@ -47,6 +47,9 @@ def test_geojson_holds_valid_shapes_and_says_that_it_is_in_metres(explored, worl
     _, folder = explored
     document = json.loads((folder / "map.geojson").read_text())
     assert document["crs"]["properties"]["name"].startswith("LOCAL_CS")
+    ids = [feature["id"] for feature in document["features"]]
+    assert len(set(ids)) == len(ids)
+    assert {"wall-0", "corner-0", "chain-0", "trajectory", "start"} <= set(ids)
     assert "metres" in document["coordinate_system"]
     shapes = {}
     for feature in document["features"]:

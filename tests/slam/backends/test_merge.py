@@ -22,7 +22,7 @@ def wall(r, t0, noise):
 
 
 def two_of_one_wall(name):
-    """Return a back end that entered one wall twice, from two places, and another wall between."""
+    """Return a back end that entered one wall as two landmarks, from two places, and another wall between."""
     rng = np.random.default_rng(21)
     backend = BACKENDS[name].make(START.copy(), P0.copy())
 

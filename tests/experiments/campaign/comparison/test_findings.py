@@ -122,7 +122,7 @@ def test_each_claim_is_told_in_its_own_words():
     everyone = ("block-ekf", "full-ekf", "fej-ekf", "invariant-ekf", "graph")
     said = findings([row(name) for name in everyone], 0.995)
     doubles_of = {
-        ("doubles", name): "no more walls twice than the 0.5 % that its gate must refuse" for name in everyone
+        ("doubles", name): "no more duplicate walls than the 0.5 % that its gate must refuse" for name in everyone
     }
     assert {(f["kind"], f["backend"]): f["claim"] for f in said} == WORDS | doubles_of
     assert len(said) == len(WORDS) + len(doubles_of)

@@ -210,4 +210,4 @@ def test_the_tables_of_a_campaign_hold_each_trial_once_cell_by_cell(tmp_path):
     assert said["hypothesis"] is None
     told = {(f["kind"], f["backend"]): f["arms"]["closed"]["found"] for f in said["findings"]}
     assert told["outside", "block-ekf"] == {"share": 1.0}
-    assert "no more walls twice than the 1 % that its gate must refuse" in {f["claim"] for f in said["findings"]}
+    assert "no more duplicate walls than the 1 % that its gate must refuse" in {f["claim"] for f in said["findings"]}

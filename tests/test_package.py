@@ -1,0 +1,88 @@
+"""Wheel and source archive: each holds all that a run outside the checkout needs."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.long
+
+
+def run(*words, cwd, **env):
+    done = subprocess.run(
+        [str(word) for word in words], cwd=cwd, capture_output=True, text=True, env=os.environ | env, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """The files under version control, elsewhere: nothing that lies about here gets into a package."""
+    copy = tmp_path_factory.mktemp("sources")
+    listed = run("git", "ls-files", "--cached", "--others", "--exclude-standard", cwd=ROOT).splitlines()
+    for name in listed:
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, copy / name)
+    return copy
+
+
+def wheel_of(folder, out):
+    pip = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index")
+    run(*pip, "--wheel-dir", out, folder, cwd=out)
+    return next(out.glob("*.whl"))
+
+
+@pytest.fixture(scope="module", params=["from the checkout", "from the source archive"])
+def wheel(request, sources, tmp_path_factory):
+    out = tmp_path_factory.mktemp("wheel")
+    if request.param == "from the checkout":
+        return wheel_of(sources, out)
+    words = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    run(sys.executable, "-c", words, out, cwd=sources)
+    with tarfile.open(next(out.glob("*.tar.gz"))) as archive:
+        archive.extractall(out, filter="data")
+    return wheel_of(next(folder for folder in out.iterdir() if folder.is_dir()), out)
+
+
+def test_what_is_installed_runs_outside_the_checkout(wheel, tmp_path):
+    venv.create(tmp_path / "venv", with_pip=False)
+    packages = Path(sysconfig.get_path("purelib", vars={"base": str(tmp_path / "venv")}))
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--quiet",
+        "install",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        packages,
+        wheel,
+        cwd=tmp_path,
+    )
+    # The dependencies are those of this environment; its editable chainslam comes after the one just installed.
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    python, code = (
+        tmp_path / "venv" / "bin" / "python",
+        "import sys; from experiments.commands.cli import main; sys.exit(main())",
+    )
+    env = {"OMP_NUM_THREADS": "1", "PYTHONPATH": ""}
+    where = run(python, "-c", "import experiments, sim; print(experiments.__file__, sim.__file__)", cwd=tmp_path, **env)
+    assert [Path(path).is_relative_to(packages) for path in where.split()] == [True, True]
+    assert "paper-fig8" in run(python, "-c", code, "worlds", cwd=tmp_path, **env)
+    assert run(python, "-c", code, "--version", cwd=tmp_path, **env).startswith("chainslam ")
+    run(python, "-c", code, "explore", "paper-fig8", "--max-steps", "20", "--out", "run", cwd=tmp_path, **env)
+    assert (tmp_path / "run" / "map.png").is_file()
+    run(python, "-c", code, "report", "run", cwd=tmp_path, **env)
+    assert (tmp_path / "run" / "report.html").is_file()
+    assert all((packages / room / "py.typed").is_file() for room in ("slam", "explore", "sim", "viz", "experiments"))
+    assert (packages / "../../../bin/chainslam").resolve().is_file() or (packages / "bin" / "chainslam").is_file()
