@@ -20,12 +20,15 @@ class MapperConfig:
 
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
-    vertices: VerticesConfig = field(default_factory=VerticesConfig)
+    vertices: VerticesConfig | None = field(default_factory=VerticesConfig)
+    """None where no segment is cut at bends that the map knows, and no wall for them."""
     chains: ChainConfig = field(default_factory=ChainConfig)
     walls: WallsConfig = field(default_factory=WallsConfig)
     candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
     openings: OpeningsConfig = field(default_factory=OpeningsConfig)
     ambiguity: AmbiguityConfig = field(default_factory=AmbiguityConfig)
-    change_points: ChangePointsConfig = field(default_factory=ChangePointsConfig)
+    change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
+    """None where no wall is cut for bends that only all scans together show; they are never looked for either where
+    `vertices` is None."""
     merging: MergingConfig | None = field(default_factory=MergingConfig)
     """None where one wall may stand in the map twice."""

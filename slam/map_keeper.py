@@ -11,6 +11,7 @@ from .estimation.backend import Backend
 from .extraction.segments import Segments
 from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
+from .map.change_points import ChangePointsConfig
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
 from .map.stochastic_map import StochasticMap
@@ -24,7 +25,8 @@ class MapKeeper:
     def __init__(self, backend: Backend, config: MapperConfig) -> None:
         self.backend = backend
         self.config = config
-        self.landmarks = Landmarks(config.walls, config.change_points, config.openings, config.chains)
+        change_points = config.change_points or ChangePointsConfig()
+        self.landmarks = Landmarks(config.walls, change_points, config.openings, config.chains)
         self._candidates = LandmarkCandidates(config.candidates)
 
     def map(self) -> StochasticMap:
@@ -90,6 +92,8 @@ class MapKeeper:
     def _ended(self, scan: Scan) -> StochasticMap:
         """Return the map, in which the sides of a bend end where they meet."""
         walls = self.map()
+        if self.config.vertices is None:
+            return walls
         pairs, along = meetings(walls, scan.range_max_m, self.config.vertices, self.landmarks.change_points.cut)
         if not len(pairs):
             return walls

@@ -1,15 +1,16 @@
 """The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from .association.ambiguity import observed_either_way
-from .association.matching import KnownWalls, Matches, match
-from .association.view import Matcher, View
+from .association.matching import KnownWalls, Matches
+from .association.methods import METHODS, Matcher
+from .association.view import View
 from .config import MapperConfig
 from .estimation.backend import Backend, Observations
 from .extraction.config import ExtractionConfig
@@ -19,7 +20,7 @@ from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map.vertices import laid_across, mistaken, vertices_within
+from .map.vertices import VerticesConfig, laid_across, mistaken, vertices_within
 from .map_keeper import MapKeeper
 from .robot import Odometry, Scan
 
@@ -60,12 +61,13 @@ class Mapper:
         backend: Backend,
         config: MapperConfig = MapperConfig(),
         extractor: Extractor = extract,
-        matcher: Matcher = match,
+        matcher: Matcher | None = None,
     ) -> None:
         self.backend = backend
         self.config = config
         self._extract = extractor
-        self._match = matcher
+        method = METHODS[config.matching.method]
+        self._method = method if matcher is None else replace(method, matcher=matcher)
         self._keeper = MapKeeper(backend, config)
 
     def predict(self, odometry: Odometry) -> None:
@@ -82,8 +84,8 @@ class Mapper:
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         first = self._reliable(clear, segments)
         relocated = view.localised(first)
-        # 4. Match the remaining features with their re-prediction from the new robot pose.
-        matches = view.match_rest(clear, relocated)
+        # 4. Match features with their re-prediction from the new robot pose.
+        matches = view.match_again(clear, relocated)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
         self.backend.update(first, self._reliable(matches, segments) or self._ambiguous(view, matches))
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
@@ -95,7 +97,9 @@ class Mapper:
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
         walls = self._keeper.map()
-        segments = self._segments(scan, walls)
+        if self.config.vertices is None:
+            return self._pieces(scan), walls
+        segments = self._segments(scan, walls, self.config.vertices)
         return segments, self._keeper.without(mistaken(segments, walls, self.config.vertices), walls)
 
     def _view(self, scan: Scan, segments: Segments, walls: StochasticMap) -> View:
@@ -103,7 +107,7 @@ class Mapper:
         lost_m = 3.0 * float(np.sqrt(np.trace(walls.belief.pose_cov[:2, :2])))
         near = walls.distances_m < scan.range_max_m + max(self.config.matching.offset_m, lost_m)
         known = KnownWalls(walls.ids[near], walls.extents[near])
-        return View(segments, known, self.backend.belief.joint(known.ids), self._match, self.config.matching)
+        return View(segments, known, self.backend.belief.joint(known.ids), self._method, self.config.matching)
 
     def _reliable(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
@@ -120,18 +124,18 @@ class Mapper:
         cov = as_told(observed.cov[reliable], segments.is_tentative[rows[reliable]], self.config.walls.reliability)
         return Observations(observed.ids[reliable], observed.lines[reliable], cov)
 
-    def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
+    def _segments(self, scan: Scan, walls: StochasticMap, vertices: VerticesConfig) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
         segments = self._pieces(scan)
-        bends = self._bends(segments, walls)
+        bends = self._bends(segments, walls, vertices)
         return self._pieces(scan, bends) if len(bends) else segments
 
     def _pieces(self, scan: Scan, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES) -> Segments:
         config = self.config.extraction
         return sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
 
-    def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
-        return vertices_within(segments, walls, self.config.vertices, self._keeper.landmarks.change_points.cut)
+    def _bends(self, segments: Segments, walls: StochasticMap, vertices: VerticesConfig) -> Float[np.ndarray, " b"]:
+        return vertices_within(segments, walls, vertices, self._keeper.landmarks.change_points.cut)
 
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
@@ -141,16 +145,18 @@ class Mapper:
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
         """
-        change_points = self._keeper.landmarks.change_points
+        vertices, change_points = self.config.vertices, self._keeper.landmarks.change_points
+        if vertices is None or self.config.change_points is None:
+            return segments, matches, NONE
         change_point = change_points.see(self.backend.belief, scan, segments, matches.pairs)
         if change_point is None:
             return segments, matches, NONE
         walls = self._keeper.map()
-        pieces = self._pieces(scan, np.append(self._bends(segments, walls), change_point.bearing_rad))
+        pieces = self._pieces(scan, np.append(self._bends(segments, walls, vertices), change_point.bearing_rad))
         clear = np.flatnonzero(are_clear(pieces, self.config.walls.reliability))
         sides = change_points.sides_of(change_point, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
-        across = laid_across(walls, change_point.wall, change_point.along_m, self.config.vertices)
+        across = laid_across(walls, change_point.wall, change_point.along_m, vertices)
         view = self._view(scan, pieces, self._keeper.without(np.union1d(across, change_point.wall), walls))
         return pieces, view.match_all(), clear[list(sides)]

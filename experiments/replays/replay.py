@@ -23,8 +23,7 @@ from sim.logs.recorded_robot import (
 )
 from sim.robot import TrueRecord
 from sim.worlds import World
-from slam.association.matching import match
-from slam.association.view import Matcher
+from slam.association.methods import METHODS, Matcher
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
 from slam.extraction.extract import extract
@@ -185,7 +184,7 @@ def replay(
             scenario.backend,
             rules,
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
-            around(match if oracle is None else oracle),
+            around(METHODS[rules.matching.method].matcher if oracle is None else oracle),
         )
         return ride_mission(scenario.robot, mapper, len(recording))
 

@@ -5,6 +5,7 @@ beside a door stay two), and the side from which each was seen (so that two face
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +19,7 @@ from ..geometry.poses import to_world
 from .hypotheses import agree, nearest_alone
 from .joint_compatibility import compatible, squared_distances, taken_together
 
+MatchingMethod = Literal["joint", "paper"]
 OVERLAP_SHARE = 0.5
 """A short segment lies along a wall that covers at least this share of it."""
 
@@ -26,6 +28,8 @@ OVERLAP_SHARE = 0.5
 class MatchingConfig:
     """When a segment and a wall are one."""
 
+    method: MatchingMethod = "joint"
+    """All segments of a scan together, or each alone as in the paper, by `gate` and `apart_m` only (`methods`)."""
     gate: float = 0.99
     """Probability level of the chi-square gate."""
     doubt: float = 0.999999
@@ -52,6 +56,8 @@ class MatchingConfig:
     the landmark that it fits better, which keeps them apart."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
+    apart_m: float = 0.3
+    """Of method `paper`: largest distance between a segment and its wall, half the width of a narrow door."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +83,13 @@ class Matches:
         return Observations(self.pairs[:, 1], segments.lines[rows], segments.cov[rows])
 
 
+NONE_AMBIGUOUS = np.zeros((0, 3), dtype=np.int64)
 NO_MATCHES = Matches(
     np.zeros((0, 2), dtype=np.int64),
     np.zeros(0),
     np.zeros(0, dtype=np.int64),
     np.zeros(0, dtype=np.int64),
-    np.zeros((0, 3), dtype=np.int64),
+    NONE_AMBIGUOUS,
     {},
 )
 
@@ -159,7 +166,7 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     lines, cov = segments.lines[segment], segments.cov[segment]
     model = innovations(pose, joint.anchors[line], means[line], lines, cov)
     model = halfway(model, lines, cov, model.e[:, 0] * _share_of_heading(line, joint, model))
-    d2 = _distances(model, line, joint)
+    d2 = pair_distances(model, line, joint)
     near = (np.abs(model.e[:, 1]) < config.offset_m) | (d2 <= gate_level(config.doubt, 2))
     segment, line = segment[near], line[near]
     gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
@@ -198,8 +205,8 @@ def _is_beside(found: _Candidates, segments: Segments, config: MatchingConfig) -
     )
 
 
-def _distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) -> Float[np.ndarray, " c"]:
-    """Squared Mahalanobis distance of each pair, from the joint covariance of pose and line."""
+def pair_distances(model: Innovations, line: Int[np.ndarray, " c"], joint: Joint) -> Float[np.ndarray, " c"]:
+    """Return the squared Mahalanobis distance of each pair, from the joint covariance of pose and line."""
     columns = 3 + 2 * line[:, None] + np.arange(2)
     pose_line = joint.cov[:3][:, columns].transpose(1, 0, 2)
     line_line = joint.cov[columns[:, :, None], columns[:, None, :]]

@@ -1,25 +1,13 @@
 """One scan beside the walls that it can show: matched, used to localise, and matched again (paper, section 2.2)."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
-from .joint_compatibility import relocate
 from .matching import KnownWalls, Matches, MatchingConfig
-
-
-@runtime_checkable
-class Matcher(Protocol):
-    """Tells which wall each segment of a scan belongs to; an oracle may take its place."""
-
-    def __call__(
-        self, segments: Segments, walls: KnownWalls, joint: Joint, config: MatchingConfig, *, clear_only: bool = False
-    ) -> Matches:
-        """Return the matches by the joint Gaussian of the pose and these walls; `clear_only`: those beyond doubt."""
-        ...
+from .methods import Method
 
 
 @dataclass(frozen=True)
@@ -30,25 +18,27 @@ class View:
     walls: KnownWalls
     joint: Joint
     """Of the pose and these walls, before the scan."""
-    matcher: Matcher
+    method: Method
     config: MatchingConfig
 
     def match_clear(self) -> Matches:
         """Return the matches that are beyond doubt."""
-        return self.matcher(self.segments, self.walls, self.joint, self.config, clear_only=True)
+        return self.method.matcher(self.segments, self.walls, self.joint, self.config, clear_only=True)
 
     def match_all(self) -> Matches:
         """Return all matches, from the pose before the scan."""
-        return self.matcher(self.segments, self.walls, self.joint, self.config)
+        return self.method.matcher(self.segments, self.walls, self.joint, self.config)
 
     def localised(self, first: Observations) -> Joint:
         """Return pose and walls as they are known once some walls were observed."""
-        return relocate(self.joint, self.walls.ids, first)
+        return self.method.relocate(self.joint, self.walls.ids, first)
 
-    def match_rest(self, clear: Matches, relocated: Joint) -> Matches:
-        """Return the clear matches together with those of the remaining segments from the new pose."""
+    def match_again(self, clear: Matches, relocated: Joint) -> Matches:
+        """Return the matches from the new pose: of the remaining segments, beside the clear ones, or of all."""
+        if not self.method.clear_stay:
+            return self.method.matcher(self.segments, self.walls, relocated, self.config)
         rest = clear.unmatched
-        again = self.matcher(self.segments.take(rest), self.walls, relocated, self.config)
+        again = self.method.matcher(self.segments.take(rest), self.walls, relocated, self.config)
         more = again.pairs.copy()
         more[:, 0] = rest[more[:, 0]]
         return Matches(

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.association.matching import KnownWalls, Matches, MatchingConfig
-from slam.association.view import Matcher
+from slam.association.methods import Matcher
 from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
 from slam.evaluation.consistency import nis
