@@ -113,7 +113,11 @@ rules-held: setup
 rules-table: setup
 	$(BIN)/python -m studies.rules.report
 
-.PHONY: pictures
+.PHONY: pictures results
+
+# The tables of docs/results.md from stored rows; says which rows are of another version of the code.
+results: setup
+	$(BIN)/python -m studies.results.page
 
 # The site, in docs/_build/index.html: it needs no network, and every warning is an error.
 docs: setup
