@@ -1,0 +1,1 @@
+"""The page of results: its tables, made from stored rows."""

@@ -1,0 +1,260 @@
+"""The headline tables of the results: what was asked, from which rows, and what they answer."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..runner.rows import Row
+
+STORED = Path("studies/results/rows")
+Table = list[list[str]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What rows came to."""
+
+    table: Table
+    """The first row holds the columns' names."""
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Headline:
+    """One table of the page."""
+
+    title: str
+    aim: str
+    command: str
+    """What makes its rows."""
+    rows: Path
+    make: Callable[[Sequence[Row]], Found]
+
+
+def intervals(rows: Sequence[Row]) -> Found:
+    """Return which share of the stated intervals holds the truth, by back end."""
+    table: Table = [["back end", "runs", "intervals that hold the truth", "map ANEES: mean, median"]]
+    shares = {}
+    for backend, mine in _by(rows, "backend").items():
+        shares[backend] = 100 * _mean(mine, "held")
+        table.append([f"`{backend}`", str(len(mine)), f"{shares[backend]:.1f} %", _both(mine, "map_anees")])
+    within = _names([name for name, share in shares.items() if 93 <= share <= 97])
+    beyond = _names([f"{name} ({share:.1f} %)" for name, share in shares.items() if not 93 <= share <= 97])
+    return Found(table, f"Reached by {within}. Missed by {beyond}.")
+
+
+def paper(rows: Sequence[Row]) -> Found:
+    """Return the pose's ANEES in the paper's two noisy worlds, and its distances, by back end."""
+    names = list(rows[0]["numbers"])
+    table: Table = [["", *(f"`{name}`" for name in names)]]
+    for figure, words in (("fig8", "figure 8"), ("fig9", "figure 9")):
+        found = [row["numbers"] for row in rows if row["figure"] == figure]
+        for score in ("pose ANEES (1 is ideal)", "map ANEES (1 is ideal)"):
+            medians = [float(np.median([numbers[name][score] for numbers in found])) for name in names]
+            kind = score.partition(" (")[0]
+            table.append([f"{words}, {len(found)} drives: {kind}, median", *(f"{value:.3g}" for value in medians)])
+    held = {name: [0, 0] for name in names}
+    for row in rows:
+        if row["figure"] == "table1":
+            for name in names:
+                inside = [value for key, value in row["numbers"][name].items() if key.endswith("in its interval")]
+                held[name][0] += sum(inside)
+                held[name][1] += len(inside)
+    table.append(["Table 1: distances inside their 95 % interval", *(f"{a} of {b}" for a, b in held.values())])
+    scores = {
+        name: [r["numbers"][name]["pose ANEES (1 is ideal)"] for r in rows if r["figure"] in ("fig8", "fig9")]
+        for name in names
+    }
+    others = max(value for name in names[1:] for value in scores[name])
+    verdict = (
+        f"The pose ANEES of `{names[0]}` is {min(scores[names[0]]):.0f} or more in every drive. Of the others the "
+    )
+    return Found(table, f"{verdict}largest in any drive is {others:.1f}, and their medians are near 1.")
+
+
+def bundled(rows: Sequence[Row]) -> Found:
+    """Return completion, coverage and consistency of the bundled worlds."""
+    errorless = rows[0]["errorless"]
+    table: Table = [["world", "complete", "coverage: least", "contours closed", "path, mean"]]
+    if not errorless:
+        table[0] += ["pose ANEES: mean, median", "map ANEES: mean, median", "false matches"]
+    for world, mine in _by(rows, "world").items():
+        cells = [f"`{world}`", _complete(mine), f"{min(row['coverage'] for row in mine):.4f}", _closed(mine)]
+        cells.append(f"{_mean(mine, 'path_length_m'):.1f} m")
+        if not errorless:
+            cells += [_both(mine, "pose_anees"), _both(mine, "map_anees"), str(_sum(mine, "false_matches"))]
+        table.append(cells)
+    return Found(table, f"{_complete(rows)} complete, {_closed(rows)} contours closed, {_touches(rows)}.")
+
+
+def apartments(rows: Sequence[Row]) -> Found:
+    """Return what exploring apartments with noise came to."""
+    coverage = [row["coverage"] for row in rows]
+    crooked = _both(rows, "map_anees_straight")
+    table: Table = [
+        ["measure", "value"],
+        ["complete", _complete(rows)],
+        ["coverage: mean, median, least", f"{np.mean(coverage):.4f}, {np.median(coverage):.4f}, {min(coverage):.3f}"],
+        ["contours closed", _closed(rows)],
+        ["false matches, duplicate walls", f"{_sum(rows, 'false_matches')}, {_sum(rows, 'duplicate_lines')}"],
+        ["pose ANEES: mean, median", _both(rows, "pose_anees")],
+        ["map ANEES: mean, median", _both(rows, "map_anees")],
+        ["map ANEES without walls that the map calls crooked", crooked],
+        ["planning, mean of a step", f"{_mean(rows, 'planning_ms_mean'):.1f} ms"],
+    ]
+    verdict = f"Completion is reached: {_complete(rows)}, {_touches(rows)}. The map is overconfident: some short lines "
+    return Found(table, verdict + "take beams from several faces ([limits](limits.md)).")
+
+
+def schools(rows: Sequence[Row]) -> Found:
+    """Return how eight back ends fare in schools over a limited number of steps."""
+    head = ["back end", "runs", "exceptions", "pose ANEES: median", "map ANEES: median"]
+    table: Table = [[*head, "coverage by then: mean", "false matches"]]
+    maps = {name: float(np.median(_values(mine, "map_anees"))) for name, mine in _by(rows, "backend").items()}
+    for backend, mine in _by(rows, "backend").items():
+        medians = [_median(mine, name) for name in ("pose_anees", "map_anees")]
+        own = _mean(mine, "coverage_own_frame")
+        failed = sum(bool(row["raised"]) for row in mine)
+        cells = [f"`{backend}`", str(len(mine)), str(failed), *medians]
+        table.append([*cells, f"{own:.3f}", str(_sum(mine, "false_matches"))])
+    failed = sum(bool(row["raised"]) for row in rows)
+    verdict = "No run ended by an exception." if not failed else f"{failed} runs ended by an exception."
+    far = [value for value in maps.values() if value <= 10]
+    verdict += f" All maps are overconfident: by {min(far):.1f} to {max(far):.1f} with the cross-correlations, and by "
+    return Found(table, f"{verdict}{', '.join(f'{value:.0f}' for value in maps.values() if value > 10)} without them.")
+
+
+def courts(rows: Sequence[Row]) -> Found:
+    """Return what courts come to, where a robot begins without a wall in sight."""
+    table: Table = [["court", "runs", "floor seen: least, mean", "coverage, own frame: mean", "collisions"]]
+    for world, mine in _by(rows, "world").items():
+        swept = [row["swept"] for row in mine]
+        own = f"{_mean(mine, 'coverage_own_frame'):.3f}"
+        cells = [f"`{world}`", str(len(mine)), f"{min(swept):.3f}, {np.mean(swept):.3f}", own]
+        table.append([*cells, str(_sum(mine, "collisions"))])
+    early = sum(row["status"] == "complete" and row["swept"] < 0.99 for row in rows)
+    return Found(table, f"{early} of {len(rows)} runs ended too early. 3,000 steps do not finish such a building.")
+
+
+def navigation(rows: Sequence[Row]) -> Found:
+    """Return both navigations beside each other, over the plans that both have driven."""
+    by = {name: {row["file"]: row for row in mine} for name, mine in _by(rows, "navigation").items()}
+    both = sorted(set.intersection(*(set(mine) for mine in by.values())))
+    head = ["navigation", "runs", "complete", "path: sum", "steps: sum", "planning, mean of a step", "collisions"]
+    table: Table = [head]
+    for name, mine in by.items():
+        pairs = [mine[file] for file in both]
+        cells = [f"`{name}`", str(len(pairs)), _complete(pairs), f"{_sum(pairs, 'path_length_m'):.0f} m"]
+        planning = f"{_mean(pairs, 'planning_ms_mean'):.1f} ms"
+        table.append([*cells, str(_sum(pairs, "steps")), planning, str(_sum(pairs, "collisions"))])
+    ratio = [by["visibility"][file]["path_length_m"] / by["floor"][file]["path_length_m"] for file in both]
+    share = float(np.exp(np.mean(np.log(ratio))))
+    return Found(
+        table, f"Sequences of walls are {share:.2f} times as long as the way over the floor, and all complete."
+    )
+
+
+HEADLINES = (
+    Headline(
+        "Do the stated intervals hold the truth?",
+        "93 to 97 % of the 95 % intervals between corners hold the true distance (`paper-fig8`, closed loop, noise).",
+        "make intervals",
+        STORED / "intervals.jsonl",
+        intervals,
+    ),
+    Headline(
+        "The paper's two worlds, by four estimators on the same scans",
+        "Pose and map ANEES near 1. [The paper's figures](paper.md) has every number.",
+        "make paper",
+        Path("studies/paper/rows.jsonl"),
+        paper,
+    ),
+    Headline(
+        "Bundled worlds, errorless",
+        "All complete, coverage 1, every contour closed.",
+        "python -m studies.exploration.suite --errorless",
+        STORED / "bundled-errorless.jsonl",
+        bundled,
+    ),
+    Headline(
+        "Bundled worlds with noise",
+        "All complete, ANEES near 1 (`full-ekf`).",
+        "python -m studies.exploration.suite --seeds 5",
+        STORED / "bundled-noisy.jsonl",
+        bundled,
+    ),
+    Headline(
+        "Apartments with noise",
+        "95 % complete, mean coverage 0.99 (`invariant-ekf`, seed 1; the first of 160 apartments by name).",
+        "python -m studies.exploration.suite --plans ../shared/data/plans --named 'lifull_*' --backend invariant-ekf",
+        STORED / "apartments.jsonl",
+        apartments,
+    ),
+    Headline(
+        "Schools and offices, eight back ends",
+        "No exception in 39 buildings of 1,500 noisy steps each, seed 1.",
+        "make schools",
+        STORED / "schools.jsonl",
+        schools,
+    ),
+    Headline(
+        "Courts: a start without a wall in sight",
+        "No run ends before its floor is seen (`invariant-ekf`, 3,000 noisy steps, ten buildings, five seeds).",
+        "make courts",
+        STORED / "courts.jsonl",
+        courts,
+    ),
+    Headline(
+        "Navigation over the floor and by sequences of walls, apartments",
+        "Both complete every apartment (errorless, `full-ekf`, seed 1).",
+        "make navigation",
+        STORED / "navigation.jsonl",
+        navigation,
+    ),
+)
+
+
+def _by(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row[name], []).append(row)
+    return found
+
+
+def _values(rows: Sequence[Row], name: str) -> list[float]:
+    return [row[name] for row in rows if row[name] is not None]
+
+
+def _mean(rows: Sequence[Row], name: str) -> float:
+    return float(np.mean(_values(rows, name)))
+
+
+def _median(rows: Sequence[Row], name: str) -> str:
+    return f"{np.median(_values(rows, name)):.3g}"
+
+
+def _both(rows: Sequence[Row], name: str) -> str:
+    return f"{_mean(rows, name):.3g}, {_median(rows, name)}"
+
+
+def _sum(rows: Sequence[Row], name: str) -> int:
+    return round(sum(_values(rows, name)))
+
+
+def _complete(rows: Sequence[Row]) -> str:
+    return f"{sum(row['status'] == 'complete' for row in rows)} of {len(rows)}"
+
+
+def _closed(rows: Sequence[Row]) -> str:
+    return f"{_sum(rows, 'contours_closed')} of {_sum(rows, 'contours_reachable')}"
+
+
+def _touches(rows: Sequence[Row]) -> str:
+    count = _sum(rows, "collisions")
+    return "no collision" if not count else f"{count} collisions"
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(names) if names else "none"

@@ -1,0 +1,73 @@
+"""The page of results, made from stored rows; says which of them are of another code than this one.
+
+.venv/bin/python -m studies.results.page
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from ..runner.rows import Row, fingerprint
+from .headlines import HEADLINES, STORED, Headline
+
+PAGE = Path("docs/results.md")
+BEGIN, END = "<!-- made by `make results` -->", "<!-- end -->"
+
+
+@dataclass(frozen=True)
+class Results:
+    """Put the headline tables between two marks of the page, and print which rows are stale."""
+
+    page: Path = PAGE
+    """The page; all else on it stays."""
+
+    def run(self) -> None:
+        """Write the page and print a line for each table."""
+        text = self.page.read_text()
+        head, tail = text[: text.index(BEGIN)], text[text.index(END) :]
+        found = [(headline, newest(headline.rows)) for headline in HEADLINES]
+        body = "\n".join(section(headline, rows) for headline, rows in found if rows)
+        self.page.write_text(f"{head}{BEGIN}\n\n{body}\n{tail}")
+        for headline, rows in found:
+            print(f"{state(rows)}: {headline.title} ({len(rows)} rows in {headline.rows}; {headline.command})")
+
+
+def state(rows: Sequence[Row]) -> str:
+    """Return in one word how rows stand to the code as it is."""
+    if not rows:
+        return "missing"
+    return "current" if rows[0]["code"] == fingerprint() else "stale"
+
+
+def newest(path: Path) -> list[Row]:
+    """Return the rows of the code that has most of them in a file, the last one where several have."""
+    if not path.exists():
+        return []
+    rows: list[Row] = [json.loads(line) for line in path.read_text().splitlines()]
+    counts = Counter(row["code"] for row in reversed(rows))
+    return [row for row in rows if row["code"] == counts.most_common(1)[0][0]] if rows else []
+
+
+def section(headline: Headline, rows: Sequence[Row]) -> str:
+    """Return the part of the page for one table."""
+    found = headline.make(rows)
+    head, *lines = ["| " + " | ".join(cells) + " |" for cells in found.table]
+    rule = "|" + "---|" * len(found.table[0])
+    count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
+    made = f"{count}, made at {made_at().get(rows[0]['code'], 'a commit not recorded')}: `{headline.command}`."
+    parts = [f"## {headline.title}", f"**Aim.** {headline.aim}", "\n".join([head, rule, *lines])]
+    return "\n\n".join([*parts, f"**Verdict.** {found.verdict}", made]) + "\n"
+
+
+def made_at() -> Mapping[str, str]:
+    """Return the commit of each fingerprint of code that rows were made by."""
+    stored: dict[str, str] = json.loads((STORED / "commits.json").read_text())
+    return stored
+
+
+if __name__ == "__main__":
+    tyro.cli(Results, description=__doc__).run()
