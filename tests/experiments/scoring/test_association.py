@@ -153,3 +153,27 @@ def test_a_wall_that_is_not_along_an_axis_is_measured_along_itself(make_map):
     assert duplicate_lines(walls, np.zeros(2, np.int64), np.ones(2, bool)) == 1
     apart = replace(walls, extents=walls.extents * 0.9)
     assert duplicate_lines(apart, np.zeros(2, np.int64), np.ones(2, bool)) == 0
+
+
+def test_counts_are_whole_numbers_and_no_lines_have_no_faces(truth):
+    votes, face_of_beam = Votes(truth), np.repeat(np.arange(6), 4)
+    votes.add(segments_of([(0, 3), (8, 11)]), np.array([7, 9]), face_of_beam)
+    votes.merge(9, 11)
+    votes.merge(12, 13)
+    assert {beams.dtype for beams in votes.beams.values()} == {np.dtype(np.int64)}
+    none = votes.faces_of(np.zeros(0, dtype=np.int64))
+    assert none.dtype == np.int64
+    assert votes.walls_of(np.zeros(0, dtype=np.int64)).tolist() == []
+    assert Votes(truth).false_matches() == 0
+
+
+def test_a_line_of_one_beam_is_of_the_face_of_that_beam(truth):
+    votes = Votes(truth)
+    for face in range(6):
+        votes.beams[face] = np.eye(6, dtype=np.int64)[face]
+    assert votes.faces_of(np.arange(6)).tolist() == list(range(6))
+
+
+def test_an_overlap_of_just_twenty_centimetres_is_one_too_many(make_map):
+    walls = make_map(np.array([[[0.0, 0.0], [OVERLAP_M, 0.0]], [[0.0, 0.0], [2.0, 0.0]]]), np.zeros(3))
+    assert duplicate_lines(walls, np.zeros(2, dtype=np.int64), np.ones(2, dtype=bool)) == 1

@@ -14,12 +14,15 @@ from experiments.scoring.coverage import (
     NEAR_NOISY_M,
     PITCH_M,
     alignment,
+    began,
     closed_contours,
     coverage,
+    coverage_curve,
     covered,
     own_alignment,
     sample,
 )
+from experiments.scoring.records import Sketch
 from experiments.scoring.truth import truth_of
 from sim.robot import RobotConfig
 from sim.worlds import World
@@ -191,3 +194,26 @@ def test_a_map_that_began_in_the_blind_is_laid_on_the_truth_by_all_that_followed
     np.testing.assert_allclose(own_alignment(estimated[0], estimated, true, 2), best, atol=1e-5)
     first = own_alignment(true[0] + lost, estimated, true, 0)
     np.testing.assert_allclose(first, alignment(true[0] + lost, true[0]))
+
+
+@pytest.mark.parametrize(
+    ("lines", "step"),
+    [([1, 2, 3], 0), ([0, 0, 4, 5], 2), ([0, 3, 0, 5, 6], 3), ([0, 0, 0], 2), ([1], 0), ([0], 0), ([0, 1, 1, 1], 1)],
+)
+def test_a_map_began_after_the_last_step_without_a_line(lines, step):
+    assert began(np.array(lines)) == step
+
+
+def test_the_curve_tells_what_each_sketch_of_the_map_covers(truth, samples):
+    moved = np.array([3.0, -2.0, 0.7])
+    ends = to_world(truth.faces, inverse(moved))
+    sketches = [Sketch(0.5, ends[:1]), Sketch(2.5, ends[:3]), Sketch(7.0, ends)]
+    curve = coverage_curve(samples, sketches, moved, 0.05)
+    assert list(curve) == ["path_length_m", "coverage"]
+    assert curve["path_length_m"] == [0.5, 2.5, 7.0]
+    expected = [coverage(samples, truth.faces[:count], 0.05) for count in (1, 3, len(truth.faces))]
+    assert curve["coverage"] == pytest.approx(expected)
+    assert 0.0 < expected[0] < expected[1] < expected[2] == pytest.approx(1.0)
+    aside = [Sketch(1.0, ends + 0.08)]
+    near, far = (coverage_curve(samples, aside, moved, within_m)["coverage"][0] for within_m in (0.05, 0.3))
+    assert near < far

@@ -98,3 +98,26 @@ def test_where_the_body_does_not_fit_nothing_can_be_seen_or_swept():
     world = World("slit", shapely.box(0.0, 0.0, 5.0, 0.3), np.array([1.0, 0.15, 0.0]), {})
     assert not visible_floor(world, RobotConfig()).any()
     assert swept(world, RobotConfig(), POSE[None], np.linspace(-1.0, 1.0, 9), np.ones((1, 9))) == 0.0
+
+
+@pytest.mark.parametrize("pose", [POSE, np.array([3.6, -0.3, 2.0]), np.array([1.2, -1.9, -1.0])])
+def test_a_place_is_seen_around_once_no_cell_of_the_square_about_it_is_left(pose):
+    floor, reach_m = Floor(ROOM), 0.5
+    assert not floor.is_seen_around(pose, reach_m)
+    near = np.zeros_like(floor.free)
+    for row, column, x, y in cells():
+        near[row, column] = abs(x - pose[0]) < reach_m and abs(y - pose[1]) < reach_m
+    floor.seen |= near & floor.free
+    assert floor.is_seen_around(pose, reach_m)
+    row, column = np.argwhere(near & floor.free)[-1]
+    floor.seen[row, column] = False
+    assert not floor.is_seen_around(pose, reach_m)
+
+
+def test_a_scan_for_each_pose_or_none():
+    room = World("room", shapely.Polygon([(0, 0), (2, 0), (2, 2), (0, 2)]), np.array([1.0, 1.0, 0.0]), {})
+    bearings = np.linspace(-np.pi, np.pi, 60, endpoint=False)
+    with pytest.raises(ValueError, match="zip"):
+        swept(room, RobotConfig(), np.zeros((2, 3)), bearings, np.ones((3, 60)))
+    with pytest.raises(ValueError, match="zip"):
+        swept(room, RobotConfig(), np.zeros((3, 3)), bearings, np.ones((2, 60)))

@@ -18,6 +18,7 @@ from experiments.campaign.comparison.tables import (
     header_of,
     mark_rows,
     parquet_bytes,
+    read_rows,
     step_rows,
     trial_row,
     write_table,
@@ -26,6 +27,7 @@ from experiments.campaign.comparison.tables import (
 from experiments.campaign.plan import Campaign, Trial
 from experiments.campaign.scores.score import TrialScores
 from experiments.scoring.measurements import Z_95
+from experiments.usage import UsageError
 
 NAMES = {
     "world": "w", "strategy": "nearest-robot", "backend": "full-ekf", "mode": "closed", "association": "own", "seed": 1,
@@ -211,3 +213,40 @@ def test_the_tables_of_a_campaign_hold_each_trial_once_cell_by_cell(tmp_path):
     told = {(f["kind"], f["backend"]): f["arms"]["closed"]["found"] for f in said["findings"]}
     assert told["outside", "block-ekf"] == {"share": 1.0}
     assert "no more duplicate walls than the 1 % that its gate must refuse" in {f["claim"] for f in said["findings"]}
+
+
+def test_a_table_is_read_back_as_it_was_written(tmp_path):
+    rows = [{"world": "w", "seed": 1, "pose_anees": 1.5}, {"world": "w", "seed": 2, "pose_anees": None}]
+    folder = tmp_path / "key=value"
+    folder.mkdir()
+    (folder / "t.parquet").write_bytes(parquet_bytes(rows, list(rows[0])))
+    assert read_rows(folder / "t.parquet") == rows
+    assert read_rows(folder / "t.parquet", ("world", "seed")) == rows
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (parquet_bytes([{"world": "w"}], ["world"]), "no column seed"),
+        (b"PAR1 cut short", "no table, or one that was cut short"),
+    ],
+)
+def test_what_is_no_such_table_is_told_with_its_place_and_the_remedy(tmp_path, content, words):
+    path = tmp_path / "t.parquet"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=words) as told:
+        read_rows(path, ("world", "seed", "pose_anees"))
+    assert f"t.parquet as this version writes it in {tmp_path}" in str(told.value)
+    assert "run the same `compare` to its end" in str(told.value)
+
+
+def test_runs_without_a_nees_at_a_step_are_counted():
+    rows = step_rows([run([3.0, np.nan]), run([9.0, 2.0]), run([np.nan, np.nan])])
+    assert [row["without_nees"] for row in rows] == [1, 2]
+
+
+def test_the_gate_of_the_campaign_decides_how_many_doubles_it_must_make():
+    counts = {"matches_true": 900, "matches_missed": 100, "matches_false": 0}
+    counts |= {"duplicate_lines": 20, "merges": 0, "false_merges": 0}
+    for gate, beyond in ((GATE, 10.0), (0.95, -30.0)):
+        assert trial_row(record(counts), gate)["doubles_beyond_gate"] == pytest.approx(beyond)

@@ -126,3 +126,28 @@ def test_innovations_of_nothing_have_no_direction():
     hear(ear, [(seen(LINES[[0]]), [3]), (seen(LINES[[0]]), [3])])
     assert ear.values == pytest.approx([0.0, 0.0])
     assert ear.whiteness() is None
+
+
+def test_the_overheard_matcher_is_asked_just_what_was_asked():
+    asked, config = [], MatchingConfig(gate=0.9)
+
+    def matcher(*given, **named):
+        asked.append((given, named))
+        return NO_MATCHES
+
+    segments, overheard = seen(LINES), InnovationEar(ReliabilityConfig()).around(matcher)
+    overheard(segments, WALLS, JOINT, config, clear_only=True)
+    overheard(segments, WALLS, JOINT, config, clear_only=False)
+    overheard(segments, WALLS, JOINT, config)
+    for (given, named), clear_only in zip(asked, (True, False, False), strict=True):
+        assert [id(each) for each in given] == [id(each) for each in (segments, WALLS, JOINT, config)]
+        assert named == {"clear_only": clear_only}
+
+
+def test_what_is_clear_is_told_by_the_ear_s_own_rule():
+    strict = InnovationEar(ReliabilityConfig(heading_rad=1e-4))
+    hear(strict, [(seen(LINES), IDS)])
+    assert strict.values == []
+    free = InnovationEar(ReliabilityConfig(heading_rad=3.0))
+    hear(free, [(seen(LINES, sigma_rad=0.5), IDS)])
+    assert free.dofs == [6]
