@@ -14,7 +14,7 @@ from .comparison import shapes
 from .comparison.comparison import MEASURES, Row, difference, select
 from .comparison.tables import trial_row
 from .merge import agree, in_order, union
-from .plan import Trial, gate_of, trials
+from .plan import Trial, trials
 from .store import Store, opened_anew, read_campaigns, read_config
 
 CONTRAST, TRIALS = "contrast.json", "contrast.csv"
@@ -38,14 +38,13 @@ def contrast(first: Path, second: Path, out: Path) -> None:
         raise UsageError(f"expected campaigns that share trials, found {first} and {second} with none: name others")
     rows: tuple[list[Row], list[Row]] = ([], [])
     different = []
-    gates = tuple(gate_of(read_campaigns(folder)[0]) for folder in (first, second))
     for trial in both:
         records = ours[trial].record(trial), theirs[trial].record(trial)
-        pair = tuple(trial_row(record, gate) for record, gate in zip(records, gates, strict=True))
-        for side, row in zip(rows, pair, strict=True):
-            side.append(row)
+        before, after = map(trial_row, records)
+        rows[0].append(before)
+        rows[1].append(after)
         if not agree(*records):
-            different.append(_side_by_side(*pair))
+            different.append(_side_by_side(before, after))
     said = {
         **stamp(CONTRAST),
         "first": str(first),

@@ -97,4 +97,4 @@ def duplicate_pairs(
 
 def _along(ends: Float[np.ndarray, "m 2 2"], alpha: float) -> Float[np.ndarray, "m 2"]:
     """Return from and to of each piece along one direction, m."""
-    return np.sort(ends @ directions(np.array(alpha)), axis=1)
+    return np.sort(ends @ directions(np.array(alpha)))

@@ -57,8 +57,7 @@ class Floor:
         beam = np.floor(turn / step).astype(np.int64)
         reach = np.where(np.isnan(ranges_m), range_max_m, ranges_m)
         # Beyond the last beam of less than a full turn nothing is seen.
-        reach = np.append(reach, np.full(max(int(beam.max(initial=0)) + 1 - len(reach), 0), -1.0))
-        visible = np.hypot(dx, dy) <= reach[beam]
+        visible = (beam < len(reach)) & (np.hypot(dx, dy) <= reach[np.minimum(beam, len(reach) - 1)])
         self.seen[row[visible], column[visible]] = True
 
 

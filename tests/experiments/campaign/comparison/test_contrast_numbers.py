@@ -153,3 +153,25 @@ def test_campaigns_that_share_no_trial_or_whose_worlds_differ_are_refused(tmp_pa
 def test_a_folder_without_a_contrast_is_told(tmp_path):
     with pytest.raises(UsageError, match="compare --against"):
         read_contrast(tmp_path)
+
+
+def test_a_back_end_in_an_arm_is_held_against_itself_alone(tmp_path):
+    before = {cell: 1.0 + k for k, cell in enumerate(TIMES)}
+    contrast(made(tmp_path / "one", before), made(tmp_path / "two", TIMES), tmp_path / "out")
+    for row in read_contrast(tmp_path / "out")["differences"]:
+        if row["measure"] == "wall_rmse_m":
+            cell = row["backend"], "closed" if row["mode"] == "closed" else f"replay-{row['association']}"
+            assert row["value"] == pytest.approx(TIMES[cell] / before[cell])
+
+
+def test_one_trial_alone_may_differ(tmp_path):
+    one = replace(CAMPAIGN, backends=("full-ekf",), arms=("closed",), trials=1)
+    before, after = ({cell: times for cell in TIMES} for times in (1.0, 2.0))
+    contrast(made(tmp_path / "one", before, one), made(tmp_path / "two", after, one), tmp_path / "out")
+    assert len(read_contrast(tmp_path / "out")["different_trials"]) == 1
+
+
+def test_a_contrast_that_cannot_be_read_names_the_remedy(tmp_path):
+    (tmp_path / "contrast.json").write_text("[]")
+    with pytest.raises(UsageError, match=r": run `compare --against` anew$"):
+        read_contrast(tmp_path)

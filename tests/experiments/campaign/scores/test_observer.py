@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.campaign.scores.observer import EVERY_M, MARKS_M, Fate, Observer, association_counts
+from experiments.campaign.scores.observer import (
+    EVERY_M,
+    MARKS_M,
+    NEAR_M,
+    OVERLAP_M,
+    Fate,
+    Observer,
+    _lying_on,
+    association_counts,
+)
 from experiments.scoring.association import Votes
 from experiments.scoring.beam_votes import UNLABELLED, vote
 from slam.estimation.backend import Joint
@@ -199,3 +208,17 @@ def test_matches_are_counted_against_the_wall_of_most_beams(truth):
     ]  # fmt: skip
     assert association_counts(fates, votes) == {"matches_true": 2, "matches_false": 2, "matches_missed": 2}
     assert association_counts([], votes) == {"matches_true": 0, "matches_false": 0, "matches_missed": 0}
+
+
+def test_true_and_false_matches_are_not_exchanged(truth):
+    one = np.eye(len(truth.faces), dtype=np.int64)
+    votes = Votes(truth, {2: one[0]})
+    wall, other = int(truth.walls[0]), int(truth.walls[1])
+    fates = [Fate(2, True, wall, ()), Fate(2, True, wall, ()), Fate(2, True, other, ())]
+    assert association_counts(fates, votes) == {"matches_true": 2, "matches_false": 1, "matches_missed": 0}
+
+
+def test_the_limits_of_lying_on_a_wall_count_as_on_it(make_map):
+    walls = make_map(np.array([[[0.0, 0.0], [4.0, 0.0]]]), np.zeros(3))
+    touching = np.array([[[-1.0, 0.0], [OVERLAP_M, 0.0]], [[1.0, NEAR_M], [3.0, NEAR_M]]])
+    assert [rows.tolist() for rows in _lying_on(touching, np.zeros(3), walls)] == [[0], [0]]
