@@ -78,7 +78,16 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
         decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
         graph.observe(update.map, update.chains, followed_wall(update.map), seen)
-        around = Surroundings(update.map, free_space, scan, recent.points_robot, graph=graph.graph)
+        around = Surroundings(
+            walls=update.map,
+            free_space=free_space,
+            scan=scan,
+            recent_robot=recent.points_robot,
+            graph=graph.graph,
+            odometry=odometry,
+            seen=tuple(seen),
+            nis=update.nis,
+        )
         decision = driver.decide(around, update.chains, graph.graph)
         given_up = decision.given_up
         if decision.outcome is Outcome.ALL_CLOSED and not update.chains:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .association.ambiguity import observed_either_way
+from .association.joint_compatibility import NO_NIS, Nis
 from .association.matching import KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.view import View
@@ -40,6 +41,8 @@ class MapUpdate:
     chains: tuple[Chain, ...]
     merged: tuple[tuple[int, int], ...]
     """Ids (kept, dropped) of the landmarks that were found to be one wall."""
+    nis: Nis = NO_NIS
+    """Of the matches that localised the robot, before they did; those beyond their gate were left out."""
 
 
 @runtime_checkable
@@ -83,7 +86,7 @@ class Mapper:
         clear = view.match_clear()
         # 3. Localise the robot with matched features (here as a pure function, to match again).
         first = self._reliable(clear, segments)
-        relocated = view.localised(first)
+        relocated, nis = view.localised(first), view.nis(first)
         # 4. Match features with their re-prediction from the new robot pose.
         matches = view.match_again(clear, relocated)
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
@@ -92,7 +95,7 @@ class Mapper:
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         chains = self._keeper.connect(walls, scan, set_aside)
-        return MapUpdate(segments, matches, owners, walls, chains, merged)
+        return MapUpdate(segments, matches, owners, walls, chains, merged, nis)
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""

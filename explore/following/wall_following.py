@@ -13,9 +13,10 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
+from slam.association.joint_compatibility import NO_NIS, Nis
 from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import MotionCommand, Scan
+from slam.robot import MotionCommand, Odometry, Scan
 
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
@@ -64,6 +65,12 @@ class Surroundings:
     """What the body touched, likewise."""
     graph: nx.DiGraph[int] = field(default_factory=nx.DiGraph)
     """The visibility graph of the walls."""
+    odometry: Odometry = field(default_factory=lambda: Odometry(np.zeros(3), np.zeros((3, 3))))
+    """The motion that led here."""
+    seen: tuple[int, ...] = ()
+    """Ids of the walls that the scan shows."""
+    nis: Nis = NO_NIS
+    """How far they lay from where the belief predicted them."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, 3]:

@@ -16,7 +16,7 @@ from ..following.wall_following import EndErrand, Errand, FollowingConfig, Place
 from ..goal import Goal
 from ..outcome import Outcome
 from ..planning.wall_routes import route
-from ..strategies import Choice, Place, Situation, Strategy
+from ..strategies import Choice, Place, Situation, Strategy, Watchful
 from ..survey.frontiers import known_floor
 from .decider import Decision
 from .ledger import Event, Key, Ledger
@@ -93,6 +93,8 @@ class Explorer:
     def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
         """Return what to do next; at the end, which ends are left."""
         self._step += 1
+        if isinstance(self._strategy, Watchful):
+            self._strategy.watch(around)
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
         self._abandon(around, ends)

@@ -9,7 +9,7 @@ from .nearest_robot import NearestRobot
 from .nearest_start import NearestStart
 from .same_chain import SameChain
 from .schedule import Schedule
-from .strategy import Choice, Place, Situation, Strategy
+from .strategy import Choice, Place, Situation, Strategy, Watchful
 from .uncertainty import Uncertainty
 
 
@@ -52,4 +52,4 @@ def make_strategy(words: str) -> Strategy:
     return parts[0][1] if len(parts) == 1 else Schedule(parts)
 
 
-__all__ = ["STRATEGIES", "Choice", "Place", "Situation", "Strategy", "StrategyEntry", "make_strategy"]
+__all__ = ["STRATEGIES", "Choice", "Place", "Situation", "Strategy", "StrategyEntry", "Watchful", "make_strategy"]

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from .strategy import Choice, Situation, Strategy
+from ..following.wall_following import Surroundings
+from .strategy import Choice, Situation, Strategy, Watchful
 
 
 class Schedule:
@@ -15,3 +16,9 @@ class Schedule:
     def choose(self, situation: Situation) -> Choice | None:
         """Return the choice of the strategy whose turn it is."""
         return [strategy for first, strategy in self._parts if first <= situation.step][-1].choose(situation)
+
+    def watch(self, around: Surroundings) -> None:
+        """Let each of them that looks at every step look at this one."""
+        for _, strategy in self._parts:
+            if isinstance(strategy, Watchful):
+                strategy.watch(around)

@@ -139,3 +139,12 @@ class Strategy(Protocol):
     def choose(self, situation: Situation) -> Choice | None:
         """Return the choice, or None where there is nothing it would drive to now."""
         ...
+
+
+@runtime_checkable
+class Watchful(Strategy, Protocol):
+    """A strategy that looks at every step, and not only where it is to choose."""
+
+    def watch(self, around: Surroundings) -> None:
+        """Take note of one more scan."""
+        ...

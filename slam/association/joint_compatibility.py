@@ -39,19 +39,44 @@ def taken_together(joint: Joint, rows: Int[np.ndarray, " m"], model: Innovations
     return JointObservations(linear.e, PHt, linear.H @ PHt[columns] + linear.R)
 
 
+@dataclass(frozen=True)
+class Nis:
+    """How far a scan's observations lie from what was predicted of them, together."""
+
+    squared: float
+    """Normalised innovation squared, e' S^-1 e: of a chi-square variable if the belief is honest."""
+    dof: int
+    """Its degrees of freedom, two for each observation."""
+
+
+NO_NIS = Nis(0.0, 0)
+
+
 def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Joint:
     """Condition the joint Gaussian on observations of some of its lines (paper, step 3), as a pure function."""
     if not len(observed.ids):
         return joint
+    seen = _seen_halfway(joint, ids, observed)
+    gain = seen.gain()
+    return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
+
+
+def joint_nis(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Nis:
+    """Return the NIS of observations of some lines of the joint Gaussian, all together."""
+    if not len(observed.ids):
+        return NO_NIS
+    seen = _seen_halfway(joint, ids, observed)
+    return Nis(float(seen.e @ np.linalg.solve(seen.S, seen.e)), len(seen.e))
+
+
+def _seen_halfway(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> JointObservations:
     rows = np.searchsorted(ids, observed.ids)
     means = joint.mean[3:].reshape(-1, 2)[rows]
     model = innovations(joint.mean[:3], joint.anchors[rows], means, observed.lines, observed.cov)
     seen = taken_together(joint, rows, model)
     step = seen.gain() @ seen.e
     turn = step[3 + 2 * rows] - step[2]
-    seen = taken_together(joint, rows, halfway(model, observed.lines, observed.cov, turn))
-    gain = seen.gain()
-    return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
+    return taken_together(joint, rows, halfway(model, observed.lines, observed.cov, turn))
 
 
 def compatible(seen: JointObservations, gate: float, together: float) -> Int[np.ndarray, " k"]:

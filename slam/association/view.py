@@ -6,6 +6,7 @@ import numpy as np
 
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
+from .joint_compatibility import Nis, joint_nis
 from .matching import KnownWalls, Matches, MatchingConfig
 from .methods import Method
 
@@ -32,6 +33,10 @@ class View:
     def localised(self, first: Observations) -> Joint:
         """Return pose and walls as they are known once some walls were observed."""
         return self.method.relocate(self.joint, self.walls.ids, first)
+
+    def nis(self, first: Observations) -> Nis:
+        """Return how far observations lie from where the belief before the scan predicts them."""
+        return joint_nis(self.joint, self.walls.ids, first)
 
     def match_again(self, clear: Matches, relocated: Joint) -> Matches:
         """Return the matches from the new pose: of the remaining segments, beside the clear ones, or of all."""
