@@ -5,7 +5,7 @@ PLANS ?= ../shared/data/plans
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies bias heading rules rules-held rules-table
+.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -63,8 +63,13 @@ bias: setup
 	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.jsonl
 	$(BIN)/python -m studies.consistency.bias --association own --out results/bias-own.jsonl
 
+# 300 runs, about an hour of one core; begun again, it goes on where it was. --length-m 30 60 120 --heading-deg 1 4 takes a night.
 heading: setup
 	$(BIN)/python -m studies.consistency.heading --out results/heading.jsonl --picture results/heading.png
+
+# 600 runs, about two hours of one core; begun again, it goes on where it was.
+adaptive: setup
+	$(BIN)/python -m studies.exploration.adaptive --out results/adaptive.jsonl
 
 courts: setup
 	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl

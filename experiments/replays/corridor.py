@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.lines import directions, normals, through
-from slam.geometry.poses import compose, inverse, to_world, wrap
+from slam.geometry.poses import compose, inverse, to_world
 
 from .observations import DriveObservations, ScanObservations
 from .oracles import as_stated
@@ -37,15 +37,11 @@ class Loop:
     after_m: float = 20.0
     """Length of the drive once the ring is closed."""
     step_m: float = 0.25
-    homings: int = 0
-    """How often it turns back to the start before it closes the ring, after equal shares of it: as `nearest-start`."""
 
     @property
     def way_m(self) -> Float[np.ndarray, " s"]:
         """Where each scan is taken, along the ring's middle."""
-        way = self.step_m * np.arange(int((self.length_m + self.after_m) / self.step_m) + 1)
-        outs = [way[way <= self.length_m * k / (self.homings + 1)] for k in range(1, self.homings + 1)]
-        return np.concatenate([part for out in outs for part in (out, out[-2:0:-1])] + [way])
+        return self.step_m * np.arange(int((self.length_m + self.after_m) / self.step_m) + 1)
 
     @property
     def closing_step(self) -> int:
@@ -59,8 +55,6 @@ def drive(loop: Loop, seed: int) -> DriveObservations:
     walls = ring(loop.length_m, rng)
     way = loop.way_m
     poses = on_ring(way, loop.length_m)
-    homewards = np.diff(way, append=np.inf) < 0.0
-    poses[homewards, 2] = wrap(poses[homewards, 2] + np.pi)
     motions, covs = _wheels(poses, loop, np.random.default_rng([seed, 1]))
     again, first = [], []
     lines, known = through(walls), np.zeros(len(walls), dtype=bool)

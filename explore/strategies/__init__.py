@@ -28,7 +28,7 @@ STRATEGIES: dict[str, StrategyEntry] = {
     "frontier": StrategyEntry(Frontier, "borders of seen floor, then the open ends left (the classical baseline)"),
     "uncertainty": StrategyEntry(Uncertainty, "the open end with the most to learn a metre, by the joint covariance"),
     "adaptive": StrategyEntry(
-        Adaptive, "nearest-robot, with returns to well-known walls while the position is uncertain"
+        Adaptive, "nearest-robot, with returns to well-known walls where the filter must be inconsistent"
     ),
 }
 

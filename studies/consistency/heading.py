@@ -24,7 +24,7 @@ from viz.figures.anees_map import Field, anees_map
 from viz.figures.maps import saved
 
 from ..runner.explored import explored
-from ..runner.rows import Key, Row, key_of, rows_of
+from ..runner.rows import Key, Row, key_of, read, rows_of
 from ..runner.scores import bootstrap
 from .ring_worlds import LEAST_M, ring_world
 
@@ -67,6 +67,8 @@ class HeadingStudy:
     """A line of JSON for each run; what it holds of the same code already is not run again."""
     picture: Path = Path("results/heading.png")
     """The maps; the suffix says which kind of file: png, svg or pdf."""
+    only_report: bool = False
+    """Draw and print what is there."""
 
     def run(self) -> None:
         """Run what is to be run, draw the maps and print them; raises UsageError."""
@@ -79,6 +81,9 @@ class HeadingStudy:
         for name, strategy in itertools.product(self.backends, self.strategies):
             choose("back end", name, BACKENDS)
             check(self.trial(Ring(self.length_m[0], self.heading_deg[0], strategy, name, 1)))
+        if self.only_report:
+            self.report(read(self.out, NAMES))
+            return
         tasks = [(ring, [key_of(self.row(ring), NAMES)]) for ring in self.rings()]
         self.report(list(rows_of(self.out, NAMES, tasks, functools.partial(_one_of, self), self.jobs)))
 
@@ -108,6 +113,9 @@ class HeadingStudy:
         """Draw the maps and print every cell."""
         cells: dict[Key, list[Row]] = {}
         for row in rows:
+            # A row of another way is another run.
+            if row["way"] != self.way:
+                continue
             cells.setdefault(key_of(row, NAMES[:5]), []).append(row)
         fields = [[self.field(cells, strategy, name) for name in self.backends] for strategy in self.strategies]
         across, along = ([f"{value:g}" for value in values] for values in (self.heading_deg, self.length_m))

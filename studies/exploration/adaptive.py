@@ -19,7 +19,7 @@ from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 
 from ..runner.explored import explored
-from ..runner.rows import Row, key_of, rows_of
+from ..runner.rows import Row, key_of, read, rows_of
 
 NAMES = ("world", "p0", "backend", "strategy", "seed", "max_path_m")
 MEASURES = {
@@ -57,6 +57,8 @@ class AdaptiveStudy:
     """Number of processes."""
     out: Path = Path("results/adaptive.jsonl")
     """A line of JSON for each run; what it holds of the same code already is not run again."""
+    only_report: bool = False
+    """Print the comparison of what is there."""
 
     def trials(self) -> list[TrialConfig]:
         """Return the trials, seed by seed, so that what is there is balanced."""
@@ -74,8 +76,11 @@ class AdaptiveStudy:
         trials = self.trials()
         for trial in trials:
             check(trial)
-        tasks = [(k, [tuple(getattr(trial, name) for name in NAMES)]) for k, trial in enumerate(trials)]
-        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
+        if self.only_report:
+            rows = [row for row in read(self.out, NAMES) if row["max_path_m"] == self.metres]
+        else:
+            tasks = [(k, [tuple(getattr(trial, name) for name in NAMES)]) for k, trial in enumerate(trials)]
+            rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
         console = plain_console(width=160)
         console.print(returns_table(rows, self.strategies[0]))
         for p0 in self.p0:

@@ -1,7 +1,6 @@
 """What the studies of back ends rest on: observations told wall by wall, noise as stated, rings of corridors."""
 
 import json
-from dataclasses import replace
 
 import jaxtyping
 import numpy as np
@@ -23,10 +22,9 @@ from experiments.usage import UsageError
 from slam.backends import BACKENDS
 from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations
-from slam.geometry.poses import compose, to_world, wrap
+from slam.geometry.poses import to_world
 from studies.consistency.bias import BiasStudy
 from studies.consistency.faults import Fault, faulty
-from studies.consistency.heading import HeadingStudy
 from studies.consistency.loops import LoopStudy
 from studies.runner.scores import bootstrap
 
@@ -212,37 +210,6 @@ def test_the_bias_study_sends_every_fault_through_every_back_end(tmp_path, capsy
     rows = study(association="own")
     assert len(rows) == 8
     assert "false matches" in capsys.readouterr().out
-
-
-def test_a_robot_that_turns_back_comes_home_before_it_closes_the_ring():
-    loop = Loop(24.0, homings=2, after_m=4.0)
-    way = loop.way_m
-    assert np.count_nonzero(way == 0.0) == 3
-    np.testing.assert_allclose(np.abs(np.diff(way)), loop.step_m)
-    assert way[loop.closing_step] == 24.0
-    assert way[: loop.closing_step].max() < 24.0
-    seen = drive(loop, 1)
-    moved = np.array([compose(pose, motion) for pose, motion in zip(seen.true_poses_world, seen.odometry[1:])])  # noqa: B905
-    off = moved - seen.true_poses_world[1:]
-    assert np.abs(off[:, :2]).max() < 0.1
-    assert np.abs(wrap(off[:, 2])).max() < 0.05
-    homewards = np.flatnonzero(np.diff(way) < 0)
-    ahead = np.sum((seen.true_poses_world[homewards + 1] - seen.true_poses_world[homewards])[:, :2]
-                   * np.stack([np.cos(h := seen.true_poses_world[homewards, 2]), np.sin(h)], -1), axis=1)  # fmt: skip
-    assert ahead.min() > 0.2
-
-
-def test_the_map_of_anees_is_drawn_from_rows_that_are_kept(tmp_path, capsys):
-    study = HeadingStudy(
-        backends=("full-ekf",), length_m=(20.0,), heading_deg=(0.6, 2.4), homings=(0, 1), seeds=1, jobs=1,
-        out=tmp_path / "heading.jsonl", picture=tmp_path / "heading.svg",
-    )  # fmt: skip
-    study.run()
-    assert len((tmp_path / "heading.jsonl").read_text().splitlines()) == 2 * 2
-    assert (tmp_path / "heading.svg").read_bytes().startswith(b"<?xml")
-    assert "full-ekf, 1 times back, 20 m, 2.4:" in capsys.readouterr().out
-    with pytest.raises(UsageError, match="kind of picture"):
-        replace(study, picture=tmp_path / "heading.bmp").run()
 
 
 @pytest.mark.usefixtures("_unchecked")
