@@ -55,10 +55,10 @@ def collinear(faces: Float[np.ndarray, "n 2 2"]) -> Int[np.ndarray, " n"]:
     off = np.maximum(_offset(centred[i], lines[j]), _offset(centred[j], lines[i]))
     same = (off <= SAME_LINE_M) & (np.cos(lines[i, 0] - lines[j, 0]) >= np.cos(SAME_LINE_RAD))
     links = coo_array((np.ones(int(same.sum())), (i[same], j[same])), shape=(len(faces), len(faces)))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+    return connected_components(links)[1].astype(np.int64)
 
 
 def _offset(faces: Float[np.ndarray, "m 2 2"], lines: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
     """Return the larger distance of a face's ends from a line, m."""
-    across = np.einsum("mei,mi->me", faces, normals(lines[:, 0])) - lines[:, 1, None]
+    across = np.vecdot(faces, normals(lines[:, 0])[:, None]) - lines[:, 1, None]
     return np.asarray(np.abs(across).max(axis=1))

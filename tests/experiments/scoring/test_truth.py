@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from experiments.scoring import truth
 from experiments.scoring.truth import collinear, truth_of
 from sim.robot import RobotConfig
 
@@ -64,3 +65,17 @@ def test_the_truth_of_a_world_is_its_faces_and_what_the_robot_can_see(world):
         assert (n @ a, n @ b) == pytest.approx((r, r), abs=1e-12)
         assert n[0] * (b - a)[1] - n[1] * (b - a)[0] == pytest.approx(np.hypot(*(b - a)))
     assert truth.contour.length_m == pytest.approx(22.4)
+
+
+@pytest.mark.parametrize("far_m", [0.0, 1e5])
+def test_only_walls_that_lie_near_each_other_are_held_against_each_other(monkeypatch, far_m):
+    """A plan of ten thousand walls has fifty million pairs."""
+    rng, looked_at = np.random.default_rng(1), []
+    plain = truth._offset
+    monkeypatch.setattr(truth, "_offset", lambda faces, lines: looked_at.append(len(faces)) or plain(faces, lines))
+    start = rng.uniform(0.0, 40.0, (300, 2))
+    turn = 0.5 * np.pi * rng.integers(0, 4, 300)
+    faces = np.stack([start, start + np.stack([np.cos(turn), np.sin(turn)], axis=-1)], axis=1) + far_m
+    labels = collinear(faces)
+    assert labels.dtype == np.int64
+    assert max(looked_at) < 0.05 * 300 * 299 / 2
