@@ -117,8 +117,8 @@ def _lying_on(
     ends = to_world(ends_robot, pose_world)
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
     own = ends[:, 1] - ends[:, 0]
-    along = np.sort(np.einsum("mei,ni->mne", ends, t))
-    wall = np.sort(np.einsum("nei,ni->ne", walls.ends_world, t))
+    along = np.sort(np.vecdot(ends[:, None], t[:, None]))
+    wall = np.sort(np.vecdot(walls.ends_world, t[:, None]))
     overlap = np.minimum(along[..., 1], wall[:, 1]) - np.maximum(along[..., 0], wall[:, 0])
     off = np.abs(ends.mean(axis=1) @ n.T - lines[:, 1])
     same_side = own @ t.T >= np.cos(SAME_SIDE_RAD) * np.hypot(*own.T)[:, None]
