@@ -139,3 +139,9 @@ smoke: setup
 compare: setup
 	$(BIN)/chainslam compare --preset paper --out results/paper
 	$(BIN)/chainslam report results/paper --latex
+
+.PHONY: paper-method
+
+# How often the paper's method enters a wall twice (figure 9); begun again, it goes on where it was.
+paper-method: setup
+	$(BIN)/python -m studies.consistency.paper_method --out studies/consistency/paper_method.jsonl

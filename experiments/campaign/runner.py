@@ -1,11 +1,12 @@
 """Runs what is missing of a campaign, on the cores of this machine or on a cluster; the results are the same."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import monotonic
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ..artifacts.presets import METHODS
 from ..terminal.console import plain_console
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
@@ -76,7 +77,9 @@ def _job(store: Store, trial: Trial) -> Job:
     if trial.association is None:
         return Job(trial, config_of(store.campaign, trial))
     recording = trial.recording
-    return Job(trial, config_of(store.campaign, recording), store.path(recording).read_bytes())
+    # A method brings a mapper of its own to the recording; back ends share one, and so the recording, read once.
+    rules = replace(recording, backend=trial.backend) if trial.backend in METHODS else recording
+    return Job(trial, config_of(store.campaign, rules), store.path(recording).read_bytes())
 
 
 def on_cores(count: int | None) -> Executor:

@@ -20,6 +20,7 @@ from slam.robot import Scan
 
 from ..artifacts.files import json_bytes, npz_bytes
 from ..artifacts.formats import RECORD, stamp
+from ..artifacts.presets import backend_of
 from ..artifacts.reading import Each, Maybe, UnfitError, parse_json
 from ..artifacts.results import log_arrays
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
@@ -223,7 +224,7 @@ def _replay(job: Job) -> TrialScores:
     observer = Observer(truth_of(world, job.config.robot).walls, lambda index: run.true_face_of_beam[index])
     ear = InnovationEar(job.config.mission.mapper.walls.reliability) if association == "true" else None
     result = replay(
-        run, job.trial.backend, ReplayOptions(association), observer, world,
+        run, backend_of(job.trial.backend), ReplayOptions(association), observer, world,
         ear.around if ear is not None else lambda matcher: matcher, remembered(job.log),
     )  # fmt: skip
     return _finish(job, result, observer, ear)

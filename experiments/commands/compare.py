@@ -10,6 +10,7 @@ import tyro
 
 from explore.planning.navigators import Navigation
 
+from ..artifacts.presets import against_methods
 from ..artifacts.settings import NAVIGATION, asked, differing, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.story import decisive_arm, story_of
@@ -44,12 +45,13 @@ class Compare:
 
     out: Path
     """Folder for the results."""
-    preset: Literal["smoke", "paper", "full"] | None = None
-    """A campaign by name; options named beside it go before."""
+    preset: Literal["smoke", "paper", "paper-method", "full"] | None = None
+    """A campaign by name; options named beside it go before. paper-method holds the paper's method against today's
+    mapper with three back ends."""
     worlds: tuple[str, ...] | None = None
     """Bundled names or files."""
     backends: tuple[str, ...] | None = None
-    """The estimators (see `chainslam backends`)."""
+    """The estimators (see `chainslam backends`); `paper-method` among them is the paper's filter and matching."""
     strategies: tuple[str, ...] | None = None
     """Exploration strategies (see `chainslam strategies`)."""
     trials: int | None = None
@@ -65,10 +67,11 @@ class Compare:
     p0: P0 = "small"
     """Covariance of the start."""
     max_steps: int | None = None
-    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500."""
+    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500,
+    in paper-method 1000."""
     navigation: Navigation = "floor"
-    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Preset paper goes
-    by walls."""
+    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Presets paper and
+    paper-method go by walls."""
     config: Path | None = None
     """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
     itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
@@ -106,8 +109,14 @@ class Compare:
             raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
         arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
         arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
-        changed = tuple(sorted(differing(trial_of(settings))))
-        return Campaign(**chosen, arms=tuple(arms), driver=self.driver, first_seed=self.first_seed, settings=changed)
+        changed = differing(trial_of(settings)) + against_methods(chosen["backends"], settings)
+        return Campaign(
+            **chosen,
+            arms=tuple(arms),
+            driver=self.driver,
+            first_seed=self.first_seed,
+            settings=tuple(sorted(dict(changed).items())),
+        )
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

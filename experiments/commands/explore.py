@@ -10,6 +10,7 @@ from explore.planning.navigators import Navigation
 from explore.step import Step
 from sim.worlds import World
 
+from ..artifacts.presets import PresetName, preset_of
 from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
@@ -46,6 +47,7 @@ SETTLED = (
     "navigation",
     "start",
     "scale",
+    "preset",
     "config",
     "set",
 )
@@ -90,6 +92,9 @@ class Explore:
     is refused."""
     force: bool = False
     """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
+    preset: PresetName | None = None
+    """A method by name: paper-method is all that the paper describes, its filter, its matching and its navigation
+    (docs/exploration.md). --config, --set and options go before it."""
     config: Path | None = None
     """Settings from this file: a run's `config.json`, or an object of some of its keys. An option that is given goes
     before it, and so does --set."""
@@ -110,12 +115,12 @@ class Explore:
     def trial(self) -> TrialConfig:
         """What decides the run, without where its results go; raises UsageError where no world is named.
 
-        An option wins over --set, that over --config, that over the defaults.
+        An option wins over --set, that over --config, that over the preset, that over the defaults.
         """
         given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
         options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
         base = {} if self.config is None else read_settings(self.config)
-        trial = trial_of(base, *map(parse_setting, self.set), options)
+        trial = trial_of(preset_of(self.preset), base, *map(parse_setting, self.set), options)
         if not trial.world:
             raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
         return trial
@@ -146,7 +151,7 @@ class Explore:
         trial = self.trial
         check(trial)
         world = load_world(trial.world, trial.start, trial.scale)
-        folder = self.out or default_folder(world.name, trial)
+        folder = self.out or default_folder(world.name, trial, self.preset)
         prepare(folder)
         with held(folder):
             config = config_record(trial)
@@ -244,9 +249,10 @@ def _why(saved: SavedRun) -> str:
     return words if saved.outcome.status == "complete" else f"{words}; raise the limit to go on"
 
 
-def default_folder(world: str, trial: TrialConfig) -> Path:
+def default_folder(world: str, trial: TrialConfig, preset: str | None = None) -> Path:
     """Return the folder for a run that names none: the same run comes to the same place."""
     parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
+    parts += [preset] if preset else []
     parts += [trial.p0] if trial.p0 != "small" else []
     parts += ["errorless"] if trial.errorless else []
     return Path("results") / "-".join(parts)

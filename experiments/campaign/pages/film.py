@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from slam.backends import BACKENDS
+
 from ...replays.replay import ReplayOptions, read_run
 from ...views.timelines import record_comparison
 from ..comparison.tables import read_rows
@@ -19,7 +21,8 @@ def record_campaign(folder: Path, campaign: Campaign, rrd: Path) -> list[str]:
     if run is not None:
         title += f"; side by side: {run.trial.world}, seed {run.trial.seed}"
     trials, steps = (read_rows(folder / f"{name}.parquet") for name in ("trials", "steps"))
-    return record_comparison(rrd, title, trials, steps, run, campaign.backends, ReplayOptions())
+    estimators = [name for name in campaign.backends if name in BACKENDS]
+    return record_comparison(rrd, title, trials, steps, run, estimators, ReplayOptions())
 
 
 def record_summary(folder: Path, title: str, rrd: Path) -> list[str]:
