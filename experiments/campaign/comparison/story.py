@@ -142,7 +142,7 @@ def answer(hypothesis: dict[str, Any]) -> tuple[str, ...]:
     return (
         f"{ANSWERS[hypothesis['verdict']]}: {where}, {says[hypothesis['verdict']]}: the walls of its map are"
         f" {_times(wall)} as far off, and its shape alone, wherever the map as a whole has drifted to,"
-        f" {_times(shape)} ({wall['runs']} pairs of runs; a match needs both 95 % intervals below"
+        f" {_times(shape)} ({_counted(wall['runs'], 'pair')} of runs; a match needs both 95 % intervals below"
         f" {hypothesis['matches_within']}).",
         _honesty(honesty),
         f"{_states(at['contender'], contender)}; {_states(at['baseline'], baseline)}. {_covered(at['uncovered'])}",
