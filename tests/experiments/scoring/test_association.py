@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.scoring.association import OVERLAP_M, Votes, duplicate_lines, duplicate_pairs
-from experiments.scoring.beam_votes import UNLABELLED
+from experiments.scoring.beam_votes import UNLABELLED, vote
 from experiments.scoring.truth import truth_of
 from sim.robot import RobotConfig
 from slam.extraction.segments import Segments
@@ -177,3 +177,16 @@ def test_a_line_of_one_beam_is_of_the_face_of_that_beam(truth):
 def test_an_overlap_of_just_twenty_centimetres_is_one_too_many(make_map):
     walls = make_map(np.array([[[0.0, 0.0], [OVERLAP_M, 0.0]], [[0.0, 0.0], [2.0, 0.0]]]), np.zeros(3))
     assert duplicate_lines(walls, np.zeros(2, dtype=np.int64), np.ones(2, dtype=bool)) == 1
+
+
+def test_a_vote_tells_beams_winner_and_the_face_of_most_of_its_beams():
+    face_of_beam = np.array([3, 4, 4, 4, 1, -1, 5, 5, -1, -1])
+    told = vote((0, 5), face_of_beam, WALLS)
+    assert told.faces.tolist() == [3, 4, 4, 4, 1]
+    assert (told.beams, told.winner, told.on_winner, told.face) == (6, 2, 4, 4)
+    assert (told.is_clear, told.wall) == (False, UNLABELLED)
+    around = vote((8, 3), face_of_beam, WALLS)
+    assert (around.beams, around.winner, around.on_winner, around.face) == (6, 2, 4, 4)
+    nothing = vote((8, 9), face_of_beam, WALLS)
+    assert nothing.faces.tolist() == []
+    assert (nothing.beams, nothing.winner, nothing.on_winner, nothing.face) == (2, UNLABELLED, 0, UNLABELLED)

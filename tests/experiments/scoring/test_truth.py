@@ -75,7 +75,7 @@ def test_only_walls_that_lie_near_each_other_are_held_against_each_other(monkeyp
     monkeypatch.setattr(truth, "_offset", lambda faces, lines: looked_at.append(len(faces)) or plain(faces, lines))
     start = rng.uniform(0.0, 40.0, (300, 2))
     turn = 0.5 * np.pi * rng.integers(0, 4, 300)
-    faces = np.stack([start, start + np.stack([np.cos(turn), np.sin(turn)], axis=-1)], axis=1) + far_m
+    faces = np.stack([start, start + np.stack([np.cos(turn), np.sin(turn)], axis=-1)], axis=1) + np.array([far_m, 0.0])
     labels = collinear(faces)
     assert labels.dtype == np.int64
     assert max(looked_at) < 0.05 * 300 * 299 / 2
