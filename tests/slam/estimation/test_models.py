@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.models import halfway, initialise, innovations, lines_robot, move
+from slam.estimation.models import halfway, initialise, innovations, lines_robot, move, stack
 from slam.extraction.line_fit import Beams, fit_runs, polar, prefix_sums
 from slam.geometry.lines import lines_to_world
 from slam.geometry.poses import to_robot, to_world, wrap
@@ -210,3 +210,37 @@ def test_moving_the_world_moves_no_innovation(seed):
     moved_pose = np.append(to_world(pose[None, :2], motion)[0], pose[2] + turn)
     moved = innovations(moved_pose, to_world(anchors, motion), means + np.array([turn, 0.0]), line, cov)
     np.testing.assert_allclose(moved.e, innovations(pose, anchors, means, line, cov).e, atol=1e-10)
+
+
+@pytest.mark.parametrize("rows", [[0, 2, 5], [3, 1], [2, 2, 4, 2], [7], []])
+def test_stacked_observations_are_those_of_each_alone_with_a_column_for_each_line(rows):
+    """Several observations of one line share its columns; what they differ in is their own noise."""
+    rng, m = np.random.default_rng(len(rows)), len(rows)
+    pose, means, anchors = random_pose(rng), rng.uniform(-3, 3, (8, 2)), rng.uniform(-9, 9, (8, 2))
+    seen = [seen_line(rng) for _ in rows]
+    lines, cov = np.array([s[0] for s in seen]).reshape(-1, 2), np.array([s[1] for s in seen]).reshape(-1, 2, 2)
+    at = np.array(rows, dtype=np.int64)
+    model = innovations(pose, anchors[at], means[at], lines, cov)
+    found = stack(at, model)
+    assert sorted(found.rows.tolist()) == sorted(set(rows))
+    assert found.rows.tolist() == (rows if len(set(rows)) == m else sorted(set(rows)))
+    columns = {row: 3 + 2 * k for k, row in enumerate(found.rows.tolist())}
+    H, R = np.zeros((2 * m, 3 + 2 * len(columns))), np.zeros((2 * m, 2 * m))
+    for k, row in enumerate(rows):
+        own = slice(2 * k, 2 * k + 2)
+        H[own, :3] = model.H_pose[k]
+        H[own, columns[row] : columns[row] + 2] = model.H_line[k]
+        R[own, own] = model.R[k]
+    np.testing.assert_array_equal(found.H, H)
+    np.testing.assert_array_equal(found.R, R)
+    np.testing.assert_array_equal(found.e, model.e.reshape(-1))
+
+
+def test_innovations_are_taken_row_by_row():
+    rng = np.random.default_rng(5)
+    seen = [seen_line(rng) for _ in range(4)]
+    lines, cov = np.array([s[0] for s in seen]), np.array([s[1] for s in seen])
+    model = innovations(random_pose(rng), rng.uniform(-9, 9, (4, 2)), rng.uniform(-3, 3, (4, 2)), lines, cov)
+    taken = model.take(np.array([3, 1]))
+    for name in ("e", "H_pose", "H_line", "R"):
+        np.testing.assert_array_equal(getattr(taken, name), getattr(model, name)[[3, 1]])
