@@ -1,11 +1,14 @@
 """Each arm of a campaign is what its name says: who drives, and whose matches a replay uses."""
 
+from dataclasses import replace
+
 import pytest
 
 from experiments.campaign.plan import ARMS, Campaign, Trial, config_of
 from experiments.campaign.work import Job, perform, unpack
 from experiments.replays import replay as replays
 from slam.association.matching import match
+from slam.association.methods import METHODS
 
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 1, max_steps=12)
 DRIVE = Trial("paper-fig4", "nearest-robot", "", "recording", 2)
@@ -19,7 +22,7 @@ def test_each_arm_uses_the_matches_that_its_name_tells(monkeypatch):
         calls.append(more)
         return match(*known, **more)
 
-    monkeypatch.setattr(replays, "match", gate)
+    monkeypatch.setattr(replays, "METHODS", {"joint": replace(METHODS["joint"], matcher=gate)})
     log = perform(Job(DRIVE, config_of(CAMPAIGN, DRIVE), keep_log=True)).log
     assert not calls
     found = {}
