@@ -9,16 +9,16 @@ from jaxtyping import Float
 
 from explore.limits import Limits
 from explore.mission import MissionConfig
-from explore.strategies import Strategy, make_strategy
+from explore.strategies import STRATEGIES, Strategy, make_strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
-from sim.worlds import World, WorldError, load
+from sim.worlds import World, WorldError, listing, load
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
 from slam.robot import Robot
 
-from .usage import UsageError, choose
+from .usage import UsageError, choose, did_you_mean
 
 P0 = Literal["zero", "small", "large"]
 P0_SIGMAS: dict[str, tuple[float, float]] = {
@@ -99,7 +99,8 @@ def load_world(name: str, start: tuple[float, ...] | None = None, scale: float |
     try:
         return load(name, start, scale)
     except WorldError as error:
-        raise UsageError(str(error)) from error
+        is_name = not Path(name).suffix and name not in listing()
+        raise UsageError(f"{error}{did_you_mean(name, listing()) if is_name else ''}") from error
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise UsageError(
@@ -112,7 +113,9 @@ def strategy_of(words: str) -> Strategy:
     try:
         return make_strategy(words)
     except ValueError as error:
-        raise UsageError(str(error)) from error
+        unknown = next((name for part in words.split(",") if (name := part.partition("@")[0]) not in STRATEGIES), None)
+        near = did_you_mean(unknown, STRATEGIES) if unknown else ""
+        raise UsageError(f"{error}{near}") from error
 
 
 def check(config: TrialConfig) -> None:

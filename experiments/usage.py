@@ -1,6 +1,10 @@
 """What is said of bad usage and bad input."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
+
+LONGEST = 100
+"""More letters than this are no typo."""
 
 
 class UsageError(ValueError):
@@ -14,5 +18,15 @@ def choose(kind: str, name: str, known: Iterable[str]) -> str:
     """Return `name` if it is known; raises UsageError otherwise."""
     names = list(known)
     if name not in names:
-        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}: choose one of these")
+        near = did_you_mean(name, names)
+        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}{near}: choose one of these")
     return name
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a question after the known name that is nearest to `name`, in brackets; nothing where none is near."""
+    names = {each.lower(): each for each in known}
+    # A name that was begun is near to what it begins, however much is missing.
+    begun = [each for each in names if len(name) > 2 and each.startswith(name.lower())]
+    near = begun or get_close_matches(name.lower()[:LONGEST], names, n=1)
+    return f" (did you mean {names[near[0]]}?)" if near else ""

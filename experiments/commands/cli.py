@@ -1,20 +1,18 @@
 """The command `chainslam`: one class for each subcommand, and one line in the registry."""
 
-import io
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stderr
 from dataclasses import dataclass, make_dataclass, replace
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-import tyro
-
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
 from ..usage import UsageError, choose
+from .parsing import parsed
 
 FAILED, BAD_USAGE = 1, 2
+ABOUT = "Explore a building by wall following and map it as chains of line segments."
 
 
 @runtime_checkable
@@ -136,7 +134,7 @@ def _tell(message: object) -> None:
 def _parse(arguments: Sequence[str] | None) -> Command:
     """Return the command that the arguments name; raises UsageError, in one line, where they make none."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words == ["--version"]:
+    if words in (["--version"], ["-V"], ["version"]):
         from importlib.metadata import version  # takes as long as the rest of the help
 
         print(f"chainslam {version('chainslam')}")
@@ -144,39 +142,16 @@ def _parse(arguments: Sequence[str] | None) -> Command:
     if words and not words[0].startswith("-"):
         # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
         choose("command", words[0], COMMANDS)
-    said = io.StringIO()
-    try:
-        with redirect_stderr(said):
-            command: Any = tyro.extras.subcommand_cli_from_dict(
-                {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()},
-                prog="chainslam",
-                description="Explore a building by wall following and map it as chains of line segments."
-                " --version tells which version this is.",
-                args=words,
-            )
-        asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
-        return asked
-    except SystemExit as leaving:
-        if leaving.code in (0, None):
-            raise
-        raise UsageError(_one_line(said.getvalue())) from leaving
+    classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
+    command = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
+    asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
+    return asked
 
 
 def given(words: Sequence[str]) -> frozenset[str]:
     """Return the options that stand in a command, by the names of their fields: `--no-sweep` and `--sweep` are one."""
     options = [word.partition("=")[0].removeprefix("--").replace("-", "_") for word in words if word[:2] == "--"]
     return frozenset(options) | {option.removeprefix("no_") for option in options}
-
-
-def _one_line(boxed: str) -> str:
-    """Return the first words of a boxed message of tyro."""
-    lines = [line.strip(" │╭╮╰╯─\n") for line in boxed.splitlines()[1:]]
-    words: list[str] = []
-    for line in lines:
-        if not line and words:
-            break
-        words.append(line)
-    return f"{' '.join(' '.join(words).split()) or 'bad usage'}: see `chainslam --help`"
 
 
 if __name__ == "__main__":

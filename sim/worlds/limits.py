@@ -40,7 +40,8 @@ def check_size(lines: Sequence[shapely.LineString], polygons: Sequence[shapely.P
     # Not written as a comparison with the largest: NaN is too far, too.
     if not all(np.all(np.abs(path) <= FARTHEST_M) for path in paths):
         raise WorldError(
-            f"expected walls at most {FARTHEST_M:g} m from the origin, found farther ones: move the drawing"
+            f"expected walls at most {FARTHEST_M:g} m from the origin, found farther ones: move the drawing, or correct"
+            " its scale (--scale METRES for a picture or an SVG)"
         )
     check_extent(np.concatenate(paths))
     pieces = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
@@ -63,7 +64,8 @@ def check_extent(points: Float[np.ndarray, "n 2"]) -> None:
     extent = float(np.max(np.ptp(points, axis=0)))
     if not SMALLEST_M <= extent <= LARGEST_M:
         raise WorldError(
-            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m: correct the scale"
+            f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m:"
+            " correct the scale (--scale METRES for a picture or an SVG)"
         )
 
 

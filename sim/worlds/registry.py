@@ -101,7 +101,7 @@ def load(
 
 def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
     if scale is not None and not 0 < scale < np.inf:
-        raise WorldError(f"expected a scale above 0 metres per unit, found {scale}: correct it")
+        raise WorldError(f"expected a scale above 0 metres per unit, found --scale {scale}: correct it")
     if text in WORLDS:
         return text, _read_svg((HERE / WORLDS[text].file).read_bytes())
     family, colon, which = text.partition(":")

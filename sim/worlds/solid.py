@@ -103,7 +103,7 @@ def _choose(
     if drivable_m2 == 0:
         raise WorldError(
             "expected a free space that walls enclose and that a robot of 0.2 m radius fits into, found none:"
-            " draw a closed wall around the building"
+            " draw a closed wall around the building, or correct the scale (--scale METRES for a picture or an SVG)"
         )
     middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(part, tolerance=0.02))[0]
     return part, np.array([round(middle[0], 3), round(middle[1], 3), 0.0])

@@ -30,7 +30,7 @@ def read_bytes(path: Path) -> bytes:
 def read_json_map(data: bytes, scale: float | None = None) -> Drawing:
     """Return the drawing in a JSON file's bytes, told by its content: GeoJSON has a "type", a plan has "walls"."""
     if scale is not None:
-        raise WorldError("expected no scale for JSON, which is in metres, found one: leave it out")
+        raise WorldError("expected no scale for JSON, which is in metres, found one: leave --scale out")
     document = _parse(data)
     if isinstance(document, dict) and "walls" in document:
         return from_json(document)

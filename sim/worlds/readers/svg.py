@@ -167,9 +167,10 @@ def _unitless_scale(shapes: list[tuple[list[Any], str | None]]) -> float:
     points = np.concatenate([ring for rings, _ in shapes for ring in rings])
     extent = float(np.max(np.ptp(points, axis=0)))
     if not SMALLEST_M <= extent <= min(UNITLESS_MAX, LARGEST_M):
+        metres = 0.01 if extent < 1e4 else 0.001
         raise WorldError(
             f"expected a drawing in metres, found {extent:.4g} units wide without a physical size: state the scale,"
-            f' such as data-metres-per-unit="{0.01 if extent < 1e4 else 0.001:g}", in the <svg> element'
+            f' such as --scale {metres:g}, or data-metres-per-unit="{metres:g}" in the <svg> element'
         )
     return 1.0
 

@@ -1,0 +1,141 @@
+"""From the words of a command line to one command, with types and defaults as people read them."""
+
+import ast
+import inspect
+import io
+import re
+import types
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stderr
+from dataclasses import Field, fields, make_dataclass
+from itertools import dropwhile, pairwise, takewhile
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+
+import tyro
+
+from ..usage import UsageError, choose, did_you_mean
+
+FOLDERS = ("out", "resume", "merge", "against")
+"""Options whose path is a folder's."""
+WORDS = {int: "N", float: "NUMBER", str: "NAME", Path: "FILE"}
+"""What stands in the help for a value of each type."""
+NAMED = {"start": "X Y [HEADING]", "scale": "METRES", "dask": "ADDRESS"}
+"""The same, for options that want more than their type tells."""
+HELP = "-h", "--help"
+
+
+def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> Any:
+    """Return the command that some words name; raises UsageError, in one line, where they make none."""
+    known: dict[str, Callable[..., Any]] = {name: readable(command) for name, command in commands.items()}
+    asked = commands.get(words[0]) if words else None
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.extras.subcommand_cli_from_dict(known, prog="chainslam", description=about, args=words)
+    except SystemExit as leaving:
+        if leaving.code in (0, None):
+            raise
+        raise UsageError(_told(_first_words(said.getvalue()), words, asked)) from leaving
+
+
+def readable(command: type) -> type:
+    """Return a class of the same command whose help has N for a whole number, and no word for what is not set."""
+    hints = get_type_hints(command, include_extras=True)
+    about = _about(command) if hints else {}
+    shown = [(each.name, _shown(each, hints[each.name], about.get(each.name)), each) for each in fields(command)]
+    return make_dataclass(
+        command.__name__, shown, bases=(command,), frozen=True, namespace={"__doc__": command.__doc__}
+    )
+
+
+def _about(command: type) -> dict[str, str]:
+    """Return what stands below each field; tyro itself would keep some of the source's line breaks."""
+    body = cast(ast.ClassDef, ast.parse(inspect.getsource(command)).body[0]).body
+    return {
+        field.target.id: " ".join(words.value.value.split())
+        for field, words in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(words, ast.Expr) and isinstance(words.value, ast.Constant) and isinstance(words.value.value, str)
+    }
+
+
+def _shown(field: Field[Any], hint: Any, about: str | None) -> Any:
+    """Return the annotation of a field with its words, that for its value and that for its default."""
+    parts: tuple[Any, ...] = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    if tyro.conf.Suppress in parts:
+        return hint
+    said = next((part.metavar for part in parts if getattr(part, "metavar", None)), None)
+    default: str | None = None
+    if field.default is None or field.default == ():
+        default = ""
+    elif isinstance(field.default, bool):
+        default = f"(default: {'on' if field.default else 'off'})"
+    word = said or _word(field.name, parts[0])
+    return Annotated[hint, tyro.conf.arg(metavar=word, help=about, help_behavior_hint=default)]
+
+
+def _word(name: str, kind: Any) -> str | None:
+    """Return what stands in the help for a value; None where tyro's own word is the one to read."""
+    if name in NAMED:
+        return NAMED[name]
+    if get_origin(kind) in (Union, types.UnionType):
+        kind = next(part for part in get_args(kind) if part is not types.NoneType)
+    if get_origin(kind) is tuple:
+        inner = get_args(kind)
+        one = _word(name, inner[0])
+        return one and (f"{one} ..." if inner[-1] is Ellipsis else " ".join([one] * len(inner)))
+    if get_origin(kind) is Literal:
+        return f"{{{','.join(map(str, get_args(kind)))}}}"
+    return "DIR" if kind is Path and name in FOLDERS else WORDS.get(kind)
+
+
+def options_of(command: type) -> list[str]:
+    """Return the options of a command as they are typed."""
+    hints = get_type_hints(command, include_extras=True)
+    named: list[str] = []
+    for each in fields(command):
+        parts = get_args(hints[each.name])
+        if tyro.conf.Suppress in parts or tyro.conf.Positional in parts:
+            continue
+        option = each.name.replace("_", "-")
+        named += [f"--{option}", f"--no-{option}"] if isinstance(each.default, bool) else [f"--{option}"]
+    return named
+
+
+def _told(message: str, words: Sequence[str], command: type | None) -> str:
+    """Return tyro's message in our own form: what was expected, what was found, what is near to it."""
+    if command is None:
+        return (
+            "expected a command, found none: see `chainslam --help`"
+            if not words
+            else f"{message}: see `chainslam --help`"
+        )
+    name, see = words[0], f"see `chainslam {words[0]} --help`"
+    if message.startswith("Unrecognized options: "):
+        rest = message.removeprefix("Unrecognized options: ").split(", ")
+        options = [word.partition("=")[0] for word in rest if word.startswith("-")]
+        if not options:
+            return f"expected no more words for {name}, found {rest[0]!r}: {see}"
+        near = did_you_mean(options[0], [*options_of(command), *HELP])
+        return f"expected an option of {name}, found {options[0]}{near}: {see}"
+    choice = re.match(r"invalid choice '(.*)' for argument '(.*?)'\. Expected one of \((.*)\)\.?$", message)
+    if choice:
+        known = [word for word in re.findall(r"'([^']*)'", choice[3]) if word != "None"]
+        try:
+            choose(f"value of {choice[2]}", choice[1], sorted(known))
+        except UsageError as error:
+            return str(error)
+    if number := re.match(
+        r"Error parsing (\S+): (invalid literal for int|could not convert string).*?: '(.*)'$", message
+    ):
+        kind = "a whole number" if "int" in number[2] else "a number"
+        return f"expected {kind} for {number[1]}, found {number[3]!r}: {see}"
+    return f"{message}: {see}"
+
+
+def _first_words(boxed: str) -> str:
+    """Return the first words of a boxed message of tyro; where there are no letters for boxes, it draws with dashes."""
+    title, *lines = [line.strip(" |│╭╮╰╯─-+\n") if line.strip("|│╭╮╰╯─-+ \n") else "" for line in boxed.splitlines()]
+    words = list(takewhile(bool, dropwhile(lambda line: not line, lines)))
+    return " ".join(" ".join(words).split()) or title or "bad usage"
