@@ -22,6 +22,13 @@ WORDS = {int: "N", float: "NUMBER", str: "NAME", Path: "FILE"}
 """What stands in the help for a value of each type."""
 NAMED = {"start": "X Y [HEADING]", "scale": "METRES", "dask": "ADDRESS"}
 """The same, for options that want more than their type tells."""
+NO_NUMBER = re.compile(
+    r"Error parsing (\S+): (?:no type matching \{None\}\|)?(INT|FLOAT|invalid literal for int|could not convert string)"
+    r".*?(?:: |\[)'(.*)'\]?\.?$"
+)
+"""How tyro says that a value is no number."""
+BOX = " |│╭╮╰╯─+\n"
+"""What tyro draws boxes with; where there are no letters for them, it draws lines of dashes."""
 HELP = "-h", "--help"
 
 
@@ -126,16 +133,14 @@ def _told(message: str, words: Sequence[str], command: type | None) -> str:
             choose(f"value of {choice[2]}", choice[1], sorted(known))
         except UsageError as error:
             return str(error)
-    if number := re.match(
-        r"Error parsing (\S+): (invalid literal for int|could not convert string).*?: '(.*)'$", message
-    ):
-        kind = "a whole number" if "int" in number[2] else "a number"
+    if number := NO_NUMBER.match(message):
+        kind = "a whole number" if "int" in number[2].lower() else "a number"
         return f"expected {kind} for {number[1]}, found {number[3]!r}: {see}"
     return f"{message}: {see}"
 
 
 def _first_words(boxed: str) -> str:
-    """Return the first words of a boxed message of tyro; where there are no letters for boxes, it draws with dashes."""
-    title, *lines = [line.strip(" |│╭╮╰╯─-+\n") if line.strip("|│╭╮╰╯─-+ \n") else "" for line in boxed.splitlines()]
+    """Return the first words of a boxed message of tyro."""
+    title, *lines = [line.strip(BOX) if line.strip(f"{BOX}-") else "" for line in boxed.splitlines()]
     words = list(takewhile(bool, dropwhile(lambda line: not line, lines)))
     return " ".join(" ".join(words).split()) or title or "bad usage"
