@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from time import monotonic
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import MofNCompleteColumn
 
 from ..artifacts.presets import METHODS
-from ..terminal.console import plain_console
+from ..terminal.progress import bar_of, duration
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform
@@ -31,8 +31,8 @@ class Tally:
         if not self.trials:
             return "all trials were there already"
         return (
-            f"{self.trials} trials in {self.wall_s:.0f} s: {self.trials / self.wall_s:.2f} a second,"
-            f" {self.cpu_s:.0f} s computed, {self.cpu_s / self.wall_s:.2f} at a time"
+            f"{self.trials} trials in {duration(self.wall_s)}: {self.trials / self.wall_s:.2f} a second, computing time"
+            f" {duration(self.cpu_s)}, {self.cpu_s / self.wall_s:.2f} processes at a time"
         )
 
 
@@ -44,14 +44,8 @@ def run_campaign(store: Store, executor: Executor) -> Tally:
     rest = [t for t in trials(store.campaign) if not store.has(t) and t not in driven]
     # Replays of one recording follow each other, so that a process reads it once.
     rest.sort(key=lambda t: (store.campaign.worlds.index(t.world), t.strategy, t.seed))
-    columns = (
-        TextColumn("{task.description}"), BarColumn(bar_width=32), MofNCompleteColumn(), TimeElapsedColumn(),
-        TextColumn("left"), TimeRemainingColumn(),
-    )  # fmt: skip
-    console = plain_console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        total = len(drives) + len(rest)
-        task = bar.add_task("trials", total=total)
+    total = len(drives) + len(rest)
+    with bar_of("trials", float(total), MofNCompleteColumn()) as (bar, task):
         for jobs in (iter(drives), (_job(store, trial) for trial in rest)):
             for done in executor(jobs):
                 store.save(done)

@@ -29,7 +29,7 @@ from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED
 from ..terminal.progress import print_pooled
 from ..usage import UsageError
-from .echo import echo_world
+from .echo import campaign_line, echo_world
 
 FAILED = 1
 JOBS_A_CORE = 8
@@ -138,6 +138,11 @@ class Compare:
             try:
                 for world in worlds:
                     echo_world(world)
+                jobs = None if self.dask else self.jobs or len(os.sched_getaffinity(0))
+                by_name = dict(zip(campaign.worlds, worlds, strict=True))
+                left = [(by_name[trial.world], trial.backend) for trial in trials(campaign) if not store.has(trial)]
+                if left:
+                    say(campaign_line(left, campaign.max_steps, jobs))
                 tally = run_campaign(store, executor)
             except KeyboardInterrupt:
                 print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",

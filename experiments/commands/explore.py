@@ -23,7 +23,7 @@ from ..terminal.progress import print_summary, progress
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError
 from ..views.timelines import TimelineOutput
-from .echo import echo_world
+from .echo import echo_world, expected_steps, run_line
 
 MAX_STEPS = TrialConfig.max_steps
 KEYS = {
@@ -195,12 +195,14 @@ class Explore:
         """Drive a run, write it into its folder, and return the exit status; raises UsageError."""
         scenario = build(trial, world)
         echo_world(world)
+        say(run_line(world, trial))
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
         log = RunningLog(folder, config, saved.kept if saved is not None else None)
         recording = TimelineOutput(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
         try:
-            with progress(f"exploring {world.name}") as show, first_interrupt_waits() as stop_if_asked:
+            steps = sum(expected_steps(world, trial.max_steps)) / 2
+            with progress(world.name, steps) as show, first_interrupt_waits() as stop_if_asked:
 
                 def watch(step: Step) -> None:
                     if saved is not None:

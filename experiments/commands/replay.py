@@ -92,7 +92,10 @@ class Replay:
         self, run: RecordedRun, name: str, options: ReplayOptions, world: World, recording: TimelineOutput
     ) -> TrialResult:
         """Replay through one back end, and stop between two steps where that is asked for."""
-        with progress(f"replaying with {name}") as show, first_interrupt_waits() as stop_if_asked:
+        with (
+            progress(f"replaying with {name}", float(len(run.recording))) as show,
+            first_interrupt_waits() as stop_if_asked,
+        ):
 
             def watch(step: Step) -> None:
                 show(step)

@@ -15,6 +15,7 @@ from ..artifacts.run_folder import prepare
 from ..reproductions import REPRODUCTIONS, Reproduction
 from ..reproductions.reproduction import Value
 from ..terminal.console import plain_console
+from ..terminal.progress import bar_of, duration
 from ..usage import UsageError, choose
 
 SEED_LARGEST = 2**32
@@ -38,9 +39,10 @@ class Reproduce:
             raise UsageError(f"expected a seed from 0 to 2^32 - 1, found {self.seed}: choose another")
         prepare(self.out)
         console = plain_console(width=max(plain_console().width, 130))
-        for name in names:
+        started = time.perf_counter()
+        for done, name in enumerate(names):
             began = time.perf_counter()
-            with console.status(f"{name}: {REPRODUCTIONS[name].about}"):
+            with bar_of(f"{_far(done, len(names), began - started)}{name}: {REPRODUCTIONS[name].about}", None):
                 made = REPRODUCTIONS[name].make(self.seed)
                 for kind in ("png", "svg"):
                     write(self.out / f"{name}.{kind}", saved(made.figure, kind))
@@ -49,8 +51,16 @@ class Reproduce:
             console.print(table_of(made))
             for note in made.notes:
                 console.print(note, style="dim")
-            console.print(f"{self.out / name}.png, .svg, .json; {time.perf_counter() - began:.0f} s\n")
+            console.print(
+                f"{self.out / name}.png, .svg, .json; computing time {duration(time.perf_counter() - began)}\n"
+            )
         return 0
+
+
+def _far(done: int, count: int, seconds: float) -> str:
+    """Return how many figures are done, and how long the others take if they take as long as those."""
+    left = f", about {duration(seconds / done * (count - done))} left" if done else ""
+    return f"{done + 1} of {count}{left}: " if count > 1 else ""
 
 
 def table_of(made: Reproduction) -> Table:

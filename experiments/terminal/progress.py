@@ -2,43 +2,82 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import timedelta
 from typing import Any
 
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column, Table
 
 from explore.step import Step
 
 from .console import plain_console
 
+ALMOST = 0.95
+"""A run that takes longer than expected stays at this share of its bar."""
+
 
 @contextmanager
-def progress(title: str) -> Iterator[Callable[[Step], None]]:
+def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step], None]]:
     """Show steps on standard error while the block runs; quiet where that is not a terminal.
 
-    The bar is the share of walls in closed chains: it may fall when something new comes into sight.
+    `steps` is how many are expected; without it no time left is told.
     """
-    console = plain_console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=24),
-        TextColumn("{task.fields[words]}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task(title, total=1.0, words="")
+    with bar_of(title, steps, TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True))) as (bar, task):
 
         def watch(step: Step) -> None:
+            done = step.index + 1
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
-            closed = sum(len(chain.walls) for chain in step.chains if chain.is_closed)
-            words = (
-                f"step {step.index + 1}  {step.path_length_m:.1f} m  {len(step.map)} walls, {closed} in closed chains"
-                f"  {open_ends} open ends"
-            )
-            bar.update(task, completed=closed / max(len(step.map), 1), words=words)
+            driving = timedelta(seconds=int(step.time_s))
+            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, driving {driving}"
+            bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch
+
+
+@contextmanager
+def bar_of(title: str, total: float | None, *columns: ProgressColumn) -> Iterator[tuple[Progress, TaskID]]:
+    """Yield a bar on standard error, and its task, with the computing time so far and what is left of it."""
+    console = plain_console(stderr=True)
+    left = (
+        ()
+        if total is None
+        else (TextColumn("left"), TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True, min_width=5)))
+    )
+    shown = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=8),
+        *columns,
+        TextColumn("computing"),
+        TimeElapsedColumn(table_column=Column(no_wrap=True, min_width=7)),
+        *left,
+    )
+    with Progress(*shown, console=console, disable=not console.is_terminal, transient=True) as bar:
+        yield bar, bar.add_task(title, total=total, words="")
+
+
+def total_of(expected: float | None, done: int) -> float | None:
+    """Return what counts as the whole of a run: what was expected, or a little more than is done already."""
+    return None if expected is None else max(expected, done / ALMOST)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words of two units at most."""
+    if seconds < 10.0:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
 def print_summary(summary: dict[str, Any]) -> None:
@@ -60,7 +99,10 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         return rows
     ms = summary["step_ms"]
     rows += [
-        ("path", f"{summary['path_length_m']:.1f} m in {summary['drive_time_s']:.0f} s"),
+        ("path", f"{summary['path_length_m']:.1f} m"),
+        ("driving time, by the robot's clock", duration(summary["drive_time_s"])),
+        ("computing time, on this machine", duration(1e-3 * ms["mean"] * summary["steps"])),
+        ("computing time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms"),
         ("contours closed", f"{summary['contours_closed']} of {summary['contours_reachable']}"),
         ("coverage", f"{100 * summary['coverage']:.2f} %"),
         *_own_frame(summary),
@@ -86,7 +128,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     if mapped and len(mapped) < len(summary["distances"]):
         missing = len(summary["distances"]) - len(mapped)
         rows.append(("distances not in the map", str(missing)))
-    return [*rows, ("time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms")]
+    return rows
 
 
 def _own_frame(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -121,6 +163,7 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
         "lines": "lines",
         "double": "duplicate_lines",
         "false": "false_matches",
+        "computing ms a step": "step_ms",
     }
     table.add_column("", no_wrap=True)
     for summary in summaries:
@@ -131,6 +174,8 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
 
 
 def _short(value: Any) -> str:
+    if isinstance(value, dict):
+        return _short(value["mean"])
     return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
 
 

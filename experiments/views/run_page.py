@@ -37,7 +37,8 @@ FIGURES: dict[str, tuple[str, float]] = {
     "odometry_max_m": ("odometry alone, worst, m", 1.0), "pose_anees": ("pose ANEES (1 is ideal)", 1.0),
     "pose_nees_in_band": ("steps in the 95 % band, %", 100.0), "map_anees": ("map ANEES (1 is ideal)", 1.0),
     "false_matches": ("false matches", 1.0), "duplicate_lines": ("duplicate walls", 1.0),
-    "collisions": ("collisions", 1.0),
+    "collisions": ("collisions", 1.0), "drive_time_s": ("driving time, s", 1.0),
+    "step_ms": ("computing time of a step, ms", 1.0),
 }  # fmt: skip
 """What the table tells: the key of summary.json, words, and what it is multiplied by."""
 
@@ -155,6 +156,8 @@ def _honest(anees: float) -> str:
 def _told(value: Any, scale: float) -> str:
     if value is None:
         return NONE
+    if isinstance(value, dict):
+        value = value["mean"]
     return number(value if scale == 1.0 else scale * value)
 
 

@@ -14,7 +14,7 @@ from .layers.sights import UNITS_PER_M
 from .recording import SIM_TIME, STEP
 
 WHITE = (255, 255, 255)
-STEP_MS_NAME, STEP_MS_SPAN = "time of a step, ms (cut at 200)", (0.0, 200.0)
+STEP_MS_NAME, STEP_MS_SPAN = "computing time of a step, ms (cut at 200)", (0.0, 200.0)
 TRACE_NAME = "trace of the pose covariance, m² + rad²"
 
 

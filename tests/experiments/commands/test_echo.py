@@ -1,6 +1,7 @@
 """Before a run a world is told in two lines: what was understood, and who said where it starts and how large it is."""
 
 import json
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,7 +10,8 @@ from PIL import Image
 
 from experiments.artifacts.files import json_bytes
 from experiments.commands.cli import main
-from experiments.commands.echo import world_lines
+from experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
+from experiments.scenario import TrialConfig
 from experiments.terminal.console import say
 from sim.worlds import load
 
@@ -93,3 +95,26 @@ def test_a_line_is_said_without_what_steers_the_terminal(capsys):
 
 def test_text_that_is_no_utf8_loses_no_file():
     assert json.loads(json_bytes({"world": "a\udc80é"}))["world"] == "a\udc80é"
+
+
+@pytest.mark.parametrize(("world", "steps"), [("paper-fig4", 165), ("paper-fig9", 364), ("rooms", 734), ("hall", 761)])
+def test_what_a_run_is_expected_to_take_holds_for_stored_runs(world, steps):
+    low, high = expected_steps(load(world), 100_000)
+    assert low <= steps <= high
+    assert high < 5 * low
+
+
+def test_a_run_is_told_with_both_clocks_and_no_further_than_its_limit():
+    rooms = load("rooms")
+    told = run_line(rooms, TrialConfig(world="rooms"))
+    assert re.fullmatch(
+        r"expected, roughly: \d+ to [\d,]+ steps; driving time .* to \d+ min, computing time \d+ s to .*", told
+    )
+    assert "expected, roughly: 5 steps;" in run_line(rooms, TrialConfig(world="rooms", max_steps=5))
+    assert told != run_line(rooms, TrialConfig(world="rooms", backend="graph"))
+
+
+def test_a_campaign_is_told_with_its_trials_and_processes():
+    runs = [(load("rooms"), "full-ekf")] * 4
+    assert campaign_line(runs, 100, 2).startswith("expected, roughly: 4 trials; computing time 2 s to 12 s on 2 proc")
+    assert campaign_line(runs, 100, None).endswith("computing time 4 s to 24 s over all workers")

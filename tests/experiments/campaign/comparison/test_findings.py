@@ -100,7 +100,7 @@ def test_double_entries_are_held_against_what_the_gate_must_refuse():
 
 
 def test_the_rate_tells_how_many_computed_at_a_time():
-    assert Tally(100, 50.0, 90.0).words().endswith("2.00 a second, 90 s computed, 1.80 at a time")
+    assert Tally(100, 50.0, 90.0).words().endswith("2.00 a second, computing time 1 min 30 s, 1.80 processes at a time")
     assert "already" in Tally(0, 0.1, 0.0).words()
 
 
