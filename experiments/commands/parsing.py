@@ -39,11 +39,13 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> An
     said = io.StringIO()
     try:
         with redirect_stderr(said):
-            return tyro.extras.subcommand_cli_from_dict(known, prog="chainslam", description=about, args=words)
+            made = tyro.extras.subcommand_cli_from_dict(known, prog="chainslam", description=about, args=words)
     except SystemExit as leaving:
         if leaving.code in (0, None):
             raise
         raise UsageError(_told(_first_words(said.getvalue()), words, asked)) from leaving
+    assert asked is not None
+    return asked(**{each.name: getattr(made, each.name) for each in fields(asked)})
 
 
 def readable(command: type) -> type:
