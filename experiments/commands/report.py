@@ -12,9 +12,10 @@ from ..artifacts.files import write
 from ..campaign.contrast import CONTRAST
 from ..campaign.pages.contrast_page import contrast_page
 from ..campaign.pages.page import page_of
+from ..views.gif import gif_of
 from ..views.run_page import is_run, run_page
 
-REPORT, TABLES = "report.html", "tables.tex"
+REPORT, TABLES, GIF = "report.html", "tables.tex", "run.gif"
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Report:
     """The folder that `compare`, `explore` or `replay` left."""
     latex: bool = False
     """Write the tables as LaTeX, too."""
+    gif: bool = False
+    """Write a run as an animated GIF, too, run.gif; from its log, so that nothing is driven again."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
@@ -35,6 +38,9 @@ class Report:
             tables = [table for section in page.sections for table in section.tables]
             write(self.folder / TABLES, latex(tables))
             print(f"tables in {self.folder / TABLES}")
+        if self.gif:
+            write(self.folder / GIF, gif_of(self.folder))
+            print(f"animation in {self.folder / GIF}")
         return 0
 
 

@@ -35,8 +35,8 @@ def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step]
         def watch(step: Step) -> None:
             done = step.index + 1
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
-            driving = timedelta(seconds=int(step.time_s))
-            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, driving {driving}"
+            clock = timedelta(seconds=int(step.time_s))
+            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, robot's clock {clock}"
             bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch
@@ -100,8 +100,8 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ms = summary["step_ms"]
     rows += [
         ("path", f"{summary['path_length_m']:.1f} m"),
-        ("driving time, by the robot's clock", duration(summary["drive_time_s"])),
-        ("computing time, on this machine", duration(1e-3 * ms["mean"] * summary["steps"])),
+        ("driving time of the robot", duration(summary["drive_time_s"])),
+        ("computing time of this machine", duration(1e-3 * ms["mean"] * summary["steps"])),
         ("computing time of a step: mean, 95 %", f"{ms['mean']:.1f} ms, {ms['p95']:.1f} ms"),
         ("contours closed", f"{summary['contours_closed']} of {summary['contours_reachable']}"),
         ("coverage", f"{100 * summary['coverage']:.2f} %"),

@@ -1,0 +1,83 @@
+"""A run's folder as an animated GIF: its log is replayed as it was made, so that nothing is driven again."""
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from explore.floor.free_space import FreeSpace
+from explore.step import Step
+from slam.geometry.poses import inverse, to_world
+from viz.figures.animation import Frame, animated, shown_steps
+
+from ..artifacts.results import LOG
+from ..replays.replay import read_options, read_run, replay
+from ..scenario import load_world
+from ..scoring.coverage import alignment
+from ..terminal.progress import progress
+from ..usage import UsageError
+
+EVERY_SCAN = 2
+"""Of these scans one is drawn into the floor that was seen."""
+
+
+def gif_of(folder: Path) -> bytes:
+    """Return the GIF of the run in a folder; raises UsageError where there is none."""
+    log = folder / LOG
+    if not log.is_file():
+        raise UsageError(f"expected a run with a {LOG}, found none in {folder}: name the folder of one run")
+    run, options = read_run(log), read_options(folder / "config.json")
+    trial = run.trial
+    world = load_world(trial.world, trial.start, trial.scale)
+    to_estimate = inverse(alignment(run.start_pose, run.true_poses_world[0]))
+    rings = (world.free.exterior, *world.free.interiors)
+    floor = [to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings]
+    film = _Film(len(run.recording))
+    with progress(f"{world.name}: GIF", float(len(run.recording))) as show:
+
+        def watch(step: Step) -> None:
+            show(step)
+            film.add(step)
+
+        replay(run, trial.backend, options, watch, world)
+    noise = "errorless" if trial.errorless else f"seed {trial.seed}"
+    if not film.frames:
+        raise UsageError(f"expected a run of at least one step, found none in {folder}: name another")
+    return animated(film.frames, floor, f"{world.name}   {trial.backend}, {trial.strategy}, {noise}")
+
+
+class _Film:
+    """Keeps what is drawn of the steps that are shown."""
+
+    def __init__(self, count: int) -> None:
+        self.frames: list[Frame] = []
+        self._shown = set(shown_steps(count))
+        self._poses: list[np.ndarray] = []
+        self._floor = FreeSpace()
+
+    def add(self, step: Step) -> None:
+        pose = step.pose_world.copy()
+        self._poses.append(pose)
+        is_shown = step.index in self._shown
+        if is_shown or step.index % EVERY_SCAN == 0:
+            self._floor.integrate(pose, step.scan)
+        if not is_shown:
+            return
+        scan, walls = step.scan, step.map
+        hit = np.isfinite(scan.ranges_m)
+        along = np.stack([np.cos(scan.bearings_rad[hit]), np.sin(scan.bearings_rad[hit])], axis=1)
+        self.frames.append(
+            Frame(
+                step=step.index,
+                time_s=step.time_s,
+                path_length_m=step.path_length_m,
+                path_world=np.array(self._poses),
+                ids=tuple(walls.ids.tolist()),
+                ends_world=walls.ends_world.copy(),
+                chains=step.chains,
+                hits_world=to_world(scan.ranges_m[hit, None] * along, pose),
+                seen=self._floor.evidence < 0,
+                seen_origin_world=self._floor.origin_world.copy(),
+                cell_m=self._floor.config.cell_m,
+            )
+        )
