@@ -81,7 +81,7 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check study intervals counts settings
+.PHONY: navigation paper paper-check study intervals interval-causes counts settings
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
@@ -94,6 +94,10 @@ study: setup
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out results/intervals.jsonl
+
+# Is it the matches, or the lines, that make them fail more often in one run than in another?
+interval-causes: setup
+	$(BIN)/python -m studies.consistency.interval_causes --seeds 60
 
 # Which tables of docs/paper.md are of other code than this?
 paper-check: setup
@@ -144,4 +148,4 @@ compare: setup
 
 # How often the paper's method enters a wall twice (figure 9); begun again, it goes on where it was.
 paper-method: setup
-	$(BIN)/python -m studies.consistency.paper_method --out studies/consistency/paper_method.jsonl
+	$(BIN)/python -m studies.consistency.paper_method

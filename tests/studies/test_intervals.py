@@ -9,7 +9,7 @@ from experiments.scenario import TrialConfig
 from experiments.scoring.corners import corners
 from experiments.scoring.measurements import Z_95
 from experiments.trial import run_trial
-from studies.consistency import intervals
+from studies.consistency import interval_causes, intervals
 
 
 @pytest.fixture(scope="module")
@@ -75,3 +75,16 @@ def test_the_table_counts_runs_that_their_own_covariance_calls_rare():
     assert cells[1] == "2"
     assert cells[5:7] == ["0.600", "1"]
     assert cells[-1] == "0.500"
+
+
+def test_the_truth_takes_the_place_of_one_stage_after_the_other(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(interval_causes, "replay", lambda run, backend, options: asked.append((backend, options)))
+    monkeypatch.setattr(interval_causes, "scores", lambda replayed: {"pairs": 0})
+    rows = interval_causes._replays_of("paper-fig4", "invariant-ekf", 3)
+    assert [(backend, o.association, o.perfect_extraction, o.perfect_odometry) for backend, o in asked] == [
+        ("invariant-ekf", "own", False, False),
+        ("invariant-ekf", "true", False, False),
+        ("invariant-ekf", "true", True, False),
+    ]
+    assert [row["stage"] for row in rows] == list(interval_causes.STAGES)

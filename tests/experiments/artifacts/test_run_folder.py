@@ -38,6 +38,8 @@ from experiments.artifacts import running_log
 from experiments.commands import cli, replay
 
 place, number, nth = sys.argv.pop(1), int(sys.argv.pop(1)), int(sys.argv.pop(1))
+# Under nohup a process is born deaf to SIGHUP.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 def strike(*_):
     global nth

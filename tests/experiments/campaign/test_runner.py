@@ -48,6 +48,8 @@ from experiments.commands import cli
 from experiments.campaign.store import Store
 
 number, left, save = int(sys.argv.pop(1)), int(sys.argv.pop(1)), Store.save
+# Under nohup a process is born deaf to SIGHUP.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 def save_and_be_struck(store, done):
     global left
