@@ -8,11 +8,14 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 LOOPBACK = "127.0.0.1"
 NOWHERE = f"http://{LOOPBACK}:9"
 """A proxy that nobody serves: the viewer asks a host outside for its newest version, analytics off or on."""
 PATIENCE_S = 20.0
+PORT, PAGE_PORT = 9876, 9090
+"""Of the recordings and of the page, where nobody else has them: the same each time, so that ssh can forward them."""
 
 
 class ViewerError(RuntimeError):
@@ -40,17 +43,55 @@ class Viewer:
         return f"rerun+http://{LOOPBACK}:{self._port}/proxy"
 
     def _wait_until_it_listens(self) -> None:
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            if self._process.poll() is not None:
-                break
-            with socket.socket() as probe:
-                if probe.connect_ex((LOOPBACK, self._port)) == 0:
-                    return
-            time.sleep(0.05)
-        raise ViewerError(
-            "expected Rerun's viewer to open, found that it ended at once: record with --rrd FILE and try `rerun FILE`"
-        )
+        _wait_for(self._process, self._port)
+
+
+class WebViewer:
+    """A viewer served to browsers of this machine, with some recordings, until it is closed."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        """Start it; raises ViewerError."""
+        executable = _executable()
+        self.port, self.page_port = _free_port(PORT), _free_port(PAGE_PORT)
+        command = [
+            executable, "--bind", LOOPBACK, "--port", str(self.port), "--serve-web",
+            "--web-viewer-port", str(self.page_port), *map(str, files),
+        ]  # fmt: skip
+        self._process = subprocess.Popen(
+            command, env=_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        _wait_for(self._process, self.page_port)
+
+    @property
+    def url(self) -> str:
+        """Where a browser finds it."""
+        source = quote(f"rerun+http://{LOOPBACK}:{self.port}/proxy", safe="")
+        return f"http://{LOOPBACK}:{self.page_port}/?url={source}"
+
+    def wait(self) -> None:
+        """Return once it has ended."""
+        self._process.wait()
+
+    def close(self) -> None:
+        """End it."""
+        self._process.terminate()
+        self._process.wait(PATIENCE_S)
+
+
+def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
+    """Return once a process listens on a port; raises ViewerError."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        if process.poll() is not None:
+            break
+        with socket.socket() as probe:
+            if probe.connect_ex((LOOPBACK, port)) == 0:
+                return
+        time.sleep(0.05)
+    raise ViewerError(
+        "expected Rerun's viewer to open, found that it ended at once: record with --rrd FILE and try `rerun FILE`"
+    )
 
 
 def available() -> str:
@@ -88,7 +129,12 @@ def _environment() -> dict[str, str]:
     return os.environ | proxies | {"XDG_CONFIG_HOME": str(settings)}
 
 
-def _free_port() -> int:
+def _free_port(wanted: int = 0) -> int:
+    """Return a port that nobody uses: the wanted one, if it is free."""
     with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOOPBACK, wanted))
+        except OSError:
+            probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])

@@ -80,6 +80,7 @@ COMMANDS = {
     "worlds": Entry("listings", "Worlds", "List the bundled worlds and families of worlds."),
     "backends": Entry("listings", "Backends", "List the estimators."),
     "strategies": Entry("listings", "Strategies", "List the exploration strategies."),
+    "completion": Entry("listings", "Completion", "Print what a shell needs to complete commands and options."),
 }
 
 

@@ -99,7 +99,7 @@ def _word(name: str, kind: Any) -> str | None:
     return "DIR" if kind is Path and name in FOLDERS else WORDS.get(kind)
 
 
-def options_of(command: type) -> list[str]:
+def options_of(command: Any) -> list[str]:
     """Return the options of a command as they are typed."""
     hints = get_type_hints(command, include_extras=True)
     named: list[str] = []

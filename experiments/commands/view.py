@@ -1,5 +1,6 @@
 """`chainslam view`: what a run left, in Rerun's viewer."""
 
+import socket
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from viz.viewer import Viewer, ViewerError, available
+from viz.viewer import Viewer, ViewerError, WebViewer, available
 
 from ..artifacts.results import LOG, RECORDING
 from ..artifacts.run_folder import prepare
@@ -17,6 +18,7 @@ from ..campaign.pages.film import record_campaign
 from ..campaign.store import read_campaigns
 from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
 from ..scenario import load_world
+from ..terminal.console import say
 from ..usage import UsageError
 from ..views.timelines import TimelineOutput
 
@@ -34,10 +36,15 @@ class View:
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
     """A .rrd file, a run's log.npz, or the folder that `explore`, `replay` or `compare` left."""
 
+    web: bool = False
+    """Serve the viewer to a browser, on this machine only, until Ctrl-C; `ssh -L` brings it to another."""
+
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError where there is nothing to open."""
         recordings = recordings_at(self.path)
         try:
+            if self.web:
+                return _serve(recordings())
             available()
             files = recordings()
             Viewer(files)
@@ -46,6 +53,20 @@ class View:
             return 1
         print(f"opened {', '.join(map(str, files))}")
         return 0
+
+
+def _serve(files: list[Path]) -> int:
+    """Serve recordings to a browser until the process is asked to stop; raises ViewerError."""
+    viewer = WebViewer(files)
+    page, data = viewer.page_port, viewer.port
+    say(f"open {viewer.url}")
+    say(f"from another machine first: ssh -L {page}:127.0.0.1:{page} -L {data}:127.0.0.1:{data} {socket.gethostname()}")
+    say("Ctrl-C ends it")
+    try:
+        viewer.wait()
+    except KeyboardInterrupt:
+        viewer.close()
+    return 0
 
 
 def recordings_at(path: Path) -> Callable[[], list[Path]]:

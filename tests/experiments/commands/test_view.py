@@ -134,3 +134,26 @@ def test_a_replay_is_shown_with_the_association_that_made_it(home, opened, tmp_p
     assert main(words) == 0
     assert main(["view", str(tmp_path)]) == 0
     assert "from the log, true association" in text(tmp_path / "run.rrd", "/legend")
+
+
+def test_a_browser_is_served_until_ctrl_c_and_told_how_to_come_over_ssh(tmp_path, capsys, monkeypatch):
+    class Served:
+        page_port, port, url, closed = 9090, 9876, "http://127.0.0.1:9090/?url=x", False
+
+        def __init__(self, files):
+            assert files == [tmp_path / "run.rrd"]
+
+        def wait(self):
+            raise KeyboardInterrupt
+
+        def close(self):
+            Served.closed = True
+
+    (tmp_path / "run.rrd").write_bytes(b"")
+    monkeypatch.setattr("experiments.commands.view.WebViewer", Served)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    assert main(["view", str(tmp_path), "--web"]) == 0
+    told = capsys.readouterr().out
+    assert Served.url in told
+    assert "ssh -L 9090:127.0.0.1:9090 -L 9876:127.0.0.1:9876" in told
+    assert Served.closed
