@@ -122,7 +122,7 @@ rules-held: setup
 rules-table: setup
 	$(BIN)/python -m studies.rules.report
 
-.PHONY: pictures results
+.PHONY: pictures results screenshots
 
 # The tables of docs/results.md from stored rows; says which rows are of another version of the code.
 results: setup
@@ -131,6 +131,10 @@ results: setup
 # The site, in docs/_build/index.html: it needs no network, and every warning is an error.
 docs: setup
 	$(BIN)/sphinx-build -q -W --keep-going docs docs/_build
+
+# Every page and report as a browser shows it, for a screen and for a phone; needs Chromium.
+screenshots: setup
+	docs/make-screenshots
 
 # Every picture of the documentation, from runs made now.
 pictures: setup
