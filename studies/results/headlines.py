@@ -117,17 +117,24 @@ def apartments(rows: Sequence[Row]) -> Found:
     return Found(table, verdict + "take beams from several faces ([limits](limits.md)).")
 
 
+LOST = 3.0
+"""A run whose mean NEES is this many times what the estimator expects no longer knows where it is."""
+
+
 def schools(rows: Sequence[Row]) -> Found:
     """Return how eight back ends fare in schools over a limited number of steps."""
     head = ["back end", "runs", "exceptions", "pose ANEES: median", "map ANEES: median"]
-    table: Table = [[*head, "coverage by then: mean", "false matches"]]
+    lost = f"lost: pose ANEES above {LOST:g}"
+    table: Table = [[*head, lost, "coverage by then: mean", "false matches", "computing, mean of a step"]]
     maps = {name: float(np.median(_values(mine, "map_anees"))) for name, mine in _by(rows, "backend").items()}
     for backend, mine in _by(rows, "backend").items():
         medians = [_median(mine, name) for name in ("pose_anees", "map_anees")]
         own = _mean(mine, "coverage_own_frame")
         failed = sum(bool(row["raised"]) for row in mine)
         cells = [f"`{backend}`", str(len(mine)), str(failed), *medians]
-        table.append([*cells, f"{own:.3f}", str(_sum(mine, "false_matches"))])
+        cells.append(str(sum(value > LOST for value in _values(mine, "pose_anees"))))
+        took = f"{_mean(mine, 'step_ms_mean'):.0f} ms"
+        table.append([*cells, f"{own:.3f}", str(_sum(mine, "false_matches")), took])
     failed = sum(bool(row["raised"]) for row in rows)
     verdict = "No run ended by an exception." if not failed else f"{failed} runs ended by an exception."
     far = [value for value in maps.values() if value <= 10]
