@@ -71,6 +71,12 @@ heading: setup
 adaptive: setup
 	$(BIN)/python -m studies.exploration.adaptive --out results/adaptive.jsonl
 
+.PHONY: scanners
+
+# Other scanners and their faults, in one world; begun again, it goes on where it was.
+scanners: setup
+	$(BIN)/python -m studies.exploration.scanners --seeds 5
+
 courts: setup
 	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl
 

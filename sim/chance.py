@@ -18,15 +18,30 @@ class Channel(IntEnum):
     """The error of the pose that the estimate starts from."""
     ORACLE = 4
     """Noise of lines that an oracle extracts."""
+    DROPOUTS = 5
+    MIXED = 6
+    BUMPS = 7
 
 
 def standard_normals(seed: int, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:
     """Return `count` standard normal draws (count,), the same for the same (seed, channel, step) on any process.
 
-    A counter-based generator (Philox) needs no warming up, so a fresh one per step costs about 10 microseconds.
     Raises ValueError for a seed or a step out of range.
     """
+    return _generator(seed, channel, step).standard_normal(count)
+
+
+def uniforms(seed: int, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:
+    """Return `count` draws (count,) even over [0, 1), the same for the same (seed, channel, step) on any process.
+
+    Raises ValueError for a seed or a step out of range.
+    """
+    return _generator(seed, channel, step).random(count)
+
+
+def _generator(seed: int, channel: Channel, step: int) -> np.random.Generator:
+    """Return a generator that is counter-based (Philox): it needs no warming up, a fresh one costs 10 microseconds."""
     if not (0 <= seed <= SEED_MAX and 0 <= step < 2**_STEP_BITS):
         raise ValueError(f"expected 0 <= seed < 2^64 and 0 <= step < 2^{_STEP_BITS}, found seed {seed}, step {step}")
     key = (seed << 64) | (int(channel) << _STEP_BITS) | step
-    return np.random.Generator(np.random.Philox(key=key)).standard_normal(count)
+    return np.random.Generator(np.random.Philox(key=key))

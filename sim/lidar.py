@@ -23,6 +23,8 @@ class LidarConfig:
     """Returns beyond this m are rejected."""
     sigma_m: float = 0.010
     """Standard deviation m of the radial error of one beam."""
+    sigma_share: float = 0.0
+    """Standard deviation of a beam's radial error as a share of its range, beside `sigma_m`; both add by squares."""
     cell_m: float = 1.0
     """Side m of the grid cells that share one list of faces within range."""
     cells_max: int = 4096
@@ -40,15 +42,22 @@ def bearings(config: LidarConfig) -> Float[np.ndarray, " k"]:
     return np.linspace(-half, half, config.beams, endpoint=not config.is_full_turn)
 
 
+def beam_sigmas(ranges: Float[np.ndarray, " k"], config: LidarConfig) -> float | Float[np.ndarray, " k"]:
+    """Return the standard deviation m of the radial error of beams by their exact ranges."""
+    if config.sigma_share <= 0.0:
+        return config.sigma_m
+    return np.hypot(config.sigma_m, config.sigma_share * np.where(np.isfinite(ranges), ranges, 0.0))
+
+
 def noisy(
     ranges: Float[np.ndarray, " k"],
-    sigma_m: float,
+    sigma_m: float | Float[np.ndarray, " k"],
     standard_normals: Float[np.ndarray, " k"],
     range_max_m: float = 4.0,
 ) -> Float[np.ndarray, " k"]:
-    """Return ranges (k,) m with radial noise; NaN stays NaN, as does what is measured beyond `range_max_m`."""
+    """Return ranges (k,) m with radial noise: +inf beyond `range_max_m`, NaN at 0 or less."""
     measured = ranges + sigma_m * standard_normals
-    return np.where((measured > 0.0) & (measured <= range_max_m), measured, np.nan)
+    return np.where(measured > range_max_m, np.inf, np.where(measured > 0.0, measured, np.nan))
 
 
 class RangeFinder:
@@ -73,7 +82,7 @@ class RangeFinder:
         self._cells: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
     def cast(self, pose_world: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-        """Return exact ranges (k,) m, NaN beyond the maximum, and the index of the face of each beam, -1 for none."""
+        """Return exact ranges (k,) m, +inf beyond the maximum, and the index of the face of each beam, -1 for none."""
         x, y, heading = float(pose_world[0]), float(pose_world[1]), float(pose_world[2])
         ids, rows = self._near(x, y)
         distance = rows[6] - rows[4] * x - rows[5] * y
@@ -92,7 +101,7 @@ class RangeFinder:
         hit = np.flatnonzero(inverse == best[beam])
         face_of_beam = np.full(self.config.beams, -1)
         face_of_beam[beam[hit]] = ids[seen[face[hit]]]
-        return np.where(face_of_beam >= 0, 1.0 / best, np.nan), face_of_beam
+        return np.where(face_of_beam >= 0, 1.0 / best, np.inf), face_of_beam
 
     def _beam_runs(
         self, ends_from_robot: Float[np.ndarray, "4 m"], heading: float

@@ -12,7 +12,8 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 from .chance import Channel, standard_normals
 from .drive import DriveConfig, clamp, draw_slip, odometry, seconds, true_motion
-from .lidar import LidarConfig, RangeFinder, noisy
+from .faults import FaultsConfig, bump_rad, slipped, with_dropouts, with_mixed_pixels
+from .lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 
 _CELL_M = 0.5
 """Side of the grid cells that share one list of faces within a step's reach."""
@@ -35,7 +36,7 @@ class Building(Protocol):
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """The body, the clock, and the two devices."""
+    """The body, the clock, the two devices, and what is wrong with them without their saying so."""
 
     radius_m: float = 0.2
     """Radius m of the disc that must not touch a wall."""
@@ -45,6 +46,7 @@ class RobotConfig:
     """How long one turn of the range finder takes, s."""
     lidar: LidarConfig = field(default_factory=LidarConfig)
     drive: DriveConfig = field(default_factory=DriveConfig)
+    faults: FaultsConfig = field(default_factory=FaultsConfig)
 
 
 @dataclass
@@ -88,14 +90,18 @@ class SimulatedRobot:
     def sense(self) -> Scan:
         """Return the scan at the present place and record the truth about it."""
         ranges, faces = self._finder.cast(self._pose)
-        lidar, step = self.config.lidar, len(self._record.poses_world)
+        lidar, faults, step = self.config.lidar, self.config.faults, len(self._record.poses_world)
+        ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._seed, step)
         if not self._errorless:
             draws = standard_normals(self._seed, Channel.LASER, step, len(ranges))
-            ranges = noisy(ranges, lidar.sigma_m, draws, lidar.range_max_m)
+            ranges = noisy(ranges, beam_sigmas(ranges, lidar), draws, lidar.range_max_m)
+        ranges = with_dropouts(ranges, faults, self._seed, step)
         self._record.poses_world.append(self._pose.copy())
-        self._record.faces_of_beams.append(np.where(np.isnan(ranges), -1, faces))
+        self._record.faces_of_beams.append(np.where(np.isfinite(ranges) & ~mixed, faces, -1))
         self._time_s += self.config.scan_s
-        return Scan(self._finder.bearings_rad, ranges, lidar.sigma_m, lidar.range_max_m, self._time_s)
+        return Scan(
+            self._finder.bearings_rad, ranges, lidar.sigma_m, lidar.range_max_m, self._time_s, lidar.sigma_share
+        )
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
@@ -106,7 +112,7 @@ class SimulatedRobot:
         drive = self.config.drive
         command = clamp(command, drive)
         draws = np.zeros(3) if self._errorless else standard_normals(self._seed, Channel.WHEELS, self._drives, 3)
-        slip = draw_slip(command, drive, draws)
+        slip = slipped(draw_slip(command, drive, draws), self.config.faults)
         count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
         shares = np.linspace(0.0, 1.0, count + 1)[1:]
         motions = true_motion(command, slip, drive, shares)
@@ -119,6 +125,7 @@ class SimulatedRobot:
         if free:
             self._pose = compose(self._pose, motions[free - 1])
             self._record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
+        self._pose[2] += bump_rad(self.config.faults, self._seed, self._drives)
         self._drives += 1
         duration = seconds(command, drive)
         self._time_s += duration

@@ -156,6 +156,7 @@ def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,
         "sigma_m": log.sigma_m,
+        "sigma_share": log.sigma_share,
         "range_max_m": log.range_max_m,
         "odometry": log.odometry,
         "odometry_cov": log.odometry_cov,

@@ -17,7 +17,7 @@ from slam.extraction.segments import Segments
 from slam.extraction.visible_extent import sure_pieces
 from slam.map.reliability import Reliability, as_told
 from slam.map_keeper import seen_centres
-from slam.robot import Odometry, Scan
+from slam.robot import Odometry
 
 from ..scenario import P0_SIGMAS, load_world
 from ..scoring.truth import truth_of
@@ -104,10 +104,8 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
     reliability = Reliability(rules.reliability)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
-    for k, ranges in enumerate(recording.ranges_m):
-        scan = Scan(
-            recording.bearings_rad, ranges, recording.sigma_m, recording.range_max_m, float(recording.time_s[k])
-        )
+    for k in range(len(recording)):
+        scan = recording.scan(k)
         witness.at = k
         segments = sure_pieces(extractor(scan, extraction), scan, extraction)
         faces = witness.faces(segments)

@@ -22,7 +22,8 @@ class Log:
     time_s: Float[np.ndarray, " s"]
     bearings_rad: Float[np.ndarray, " k"]
     ranges_m: Float[np.ndarray, "s k"]
-    sigma_m: float
+    sigma_m: Float[np.ndarray, " k"]
+    sigma_share: float
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each step, robot frame before the motion, m m rad."""
@@ -132,7 +133,8 @@ class Recorder:
         columns = {name: np.array([row[name] for row in self._rows]) for name in self._rows[0] if name != "reasons"}
         return Log(
             bearings_rad=scan.bearings_rad,
-            sigma_m=float(scan.sigma_m),
+            sigma_m=np.broadcast_to(np.asarray(scan.sigma_m, dtype=np.float64), scan.bearings_rad.shape),
+            sigma_share=scan.sigma_share,
             range_max_m=float(scan.range_max_m),
             reasons=tuple(str(row["reasons"]) for row in self._rows),
             **columns,

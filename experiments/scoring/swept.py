@@ -10,6 +10,7 @@ from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
 from sim.worlds import World
 from slam.geometry.poses import wrap_positive
+from slam.robot import Scan
 
 CELL_M = 0.05
 LOOKOUT_M = 0.25
@@ -49,13 +50,16 @@ class Floor:
         ranges_m: Float[np.ndarray, " k"],
         range_max_m: float,
     ) -> None:
-        """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor."""
+        """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor.
+
+        One that is missing alone is not.
+        """
         row, column = self._unseen_around(pose_world, range_max_m)
         dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
         step = (bearings_rad[-1] - bearings_rad[0]) / (len(bearings_rad) - 1)
         turn = wrap_positive(np.arctan2(dy, dx) - pose_world[2] - bearings_rad[0] + 0.5 * step)
         beam = np.floor(turn / step).astype(np.int64)
-        reach = np.where(np.isnan(ranges_m), range_max_m, ranges_m)
+        reach = Scan(bearings_rad, ranges_m, 0.0, range_max_m, 0.0).shown_m
         # Beyond the last beam of less than a full turn nothing is seen.
         visible = (beam < len(reach)) & (np.hypot(dx, dy) <= reach[np.minimum(beam, len(reach) - 1)])
         self.seen[row[visible], column[visible]] = True

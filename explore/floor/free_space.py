@@ -165,7 +165,7 @@ class FreeSpace:
         cell = self.config.cell_m
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
-        reach = self._reach(scan)
+        reach = scan.shown_m
         beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
         tips = self.cells(to_world(beams * reach[:, None], pose_world))
         here = self.cells(pose_world[None, :2])[0]
@@ -213,15 +213,6 @@ class FreeSpace:
             between[k - 1 :] = min(shown[-1], shown[0])
         body = distance < self.config.body_m
         return (distance < between[beam]) | body, distance < self.config.body_m - HALF_DIAGONAL * self.config.cell_m
-
-    @staticmethod
-    def _reach(scan: Scan) -> Float[np.ndarray, " k"]:
-        """How far each beam shows free floor; a lone missing return may be a fault, so its neighbours speak for it."""
-        around = np.concatenate([scan.ranges_m[-1:], scan.ranges_m, scan.ranges_m[:1]])
-        before, here, after = around[:-2], around[1:-1], around[2:]
-        # A minimum with NaN is NaN: a missing return is alone where both neighbours returned.
-        reach = np.where(np.isfinite(here), here, np.minimum(before, after))
-        return np.where(np.isfinite(reach), reach, scan.range_max_m)
 
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""

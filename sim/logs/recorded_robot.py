@@ -11,13 +11,14 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 from .archive import ArchiveError, read_archive
 
-FORMAT = 1
-"""The number in every log; another one when a log of before can no longer be read."""
+FORMAT = 2
+"""The number in every log. In logs of format 1, which are read as well, NaN means that nothing came back, and all beams
+have one standard deviation."""
 NEEDED = {
     "time_s": "float s",
     "bearings_rad": "float k",
     "ranges_m": "float s k",
-    "sigma_m": "float",
+    "sigma_m": "float k",
     "range_max_m": "float",
     "odometry": "float s 3",
     "odometry_cov": "float s 3 3",
@@ -30,7 +31,7 @@ TRUTH = {
     "true_face_of_beam": "int s k",
 }
 """What a simulated run tells besides."""
-LATER = {"touched": "bool s"}
+LATER = {"touched": "bool s", "sigma_share": "float"}
 """What older logs do not hold."""
 MOST_M = 1e6
 """Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
@@ -47,16 +48,26 @@ class Recording:
     time_s: Float[np.ndarray, " s"]
     bearings_rad: Float[np.ndarray, " k"]
     ranges_m: Float[np.ndarray, "s k"]
-    sigma_m: float
+    """+inf where nothing came back, NaN where a beam tells nothing."""
+    sigma_m: Float[np.ndarray, " k"]
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each scan, robot frame before the motion, m m rad; zero for the first."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
     touched: Bool[np.ndarray, " s"] | None = None
     """Whether the body met something on the way to each scan; None where nobody kept it."""
+    sigma_share: float = 0.0
+    """What of the standard deviation grows with the range, as a share of it."""
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def scan(self, index: int) -> Scan:
+        """Return one of its scans."""
+        return Scan(
+            self.bearings_rad, self.ranges_m[index], self.sigma_m, self.range_max_m, float(self.time_s[index]),
+            self.sigma_share,
+        )  # fmt: skip
 
 
 class RecordedRobot:
@@ -69,7 +80,7 @@ class RecordedRobot:
     def sense(self) -> Scan:
         """Return the scan at the present place of the recording."""
         r = self._recording
-        return Scan(r.bearings_rad, r.ranges_m[self._at], r.sigma_m, r.range_max_m, float(r.time_s[self._at]))
+        return r.scan(self._at)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Go on to the next scan, whatever the command; raises EOFError at the end of the recording."""
@@ -86,8 +97,10 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
     name = source.name if isinstance(source, Path) else "log.npz"
     try:
         said = read_archive(source, {"format": "int"})["format"]
-        if said != FORMAT:
+        if not 1 <= said <= FORMAT:
             raise ArchiveError(f"format {said}, where this version reads {FORMAT}")
+        if said == 1:
+            return _of_format_1(read_archive(source, NEEDED | {"sigma_m": "float"}, {**TRUTH, **LATER}))
         return read_archive(source, NEEDED, {**TRUTH, **LATER})
     except FileNotFoundError as error:
         raise RecordingError(f"expected a run's log.npz, found no file {name} there: name a log that exists") from error
@@ -98,11 +111,18 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
         raise RecordingError(f"expected a run's log.npz, found {name} ({reason}): name a run's log") from error
 
 
+def _of_format_1(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    ranges = arrays["ranges_m"]
+    sigma = np.full(len(arrays["bearings_rad"]), float(arrays["sigma_m"]))
+    return arrays | {"ranges_m": np.where(np.isnan(ranges), np.inf, ranges), "sigma_m": sigma}
+
+
 def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
     """Return the recording in a log's arrays; raises RecordingError where their numbers make none."""
     recording = Recording(
-        arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], float(arrays["sigma_m"]),
+        arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], arrays["sigma_m"],
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
+        float(arrays.get("sigma_share", 0.0)),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:
@@ -113,14 +133,16 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
 def _faults(r: Recording) -> Iterator[tuple[bool, str]]:
     """Yield, in order, whether a recording is none in some way, and that way in words."""
     yield len(r) < 1 or len(r.bearings_rad) < 2, f"{len(r)} scans of {len(r.bearings_rad)} beams"
-    for name in ("time_s", "bearings_rad", "sigma_m", "range_max_m", "odometry", "odometry_cov"):
+    for name in ("time_s", "bearings_rad", "sigma_m", "sigma_share", "range_max_m", "odometry", "odometry_cov"):
         yield not within(getattr(r, name), MOST_M), f"{name} with NaN or beyond {MOST_M:g}"
-    yield not r.sigma_m > 0 or not r.range_max_m > 0, f"sigma_m {r.sigma_m:g}, range_max_m {r.range_max_m:g}"
+    least = float(r.sigma_m.min(initial=np.inf))
+    noise = not least > 0 or not r.range_max_m > 0 or r.sigma_share < 0
+    yield noise, f"sigma_m {least:g}, sigma_share {r.sigma_share:g}, range_max_m {r.range_max_m:g}"
     yield bool(np.any(np.diff(r.time_s) < 0)), "times that run backwards"
     steps = np.diff(r.bearings_rad)
     even = np.allclose(steps, steps.mean(), rtol=1e-3, atol=1e-6)
     yield not even or not 0 < steps.sum() < 2 * np.pi, "bearings that are not evenly spread over a turn at most"
-    far = bool(np.any((r.ranges_m <= 0) | (r.ranges_m > r.range_max_m)))
+    far = bool(np.any((r.ranges_m <= 0) | (np.isfinite(r.ranges_m) & (r.ranges_m > r.range_max_m))))
     yield far, f"ranges of 0 m or less or beyond {r.range_max_m:g} m"
     yield not are_covariances(r.odometry_cov), "odometry_cov that is no covariance"
 

@@ -106,7 +106,7 @@ def _sharpen(
     other = np.concatenate((after, k))
     predicted, variance = prediction(_take(fit, other), returns.beams.cos[at], returns.beams.sin[at])
     off2 = np.square(predicted - returns.beams.rho[at])
-    explained = off2 < config.doubt_sigmas**2 * (returns.sigma_m**2 + variance)
+    explained = off2 < config.doubt_sigmas**2 * (returns.sigma_m[at] ** 2 + variance)
     in_doubt[k, 1], in_doubt[after, 0] = explained[: len(k)], explained[len(k) :]
     return fit, Pieces(start, stop), is_corner, in_doubt
 
@@ -143,8 +143,8 @@ def _fitted(
     place = np.arange(len(line)) + (start - offsets)[line]
     at = place % len(returns.beam)
     beams = Beams(returns.beams.cos[at], returns.beams.sin[at], returns.beams.rho[at])
-    sigma2 = returns.sigma_m**2
-    fit = refit(fit, beams, line, offsets, np.full(len(line), 1.0 / sigma2))
+    sigma2 = returns.sigma_m[at] ** 2
+    fit = refit(fit, beams, line, offsets, 1.0 / sigma2)
     gate = np.full(len(line), config.noise_sigmas**2)
     free = np.concatenate((offsets[~is_corner[:, 0]], (offsets + size - 1)[~is_corner[:, 1]]))
     gate[free] = config.open_gate_sigmas**2
@@ -154,7 +154,7 @@ def _fitted(
     fit = refit(fit, beams, line, offsets, is_in / sigma2)
     counts = np.add.reduceat(is_in, offsets, dtype=int)
     off = 1.0 / (fit.a[line] * beams.cos + fit.b[line] * beams.sin) - beams.rho
-    chi2 = np.add.reduceat(np.where(is_in, np.square(off), 0.0), offsets) / sigma2
+    chi2 = np.add.reduceat(np.where(is_in, np.square(off), 0.0) / sigma2, offsets)
     first = np.minimum.reduceat(np.where(is_in, place, place[-1] + 1), offsets)
     last = np.maximum.reduceat(np.where(is_in, place, place[0] - 1), offsets)
     good = (counts >= config.least_beams) & np.isfinite(fit.a + fit.b)
@@ -203,7 +203,7 @@ def _free_kinds(
     at = beyond % m
     steps = np.abs(returns.turn[at] + returns.period * (beyond // m) - turn[..., None])
     inverse = fit.a[:, None, None] * returns.beams.cos[at] + fit.b[:, None, None] * returns.beams.sin[at]
-    hides = inverse * (returns.beams.rho[at] + config.noise_sigmas * returns.sigma_m) < 1.0
+    hides = inverse * (returns.beams.rho[at] + config.noise_sigmas * returns.sigma_m[at]) < 1.0
     hides &= steps <= config.gap_beams
     return np.where(hides.any(axis=-1), int(EndKind.OCCLUDED), int(EndKind.OPEN))
 

@@ -35,7 +35,7 @@ class Fit(NamedTuple):
     """Information of b."""
 
 
-def prefix_sums(beams: Beams, sigma_m: float) -> Float[np.ndarray, "6 m1"]:
+def prefix_sums(beams: Beams, sigma_m: Float[np.ndarray, " m"]) -> Float[np.ndarray, "6 m1"]:
     """Return running sums, from 0, of the weighted normal equations, so that any run of beams is fitted in O(1)."""
     rho2 = np.square(beams.rho / sigma_m)
     x, y = beams.rho * beams.cos, beams.rho * beams.sin

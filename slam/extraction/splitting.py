@@ -31,8 +31,8 @@ class Returns(NamedTuple):
     """Beams of a full turn; 0 when the scan is not one."""
     step_rad: float
     """Angle between neighbouring beams."""
-    sigma_m: float
-    """Standard deviation of a range."""
+    sigma_m: Float[np.ndarray, " m"]
+    """Standard deviation of each range."""
 
 
 class Pieces(NamedTuple):
@@ -52,9 +52,9 @@ def _steepest(step_rad: float, config: ExtractionConfig) -> Float[np.ndarray, " 
 
 def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
     """Return the returns and their breaks, rolled to begin after a break, or at the farthest in a closed room."""
-    sigma = max(float(scan.sigma_m), 1e-6)
+    sigmas = np.maximum(scan.sigmas_m, 1e-6)
     ranges, bearings = scan.ranges_m, scan.bearings_rad
-    beam = ((ranges > config.noise_sigmas * sigma) & (ranges <= min(scan.range_max_m, _FAR_M))).nonzero()[0]
+    beam = ((ranges > config.noise_sigmas * sigmas) & (ranges <= min(scan.range_max_m, _FAR_M))).nonzero()[0]
     m = len(beam)
     if m < config.least_beams:
         return None
@@ -68,7 +68,9 @@ def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
     gap[0] = beam[0] + period - beam[-1] if period else config.gap_beams + 1
     near, far = np.minimum(rho, before), np.maximum(rho, before)
     steepest = _steepest(step, config)[np.minimum(gap, config.gap_beams + 1)]
-    found = (far - near * steepest > config.noise_sigmas * sigma).nonzero()[0]
+    sigma = sigmas[beam]
+    noise = np.maximum(sigma, np.concatenate((sigma[-1:], sigma[:-1])))
+    found = (far - near * steepest > config.noise_sigmas * noise).nonzero()[0]
     first = int(found[0]) if len(found) else int(rho.argmax())
     breaks = np.empty(max(len(found), 1) + 1, int)
     breaks[0], breaks[-1] = 0, m
@@ -78,7 +80,7 @@ def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
         beam = np.concatenate((beam[first:], beam[:first]))
         turn = beam.copy()
         turn[m - first :] += period
-        rho = ranges[beam]
+        rho, sigma = ranges[beam], sigmas[beam]
     theta = bearings[beam]
     return Returns(Beams(np.cos(theta), np.sin(theta), rho), beam, turn, breaks, len(found) == 0, period, step, sigma)
 
@@ -143,7 +145,8 @@ def rolled(returns: Returns, first: int) -> Returns:
     beams = Beams(*(np.concatenate((x[first:], x[:first])) for x in returns.beams))
     beam = np.concatenate((returns.beam[first:], returns.beam[:first]))
     turn = np.concatenate((returns.turn[first:], returns.turn[:first] + returns.period))
-    return returns._replace(beams=beams, beam=beam, turn=turn)
+    sigma = np.concatenate((returns.sigma_m[first:], returns.sigma_m[:first]))
+    return returns._replace(beams=beams, beam=beam, turn=turn, sigma_m=sigma)
 
 
 def choose(

@@ -89,7 +89,7 @@ class ChangePoints:
         alpha, r = segments.lines[pairs[:, 0]].T
         off_normal = scan.bearings_rad[beams] - alpha[of]
         cos = np.cos(off_normal)
-        across, sigma = scan.ranges_m[beams] * cos - r[of], scan.sigma_m * cos
+        across, sigma = scan.ranges_m[beams] * cos - r[of], scan.sigmas_m[beams] * cos
         ours = np.abs(across) < self._config.gate_sigmas * sigma
         number = np.arange(len(of))
         from_end = np.minimum(number - np.searchsorted(of, of), np.searchsorted(of, of, side="right") - 1 - number)

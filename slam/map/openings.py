@@ -102,7 +102,6 @@ def passing(
     """
     bearing = pose_world[2] + scan.bearings_rad
     beam = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    ranges = np.where(np.isfinite(scan.ranges_m), scan.ranges_m, scan.range_max_m)
     gap, start = to_world - from_world, from_world - pose_world[:2]
     width = np.hypot(gap[:, 0], gap[:, 1])
     # p + s beam = from + u gap; with J the quarter turn, x·(J y) = 0 for x parallel to y.
@@ -118,5 +117,5 @@ def passing(
         & (u > margin)
         & (u < 1.0 - margin)
         & (s > 0)
-        & (ranges > s + beyond_m + across_m / np.maximum(sine, 1e-9))
+        & (scan.passed_m > s + beyond_m + across_m / np.maximum(sine, 1e-9))
     )

@@ -44,8 +44,7 @@ def ray_evidence(
     distance = r[:, None] / safe
     foot = np.vecdot(directions(means[:, 0]), -to_anchor)
     along = np.where(ahead, foot[:, None] + distance * np.sin(off_normal), np.nan)
-    ranges = np.where(np.isfinite(scan.ranges_m), scan.ranges_m, scan.range_max_m)
-    across = (ranges - distance) * safe
+    across = (scan.passed_m - distance) * safe
     returned = np.isfinite(scan.ranges_m)
     hits = ahead & returned & (np.abs(across) <= margin_m)
     passes = ahead & (across > margin_m)

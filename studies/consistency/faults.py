@@ -61,5 +61,6 @@ def _noisier(run: RecordedRun, sigma_m: float) -> RecordedRun:
         true, hit = finder.cast(pose)
         draws = standard_normals(trial.seed, Channel.LASER, k, len(true))
         ranges[k] = noisy(true, sigma_m, draws, lidar.range_max_m)
-        faces[k] = np.where(np.isnan(true), -1, hit)
-    return replace(run, recording=replace(recording, ranges_m=ranges, sigma_m=sigma_m), true_face_of_beam=faces)
+        faces[k] = np.where(np.isfinite(true), hit, -1)
+    told = replace(recording, ranges_m=ranges, sigma_m=np.full_like(recording.sigma_m, sigma_m))
+    return replace(run, recording=told, true_face_of_beam=faces)

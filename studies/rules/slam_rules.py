@@ -268,7 +268,7 @@ SCAN = (
            "trim = «(in_doubt | ~is_corner) & (size - 2 >= config.least_beams)[:, None]»",
            NO, "the last beam at a free end or one in doubt is left out"),
     Switch("extraction.in_doubt", "slam.extraction.extract",
-           "explained = «off2 < config.doubt_sigmas**2 * (returns.sigma_m**2 + variance)»",
+           "explained = «off2 < config.doubt_sigmas**2 * (returns.sigma_m[at] ** 2 + variance)»",
            NO, "a beam that the neighbour's line explains is in doubt"),
     Switch("extraction.inset", "slam.extraction.extract",
            "inset = «(stop - start - 2 > config.least_beams).astype(int)»",

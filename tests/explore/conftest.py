@@ -57,7 +57,7 @@ class Scene:
             for c in chains
         )
         candidates = tuple(e for c in found for e in c.open_ends if (e.wall, e.side) not in set_aside)
-        scan = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.nan), 0.01, 4.0, 0.0)
+        scan = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.inf), 0.01, 4.0, 0.0)
         return Situation(
             around=Surroundings(walls, self.grid, scan),
             chains=found,

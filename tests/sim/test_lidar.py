@@ -6,7 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.lidar import LidarConfig, RangeFinder, bearings, noisy
+from sim.lidar import LidarConfig, RangeFinder, beam_sigmas, bearings, noisy
+from slam.robot import Scan
 
 FULL = LidarConfig()
 HALF = LidarConfig(beams=181, fov_rad=np.pi)
@@ -27,7 +28,7 @@ def brute_force(faces, config, pose):
     ends = (faces - pose[:2]).reshape(-1, 2)
     miss = np.arctan2(ends[:, 1], ends[:, 0]) - directions[:, None]
     near_an_end = np.abs((miss + np.pi) % (2 * np.pi) - np.pi).min(axis=1) < 1e-7
-    return np.where(ranges <= config.range_max_m, ranges, np.nan), near_an_end
+    return np.where(ranges <= config.range_max_m, ranges, np.inf), near_an_end
 
 
 def room(x0, y0, x1, y1):
@@ -92,7 +93,7 @@ def test_faces_are_transparent_from_behind_and_a_face_without_length_is_ignored(
 
 def test_an_empty_world_returns_nothing():
     ranges, face = RangeFinder(np.zeros((0, 2, 2)), FULL).cast(np.zeros(3))
-    assert np.all(np.isnan(ranges))
+    assert np.all(np.isposinf(ranges))
     assert np.all(face == -1)
 
 
@@ -108,10 +109,18 @@ def test_bearings_of_a_full_turn_do_not_repeat_its_end_and_those_of_a_half_turn_
     np.testing.assert_allclose(np.rad2deg(bearings(HALF)), np.arange(-90.0, 91.0))
 
 
-def test_noise_is_radial_and_measurements_beyond_the_maximum_are_rejected():
-    ranges = np.array([1.0, 3.995, 3.995, np.nan])
-    measured = noisy(ranges, 0.01, np.array([2.0, 1.0, -1.0, 0.0]))
-    np.testing.assert_allclose(measured, [1.02, np.nan, 3.985, np.nan])
+def test_noise_is_radial_and_measurements_beyond_the_maximum_are_none_and_those_below_0_tell_nothing():
+    ranges = np.array([1.0, 3.995, 3.995, np.inf, 0.01])
+    measured = noisy(ranges, 0.01, np.array([2.0, 1.0, -1.0, 0.0, -2.0]))
+    np.testing.assert_allclose(measured, [1.02, np.inf, 3.985, np.inf, np.nan])
+
+
+def test_noise_that_grows_with_the_range_has_the_stated_standard_deviation_at_each_range():
+    config = LidarConfig(sigma_m=0.01, sigma_share=0.02)
+    assert beam_sigmas(np.array([1.0]), LidarConfig()) == 0.01
+    np.testing.assert_allclose(beam_sigmas(np.array([0.5, 2.0, np.inf]), config), [0.01 * 2**0.5, 0.01 * 17**0.5, 0.01])
+    scan = Scan(bearings(config)[:3], np.array([0.5, 2.0, np.inf]), 0.01, 4.0, 0.0, 0.02)
+    np.testing.assert_allclose(scan.sigmas_m, beam_sigmas(scan.ranges_m, config))
 
 
 def test_an_impossible_field_of_view_is_refused():

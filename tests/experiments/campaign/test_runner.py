@@ -19,7 +19,6 @@ from experiments.campaign.store import opened, read_campaigns
 from experiments.campaign.work import Job, perform
 from experiments.commands.cli import main
 from slam.extraction.extract import extract
-from slam.robot import Scan
 from tests.experiments.campaign.running import run
 
 ROOT = Path(__file__).parents[3]
@@ -170,8 +169,7 @@ def test_replays_of_one_recording_extract_each_scan_once_and_see_what_extraction
     config = config_of(CAMPAIGN, trial)
     log = perform(Job(trial, config, keep_log=True)).log
     run = work._recording(log, config)
-    scans = [Scan(run.recording.bearings_rad, ranges, run.recording.sigma_m, run.recording.range_max_m, float(time_s))
-             for ranges, time_s in zip(run.recording.ranges_m, run.recording.time_s, strict=True)]  # fmt: skip
+    scans = [run.recording.scan(k) for k in range(len(run.recording))]
     extracted, rules = work.remembered(log), config.mission.mapper.extraction
     assert len({scan.time_s for scan in scans}) == len(scans)
     for scan in scans:

@@ -48,9 +48,10 @@ def test_a_region_covers_the_free_cells_within_it():
 def test_a_cell_is_seen_if_it_lies_before_the_return_of_its_nearest_beam(bearings, range_max_m):
     rng = np.random.default_rng(2)
     ranges = rng.uniform(0.2, 2.0, len(bearings))
-    ranges[::7], ranges[3::11] = np.nan, np.inf
+    ranges[::7], ranges[3::11], ranges[20:24] = np.nan, np.inf, np.inf
     floor = Floor(ROOM)
     floor.look(POSE, bearings, ranges, range_max_m)
+    full = len(bearings) == 90
     half, checked = 0.5 * (bearings[1] - bearings[0]), {True: 0, False: 0}
     for row, column, x, y in cells():
         off = np.angle(np.exp(1j * (np.arctan2(y - POSE[1], x - POSE[0]) - POSE[2] - bearings)))
@@ -59,7 +60,13 @@ def test_a_cell_is_seen_if_it_lies_before_the_return_of_its_nearest_beam(bearing
         # Beyond the range the grid may hold any cell within its square; where beams end, either neighbour may count.
         if max(abs(x - POSE[0]), abs(y - POSE[1])) > range_max_m - CELL_M or abs(abs(off[nearest]) - half) < 1e-9:
             continue
-        reach = ranges[nearest] if not np.isnan(ranges[nearest]) else range_max_m
+        beside = ranges[[nearest - 1, (nearest + 1) % len(ranges)]]
+        if not full and nearest in (0, len(ranges) - 1):
+            beside = np.array([np.inf, np.inf])
+        if np.isfinite(ranges[nearest]) or np.isfinite(beside).all():
+            reach = ranges[nearest] if np.isfinite(ranges[nearest]) else min(beside)
+        else:
+            reach = 0.0 if np.isnan(ranges[nearest]) else range_max_m
         expected = bool(floor.free[row, column] and abs(off[nearest]) < half and distance <= reach)
         assert floor.seen[row, column] == expected, (row, column)
         checked[expected] += 1

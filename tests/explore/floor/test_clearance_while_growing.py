@@ -24,7 +24,7 @@ def test_clearances_equal_a_full_distance_transform_after_many_updates_and_growt
     pose, shapes = np.zeros(3), set()
     for _ in range(60):
         pose = pose + rng.normal(0, [0.5, 0.5, 1.0])
-        ranges = np.where(rng.random(90) < 0.2, np.nan, rng.uniform(0.25, 1.5, 90))
+        ranges = np.where(rng.random(90) < 0.2, np.inf, rng.uniform(0.25, 1.5, 90))
         grid.integrate(pose, Scan(bearings, ranges, 0.01, 1.6, 0.0))
         shapes.add(grid.shape)
         if rng.random() < 0.4:

@@ -126,7 +126,7 @@ def test_a_direction_that_was_not_scanned_stays_unknown():
 def test_beams_without_return_show_free_floor_up_to_the_range_and_nothing_occupied():
     bearings = -np.pi + np.arange(180) * np.deg2rad(2.0)
     grid = FreeSpace()
-    grid.integrate(np.zeros(3), Scan(bearings, np.full(180, np.nan), 0.01, 1.5, 0.0))
+    grid.integrate(np.zeros(3), Scan(bearings, np.full(180, np.inf), 0.01, 1.5, 0.0))
     assert np.all(grid.evidence <= 0)
     centres = grid.points(np.argwhere(np.ones(grid.shape, dtype=bool))).reshape(*grid.shape, 2)
     distance = np.hypot(centres[..., 0], centres[..., 1])
@@ -149,7 +149,7 @@ def test_clearances_equal_a_full_distance_transform_after_many_updates(seed):
     grid, bearings = FreeSpace(), -np.pi + np.arange(90) * np.deg2rad(4.0)
     for _ in range(60):
         pose = rng.uniform([-0.4, -0.4, -4.0], [0.4, 0.4, 4.0])
-        ranges = np.where(rng.random(90) < 0.2, np.nan, rng.uniform(0.25, 1.5, 90))
+        ranges = np.where(rng.random(90) < 0.2, np.inf, rng.uniform(0.25, 1.5, 90))
         grid.integrate(pose, Scan(bearings, ranges, 0.01, 1.6, 0.0))
         if rng.random() < 0.4:
             np.testing.assert_allclose(grid.clearance(), full_clearance(grid), atol=1e-6)

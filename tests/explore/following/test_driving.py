@@ -25,7 +25,7 @@ def scan_of(ranges):
 def open_floor(pose):
     """Return a free space in which everything around the robot was seen free."""
     grid = FreeSpace()
-    grid.integrate(pose, scan_of(np.full(180, np.nan)))
+    grid.integrate(pose, scan_of(np.full(180, np.inf)))
     return grid
 
 
@@ -48,7 +48,7 @@ def test_the_disc_keeps_clear_of_all_returns_on_the_whole_step(seed):
     grid = open_floor(pose)
     pilot = pilot_to(pose[:2] + rng.uniform(-1.5, 1.5, 2), pose, grid)
     ranges = rng.uniform(rng.choice([0.21, 0.3]), 1.2, 180)
-    ranges[rng.random(180) < rng.uniform(0, 0.95)] = np.nan
+    ranges[rng.random(180) < rng.uniform(0, 0.95)] = np.inf
     scan = scan_of(ranges)
     command = pilot.command(pose, scan, grid)
     if command is None or command.forward_m == 0.0 or not len(returns(scan)):
@@ -68,7 +68,7 @@ def test_no_step_leads_nearer_to_a_lone_corner_that_is_within_the_margin(ahead, 
     pose = np.zeros(3)
     grid = open_floor(pose)
     corner = np.array([ahead, side * np.sqrt(0.208**2 - ahead**2)])
-    ranges = np.full(180, np.nan)
+    ranges = np.full(180, np.inf)
     at = np.argmin(np.abs(BEARINGS - np.arctan2(corner[1], corner[0])))
     ranges[at] = np.hypot(*corner)
     scan = scan_of(ranges)
@@ -83,10 +83,10 @@ def test_a_corner_that_this_scan_shows_too_far_is_kept_clear_of_where_the_scans_
     """A wall's end 0.225 m away showed 0.239 m in one beam, and 24 mm of that were taken: the robot touched it."""
     pose, grid = np.zeros(3), open_floor(np.zeros(3))
     way = np.array([np.cos(-0.97), np.sin(-0.97)])
-    ranges = np.full(180, np.nan)
+    ranges = np.full(180, np.inf)
     ranges[np.argmin(np.abs(BEARINGS + 0.97))] = 0.239
     recent = AccumulatedReturns()
-    recent.see(scan_of(np.where(np.isfinite(ranges), 0.226, np.nan)))
+    recent.see(scan_of(np.where(np.isfinite(ranges), 0.226, np.inf)))
     pilot = pilot_to(np.array([1.0, 0.2]), pose, grid)
     bold, careful = (
         pilot.command(pose, scan_of(ranges), grid, seen) for seen in (np.zeros((0, 2)), recent.points_robot)
@@ -103,7 +103,7 @@ def test_a_corner_that_this_scan_shows_too_far_is_kept_clear_of_where_the_scans_
 def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
     rng = np.random.default_rng(seed)
     recent = AccumulatedReturns()
-    ranges = np.full(180, np.nan)
+    ranges = np.full(180, np.inf)
     at = rng.choice(180, 5, replace=False)
     ranges[at] = rng.uniform(0.2, 0.8, 5)
     scan = scan_of(ranges)
@@ -115,7 +115,7 @@ def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
         pose = compose(pose, motion)
     np.testing.assert_allclose(to_world(recent.points_robot, pose), seen, atol=1e-12)
     for _ in range(SCANS):
-        recent.see(scan_of(np.full(180, np.nan)))
+        recent.see(scan_of(np.full(180, np.inf)))
     assert not len(recent.points_robot)
 
 
@@ -126,7 +126,7 @@ def test_commands_are_short_forward_steps_and_small_turns(seed):
     pose = np.append(rng.uniform(-1, 1, 2), rng.uniform(-3, 3))
     grid = open_floor(pose)
     pilot = pilot_to(pose[:2] + rng.uniform(-1.5, 1.5, 2), pose, grid)
-    command = pilot.command(pose, scan_of(np.full(180, np.nan)), grid)
+    command = pilot.command(pose, scan_of(np.full(180, np.inf)), grid)
     assert command is not None
     assert 0.0 <= command.forward_m <= CONFIG.step_m
     assert abs(command.turn_rad) <= CONFIG.turn_rad + 1e-12
@@ -140,7 +140,7 @@ def test_the_robot_gets_to_the_end_of_a_free_path(heading):
     for _ in range(80):
         if pilot.arrived(pose):
             break
-        command = pilot.command(pose, scan_of(np.full(180, np.nan)), grid)
+        command = pilot.command(pose, scan_of(np.full(180, np.inf)), grid)
         assert command is not None
         pose = compose(pose, arc(command.forward_m, command.turn_rad))
     assert np.hypot(*(pose[:2] - goal)) < CONFIG.arrived_m
@@ -151,11 +151,11 @@ def test_a_path_through_a_return_is_obstructed_and_one_past_it_is_not():
     pose = np.zeros(3)
     grid = open_floor(pose)
     pilot = pilot_to(np.array([1.0, 0.0]), pose, grid)
-    ranges = np.full(180, np.nan)
+    ranges = np.full(180, np.inf)
     ranges[np.argmin(np.abs(BEARINGS))] = 0.6
     assert pilot.is_obstructed(pose, scan_of(ranges))
-    assert not pilot.is_obstructed(pose, scan_of(np.full(180, np.nan)))
-    aside = np.full(180, np.nan)
+    assert not pilot.is_obstructed(pose, scan_of(np.full(180, np.inf)))
+    aside = np.full(180, np.inf)
     aside[np.argmin(np.abs(BEARINGS - np.pi / 2))] = 0.3
     assert not pilot.is_obstructed(pose, scan_of(aside))
 
@@ -166,7 +166,7 @@ def test_a_step_onto_floor_that_was_never_seen_is_careful():
     blind = FreeSpace()
     blind.integrate(pose, scan_of(np.full(180, 0.3)))
     pilot = pilot_to(np.array([1.0, 0.0]), pose, seen)
-    free = scan_of(np.full(180, np.nan))
+    free = scan_of(np.full(180, np.inf))
     bold, careful = pilot.command(pose, free, seen), pilot.command(pose, free, blind)
     assert bold is not None
     assert careful is not None
@@ -176,7 +176,7 @@ def test_a_step_onto_floor_that_was_never_seen_is_careful():
 def test_a_robot_that_faces_the_wrong_way_turns_on_the_spot_the_short_way():
     pose = np.zeros(3)
     grid = open_floor(pose)
-    free = scan_of(np.full(180, np.nan))
+    free = scan_of(np.full(180, np.inf))
     left = pilot_to(np.array([-1.0, 0.2]), pose, grid).command(pose, free, grid)
     right = pilot_to(np.array([-1.0, -0.2]), pose, grid).command(pose, free, grid)
     assert left == MotionCommand(0.0, CONFIG.turn_rad)

@@ -101,7 +101,7 @@ def test_what_is_near_is_found_without_a_search_of_the_whole_building(monkeypatc
     grid, searched = FreeSpace(), []
     beams = np.linspace(-np.pi, np.pi, 180, endpoint=False)
     for x in np.arange(0.0, 40.0, 1.0):
-        grid.integrate(np.array([x, 0.0, 0.0]), Scan(beams, np.full(180, np.nan), 0.01, 4.0, 0.0))
+        grid.integrate(np.array([x, 0.0, 0.0]), Scan(beams, np.full(180, np.inf), 0.01, 4.0, 0.0))
 
     def noted(blocks):
         searched.append(blocks.shape)

@@ -284,7 +284,7 @@ def test_where_no_wall_was_seen_all_floor_costs_the_same():
     grid = FreeSpace()
     for x in (0.0, 2.0, 4.0):
         grid.integrate(
-            np.array([x, 0.0, 0.0]), Scan(np.linspace(-np.pi, np.pi, 181)[:-1], np.full(180, np.nan), 0.01, 4.0, 0.0)
+            np.array([x, 0.0, 0.0]), Scan(np.linspace(-np.pi, np.pi, 181)[:-1], np.full(180, np.inf), 0.01, 4.0, 0.0)
         )
     start, goal = np.array([-1.0, 0.0]), np.array([5.0, 0.0])
     path = Planner(grid, start, CONFIG).to(goal[None])

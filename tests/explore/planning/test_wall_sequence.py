@@ -16,7 +16,7 @@ from slam.robot import Scan
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
 STANDOFF_M, REACH_M = 0.35, 1.0
-NOTHING_SEEN = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.nan), 0.01, REACH_M, 0.0)
+NOTHING_SEEN = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.inf), 0.01, REACH_M, 0.0)
 
 
 def around_room(scene):

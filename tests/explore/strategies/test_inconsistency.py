@@ -16,7 +16,7 @@ from slam.robot import Odometry, Scan
 
 START = np.array([3.0, -2.0, 0.4])
 START_COV = np.diag([0.02, 0.02, 0.01]) ** 2
-NOTHING_SEEN = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.nan), 0.01, 4.0, 0.0)
+NOTHING_SEEN = Scan(np.linspace(-3.1, 3.1, 180), np.full(180, np.inf), 0.01, 4.0, 0.0)
 
 
 def moved(mean, anchors, shift, turn):

@@ -138,7 +138,7 @@ def test_the_noise_of_the_innovation_is_that_of_fits_to_noisy_beams(middle, epsi
     lines, covs = np.zeros((3000, 2)), np.zeros((3000, 2, 2))
     for k in range(3000):
         ranges = true_ranges + sigma * rng.standard_normal(40)
-        sums = prefix_sums(Beams(np.cos(bearings), np.sin(bearings), ranges), sigma)
+        sums = prefix_sums(Beams(np.cos(bearings), np.sin(bearings), ranges), np.full(len(ranges), sigma))
         fit, _ = fit_runs(sums, np.array([0]), np.array([40]))
         lines[k : k + 1], covs[k : k + 1] = polar(fit)
     many = innovations(np.zeros(3), np.repeat(anchors, 3000, 0), np.repeat(means, 3000, 0), lines, covs)

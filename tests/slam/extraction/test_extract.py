@@ -252,7 +252,7 @@ def test_a_gap_of_more_than_three_beams_parts_a_wall_and_a_single_missing_beam_d
     scan = scan_of(wall(0.0, half_length=1.5), np.zeros(3))
     for missing, pieces in ((1, 1), (2, 1), (4, 2)):
         ranges = scan.ranges_m.copy()
-        ranges[90 : 90 + missing] = np.nan
+        ranges[90 : 90 + missing] = np.inf
         assert len(extract(replace(scan, ranges_m=ranges))) == pieces
 
 
@@ -275,6 +275,6 @@ def test_no_scan_raises_and_what_comes_is_finite(ranges, half, sigma):
     assert np.all(segments.lines[:, 1] > 0)
 
 
-@pytest.mark.parametrize("ranges", [np.full(180, np.nan), np.full(180, 2.0), np.zeros(180), np.full(2, 1.0)])
+@pytest.mark.parametrize("ranges", [np.full(180, np.inf), np.full(180, 2.0), np.zeros(180), np.full(2, 1.0)])
 def test_degenerate_scans_are_answered(ranges):
     extract(Scan(np.linspace(-np.pi, np.pi, len(ranges), endpoint=False), ranges, SIGMA, 4.0, 0.0))

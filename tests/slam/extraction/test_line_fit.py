@@ -23,7 +23,7 @@ def test_prefix_sums_fit_every_run_as_weighted_least_squares_does(seed):
     rho = rng.uniform(0.3, 4.0, len(theta))
     start = rng.integers(0, len(rho) - 12, 5)
     stop = start + rng.integers(4, 12, 5)
-    fit, values = fit_runs(prefix_sums(Beams(np.cos(theta), np.sin(theta), rho), SIGMA), start, stop)
+    fit, values = fit_runs(prefix_sums(Beams(np.cos(theta), np.sin(theta), rho), np.full(len(rho), SIGMA)), start, stop)
     for i in range(5):
         run = slice(start[i], stop[i])
         rows = np.column_stack([np.cos(theta[run]), np.sin(theta[run])]) * (rho[run, None] ** 2 / SIGMA)

@@ -28,13 +28,17 @@ def test_passing_beams_are_those_that_shapely_sees_cross_the_middle_of_the_gap(s
     pose = np.array([*rng.uniform(-1, 1, 2), rng.uniform(-np.pi, np.pi)])
     ends = rng.uniform(-2, 2, (5, 2, 2))
     ends = ends[np.hypot(*(ends[:, 1] - ends[:, 0]).T) > 3 * 0.04]
-    ranges = np.where(rng.random(180) < 0.2, np.nan, rng.uniform(0.2, 4.0, 180))
+    ranges = np.where(rng.random(180) < 0.4, np.inf, rng.uniform(0.2, 4.0, 180))
     margin, beyond = 0.04, 0.15
     found = passing(ends[:, 0], ends[:, 1], pose, Scan(BEARINGS, ranges, 0.01, 4.0, 0.0), beyond, margin)
     for gap, row in zip(ends, found, strict=True):
         along = (gap[1] - gap[0]) / np.hypot(*(gap[1] - gap[0]))
         middle = shapely.LineString([gap[0] + margin * along, gap[1] - margin * along])
-        for bearing, reach, passes in zip(BEARINGS, np.where(np.isnan(ranges), 4.0, ranges), row, strict=True):
+        reaches = [
+            r if np.isfinite(r) else 4.0 if np.isinf([ranges[k - 1], ranges[(k + 1) % 180]]).all() else 0.0
+            for k, r in enumerate(ranges)
+        ]
+        for bearing, reach, passes in zip(BEARINGS, reaches, row, strict=True):
             ahead = np.array([np.cos(pose[2] + bearing), np.sin(pose[2] + bearing)])
             beam = shapely.LineString([pose[:2], pose[:2] + max(reach - beyond, 0.0) * ahead])
             if abs(beam.distance(middle)) < 1e-9 or beam.distance(middle) > 1e-6:
@@ -58,6 +62,7 @@ def test_a_gap_is_passed_by_two_beams_of_one_scan(through: int, is_passed: bool)
     (beams,) = np.nonzero(passing(ends[:1, HEAD], ends[1:, TAIL], pose, scan, 0.15, 0.04)[0])
     assert len(beams) > 2
     ranges = scan.ranges_m.copy()
+    ranges[beams[:through]] = 3.9
     ranges[beams[through:]] = np.hypot(*(ends[0, HEAD] - pose[:2]))
     gaps = Openings(OpeningsConfig(), ChainConfig())
     gaps.see(walls, replace(scan, ranges_m=ranges))

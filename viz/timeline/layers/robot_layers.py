@@ -104,6 +104,7 @@ class ScanLayer:
     def _scan(self, block: Block) -> None:
         bearings = block.rows[0].scan.bearings_rad
         ranges = np.array([row.scan.ranges_m for row in block.rows])
-        points = ranges[..., None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
         seen = np.isfinite(ranges)
-        self._out.points(f"{self._entity}/scan", block.moments, seen.sum(axis=1), points[seen])
+        row, beam = np.nonzero(seen)
+        along = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+        self._out.points(f"{self._entity}/scan", block.moments, seen.sum(axis=1), ranges[row, beam, None] * along[beam])

@@ -1,0 +1,78 @@
+"""What is true of a simulated robot beyond what it states: beams that get lost, bumps, wheels that slip more.
+
+Only `sim/` reads these. Each has a channel of chance of its own, so that one fault shifts no draw of another.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from .chance import Channel, uniforms
+from .drive import Slip
+
+
+@dataclass(frozen=True)
+class FaultsConfig:
+    """Faults that the robot does not know of; the defaults are none."""
+
+    dropout: float = 0.0
+    """Share of the beams that come back empty (+inf), whatever stands there."""
+    mixed: float = 0.0
+    """Share of the beams at an edge that return something between the surface before it and the one behind it."""
+    edge_m: float = 0.2
+    """An edge is where two neighbouring beams' true ranges differ by more than this m."""
+    bump: float = 0.0
+    """Share of the drives in which a bump turns the robot by `bump_rad`, to either side alike."""
+    bump_rad: float = float(np.deg2rad(8.0))
+    """How far a bump turns the robot rad; the wheels report nothing of it."""
+    slip: float = 1.0
+    """How many times as far as stated the wheels slip."""
+
+
+def with_mixed_pixels(
+    ranges: Float[np.ndarray, " k"], config: FaultsConfig, is_full_turn: bool, seed: int, step: int
+) -> tuple[Float[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
+    """Return exact ranges (k,) m with some of the beams at edges between both surfaces, evenly drawn, and which."""
+    if config.mixed <= 0.0:
+        return ranges, np.zeros(len(ranges), dtype=bool)
+    after = np.roll(ranges, -1)
+    if not is_full_turn:
+        after[-1] = ranges[-1]
+    both = np.isfinite(ranges) & np.isfinite(after)
+    leap = np.where(both, after, 0.0) - np.where(both, ranges, 0.0)
+    at_edge = np.abs(leap) > config.edge_m
+    draws = uniforms(seed, Channel.MIXED, step, 2 * len(ranges)).reshape(2, -1)
+    taken = at_edge & (draws[0] < config.mixed)
+    between = ranges.copy()
+    between[taken] += draws[1, taken] * leap[taken]
+    return between, taken
+
+
+def with_dropouts(
+    ranges: Float[np.ndarray, " k"], config: FaultsConfig, seed: int, step: int
+) -> Float[np.ndarray, " k"]:
+    """Return measured ranges (k,) m, +inf at the beams that were lost."""
+    if config.dropout <= 0.0:
+        return ranges
+    return np.where(uniforms(seed, Channel.DROPOUTS, step, len(ranges)) < config.dropout, np.inf, ranges)
+
+
+def slipped(slip: Slip, config: FaultsConfig) -> Slip:
+    """Return the slip that really happens."""
+    if config.slip == 1.0:
+        return slip
+    return replace(
+        slip,
+        left_m=config.slip * slip.left_m,
+        right_m=config.slip * slip.right_m,
+        lateral_m=config.slip * slip.lateral_m,
+    )
+
+
+def bump_rad(config: FaultsConfig, seed: int, step: int) -> float:
+    """Return by how much a bump turns the robot after a drive, rad; 0 for most."""
+    if config.bump <= 0.0:
+        return 0.0
+    share, side = uniforms(seed, Channel.BUMPS, step, 2)
+    return 0.0 if share >= config.bump else float(np.copysign(config.bump_rad, side - 0.5))

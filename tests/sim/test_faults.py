@@ -1,0 +1,80 @@
+"""Faults that a simulated robot does not know of: as many as asked for, and no other draw is shifted."""
+
+import numpy as np
+import pytest
+
+from sim.drive import Slip
+from sim.faults import FaultsConfig, bump_rad, slipped, with_dropouts, with_mixed_pixels
+from sim.robot import RobotConfig, SimulatedRobot
+from slam.robot import MotionCommand
+from tests.sim.test_robot import room
+
+DRIVES = [MotionCommand(0.1, 0.1), MotionCommand(0.15, -0.1), MotionCommand(0.0, 0.17)] * 3
+
+
+def driven(faults, seed=5):
+    """A robot's scans and odometry along some drives, and its true poses."""
+    robot = SimulatedRobot(room(), seed, config=RobotConfig(faults=faults))
+    scans, reports = [robot.sense()], []
+    for command in DRIVES:
+        reports.append(robot.drive(command))
+        scans.append(robot.sense())
+    return scans, reports, np.array(robot.record.poses_world), robot.record.faces_of_beams
+
+
+def test_without_faults_nothing_changes():
+    ranges = np.array([1.0, np.inf, 2.0])
+    none = FaultsConfig()
+    assert with_dropouts(ranges, none, 1, 0) is ranges
+    np.testing.assert_array_equal(with_mixed_pixels(ranges, none, True, 1, 0)[0], ranges)
+    slip = Slip(0.1, 0.2, 0.3)
+    assert slipped(slip, none) is slip
+    assert bump_rad(none, 1, 0) == 0.0
+
+
+def test_lost_beams_are_empty_and_hit_nothing_and_the_others_are_as_they_were():
+    right, lost = driven(FaultsConfig()), driven(FaultsConfig(dropout=0.2))
+    np.testing.assert_array_equal(right[2], lost[2])
+    gone = np.array([np.isposinf(scan.ranges_m) for scan in lost[0]])
+    assert 0.15 < gone.mean() < 0.25
+    for k, (before, after) in enumerate(zip(right[0], lost[0], strict=True)):
+        np.testing.assert_array_equal(before.ranges_m[~gone[k]], after.ranges_m[~gone[k]])
+        assert np.all(lost[3][k][gone[k]] == -1)
+        assert np.all(lost[3][k][~gone[k]] == right[3][k][~gone[k]])
+
+
+def test_mixed_pixels_lie_between_the_two_surfaces_and_only_at_edges():
+    ranges = np.array([1.0, 1.05, 3.0, 3.1, np.inf, 2.0, 1.0])
+    config, drawn = FaultsConfig(mixed=0.5), []
+    for step in range(200):
+        found, mixed = with_mixed_pixels(ranges, config, False, 3, step)
+        assert not mixed[[0, 2, 3, 4, 6]].any()
+        np.testing.assert_array_equal(found[~mixed], ranges[~mixed])
+        assert np.all(found[mixed] <= np.maximum(ranges, np.roll(ranges, -1))[mixed])
+        assert np.all(found[mixed] >= np.minimum(ranges, np.roll(ranges, -1))[mixed])
+        drawn.append(mixed[[1, 5]])
+    assert 0.4 < np.mean(drawn) < 0.6
+    turned = np.array([1.0, 2.0, 2.0, 3.0])
+    assert any(with_mixed_pixels(turned, config, True, 3, step)[1][3] for step in range(20))
+    assert not any(with_mixed_pixels(turned, config, False, 3, step)[1][3] for step in range(20))
+
+
+def test_a_bump_turns_the_robot_and_the_wheels_say_nothing_of_it():
+    right, bumped = driven(FaultsConfig()), driven(FaultsConfig(bump=1.0, bump_rad=0.1))
+    for before, after in zip(right[1], bumped[1], strict=True):
+        np.testing.assert_array_equal(before.motion, after.motion)
+        np.testing.assert_array_equal(before.cov, after.cov)
+    off = np.diff(bumped[2][:, 2]) - np.diff(right[2][:, 2])
+    np.testing.assert_allclose(np.abs(off), 0.1, atol=1e-12)
+    sides = [bump_rad(FaultsConfig(bump=0.5, bump_rad=0.1), 1, step) for step in range(400)]
+    assert 0.4 < np.mean(np.abs(sides) > 0) < 0.6
+    assert abs(np.mean(sides)) < 0.02
+
+
+@pytest.mark.parametrize("times", [0.0, 3.0])
+def test_wheels_slip_as_many_times_as_asked_and_state_the_same(times):
+    assert slipped(Slip(1.0, -2.0, 4.0), FaultsConfig(slip=times)) == Slip(times, -2.0 * times, 4.0 * times)
+    right, worse = driven(FaultsConfig()), driven(FaultsConfig(slip=times))
+    for before, after in zip(right[1], worse[1], strict=True):
+        np.testing.assert_array_equal(before.cov, after.cov)
+    assert not np.array_equal(right[2], worse[2])
