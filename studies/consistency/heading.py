@@ -142,7 +142,7 @@ class HeadingStudy:
                 off = _values(runs, "heading_error_deg")
                 line.append(f"{np.median(off):.1f}°, n {len(sound)}" if len(off) else "")
             notes.append(tuple(line))
-        return Field(f"{name}, {strategy}", anees, tuple(notes))
+        return Field(f"{name}\n{strategy}", anees, tuple(notes))
 
 
 def told(runs: Sequence[Row]) -> str:
