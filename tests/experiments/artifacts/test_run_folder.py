@@ -55,7 +55,7 @@ def before(owner, name):
     setattr(owner, name, struck)
 
 @contextmanager
-def strikes(title):
+def strikes(title, steps):
     yield strike
 
 if place == "step":
