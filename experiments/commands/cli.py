@@ -6,7 +6,7 @@ from dataclasses import dataclass, make_dataclass, replace
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks
+from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks, too_late
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
 from ..usage import UsageError, choose
 from .parsing import parsed
@@ -104,6 +104,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
+def process() -> int:
+    """Run one command as a process of its own and return its exit status, which no later signal changes."""
+    status = main()
+    too_late()
+    return status
+
+
 def _is_lost(out: Lasting | None) -> bool:
     """Whether output found no place, though somebody waits for it."""
     sys.stdout.flush()
@@ -156,4 +163,4 @@ def given(words: Sequence[str]) -> frozenset[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(process())

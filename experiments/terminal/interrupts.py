@@ -73,6 +73,11 @@ def nothing_half_built_speaks() -> Iterator[None]:
             sys.unraisablehook = hook
 
 
+def too_late() -> None:
+    """Ignore the signals from now on: all is done, and one that comes while Python ends would change the status."""
+    _set(dict.fromkeys(STOPS, signal.SIG_IGN))
+
+
 def _set(handlers: dict[signal.Signals, Any]) -> None:
     for number, handler in handlers.items():
         signal.signal(number, handler)

@@ -182,6 +182,19 @@ def test_what_an_interrupt_leaves_half_built_says_nothing(monkeypatch):
     said.clear()
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_comes_when_all_is_done_changes_no_status(number):
+    code = (
+        "import atexit, os, sys\n"
+        "from experiments.commands import cli\n"
+        f"atexit.register(os.kill, os.getpid(), {int(number)})\n"
+        "sys.argv = ['chainslam', 'strategies']\n"
+        "sys.exit(cli.process())"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
     out = tmp_path / "run"
