@@ -1,0 +1,210 @@
+"""CARMEN logs become recordings: whatever is wrong with a log, what was good before it is kept."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from sim.logs.keyframes import KeyframesConfig
+from sim.logs.recorded_log import is_own_log, read_recorded_log
+from sim.logs.recorded_robot import RecordingError, recording_of
+from slam.geometry.poses import compose, inverse, wrap
+
+
+def flaser(x, y=0.0, theta=0.0, time_s=None, ranges=(), beams=180, laser=None):
+    values = [*ranges, *[2.5] * (beams - len(ranges))]
+    laser = (x, y, theta) if laser is None else laser
+    time_s = 100.0 + x if time_s is None else time_s
+    return " ".join(map(str, ["FLASER", beams, *values, *laser, x, y, theta, time_s, "robot", time_s]))
+
+
+def robotlaser(x, beams=4, offset=(0.0, 0.0, 0.0), most=8.0, ranges=None):
+    robot = np.array([x, 0.0, 0.0])
+    laser = compose(robot, np.array(offset))
+    head = ["ROBOTLASER1", 0, -0.3, 0.6, 0.2, most, 0.01, 0, beams, *(ranges or [1.0] * beams), 2, 7, 7]
+    return " ".join(map(str, [*head, *laser, *robot, 0, 0, 0, 0, 0, 100.0 + x, "robot", 0.0]))
+
+
+def written(path, lines):
+    path.write_text("".join(f"{line}\n" for line in lines))
+    return path
+
+
+def read(tmp_path, lines, **config):
+    return read_recorded_log(written(tmp_path / "a.log", lines), KeyframesConfig(**config))
+
+
+@pytest.mark.parametrize(
+    ("beams", "step", "last"), [(180, 1.0, 89.0), (181, 1.0, 90), (360, 0.5, 89.5), (361, 0.5, 90)]
+)
+def test_beams_begin_to_the_right_and_cover_180_degrees(tmp_path, beams, step, last):
+    found = np.rad2deg(read(tmp_path, [flaser(0.0, beams=beams)]).recording.bearings_rad)
+    assert len(found) == beams
+    np.testing.assert_allclose([found[0], found[1] - found[0], found[-1]], [-90.0, step, last])
+
+
+def test_no_return_is_infinite_and_a_range_of_nothing_is_unknown(tmp_path):
+    recording = read(tmp_path, [flaser(0.0, ranges=(1.5, 81.91, 50.0, 0.0, -1.0, 39.0))]).recording
+    np.testing.assert_array_equal(recording.ranges_m[0, :6], [1.5, np.inf, np.inf, np.nan, np.nan, 39.0])
+    assert recording.range_max_m == 40.0
+
+
+def test_a_scan_is_mapped_where_the_wheels_have_moved_far_enough_or_turned(tmp_path):
+    lines = ["# a comment", "PARAM robot_length 1", "ODOM 0 0 0 0 0 0 99 robot 0"]
+    lines += [flaser(x) for x in (0.0, 0.06, 0.11, 0.15)] + [flaser(0.16, theta=0.1), flaser(0.4, theta=0.1)]
+    log = read(tmp_path, lines)
+    np.testing.assert_allclose(log.recording.time_s, [0.0, 0.11, 0.16, 0.4])
+    np.testing.assert_array_equal(log.keyframe_of_scan, [0, 0, 1, 1, 2, 3])
+    np.testing.assert_allclose(log.scan_time_s, 100.0 + np.array([0.0, 0.06, 0.11, 0.15, 0.16, 0.4]))
+    halved = read(tmp_path, lines, every=2).recording
+    np.testing.assert_allclose(halved.time_s, [0.0, 0.16])
+
+
+def test_the_scans_between_keyframes_are_where_the_wheels_say(tmp_path):
+    rng = np.random.default_rng(1)
+    poses = np.cumsum(rng.normal(0.03, 0.03, (40, 3)), axis=0)
+    log = read(tmp_path, [flaser(*pose, time_s=k) for k, pose in enumerate(poses)])
+    assert 1 < len(log.recording) < 40
+    start, keyframes = poses[0], [poses[0]]
+    for motion in log.recording.odometry[1:]:
+        keyframes.append(compose(keyframes[-1], motion))
+    found = log.poses_of_scans(np.array(keyframes))
+    np.testing.assert_allclose(found[:, :2], poses[:, :2], atol=1e-9)
+    np.testing.assert_allclose(wrap(found[:, 2] - poses[:, 2]), 0.0, atol=1e-9)
+    assert len(log.poses_of_scans(start[None])) == np.count_nonzero(log.keyframe_of_scan == 0)
+
+
+def test_what_is_mapped_is_a_recording_that_a_log_of_our_own_may_hold(tmp_path):
+    r = read(tmp_path, [flaser(0.2 * k, theta=0.3 * k) for k in range(5)]).recording
+    arrays = {name: getattr(r, name) for name in ("time_s", "bearings_rad", "ranges_m", "sigma_m", "odometry")}
+    again = recording_of(arrays | {"range_max_m": np.array(r.range_max_m), "odometry_cov": r.odometry_cov})
+    assert len(again) == 5
+    assert np.all(np.linalg.eigvalsh(r.odometry_cov[1:]) > 0)
+    assert not r.odometry_cov[0].any()
+
+
+@pytest.mark.parametrize("offset", [(0.2, 0.0, 0.0), (0.1, -0.3, 0.5)])
+def test_the_motions_are_those_of_the_scanner_on_the_robot(tmp_path, offset):
+    turned = np.array([0.0, 0.0, 0.5])
+    lines = [flaser(*p, time_s=k, laser=compose(p, np.array(offset))) for k, p in enumerate([np.zeros(3), turned])]
+    log = read(tmp_path, lines)
+    np.testing.assert_allclose(log.scanner_on_robot, offset, atol=1e-9)
+    expected = compose(inverse(np.array(offset)), compose(turned, np.array(offset)))
+    np.testing.assert_allclose(log.recording.odometry[1], expected, atol=1e-9)
+
+
+def test_a_corrected_path_beside_the_wheels_is_no_place_of_the_scanner(tmp_path):
+    lines = [flaser(0.2 * k, laser=(0.2 * k, 0.02 * k, 0.01 * k)) for k in range(6)]
+    log = read(tmp_path, lines)
+    assert not log.scanner_on_robot.any()
+    np.testing.assert_allclose(log.recording.odometry[1:, 1], 0.0, atol=1e-12)
+
+
+def test_robotlaser_tells_its_beams_its_range_and_where_it_sits(tmp_path):
+    lines = [
+        robotlaser(0.0, offset=(0.3, 0.0, 0.0), ranges=[1.0, 8.0, 9.0, 2.0]),
+        robotlaser(0.5, offset=(0.3, 0.0, 0.0)),
+    ]
+    log = read(tmp_path, lines)
+    recording = log.recording
+    np.testing.assert_allclose(recording.bearings_rad, [-0.3, -0.1, 0.1, 0.3])
+    np.testing.assert_array_equal(recording.ranges_m[0], [1.0, np.inf, np.inf, 2.0])
+    assert recording.range_max_m == 8.0
+    np.testing.assert_allclose(log.scanner_on_robot, [0.3, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(log.scan_time_s, [100.0, 100.5])
+
+
+def test_dpslam_logs_have_no_times_and_the_pose_before_each_scan(tmp_path):
+    lines = []
+    for k in range(3):
+        lines += [f"Odometry {0.2 * k} 0 0", "Laser 181 " + " ".join(["3.0"] * 181)]
+    log = read(tmp_path, lines)
+    np.testing.assert_allclose(log.scan_time_s, [0.0, 1.0, 2.0])
+    np.testing.assert_allclose(log.recording.odometry[1:], [[0.2, 0, 0]] * 2, atol=1e-12)
+    assert read(tmp_path, [*lines, "Laser 180 1"]).trouble.startswith("line 7: ")
+
+
+def test_gzip_reads_as_plain_text_does(tmp_path):
+    lines = [flaser(0.2 * k) for k in range(4)]
+    plain = read(tmp_path, lines)
+    packed = tmp_path / "b.log.gz"
+    packed.write_bytes(gzip.compress((tmp_path / "a.log").read_bytes()))
+    np.testing.assert_array_equal(read_recorded_log(packed).recording.ranges_m, plain.recording.ranges_m)
+
+
+def test_of_a_gzip_file_that_was_cut_short_the_whole_lines_are_kept(tmp_path):
+    rng = np.random.default_rng(0)
+    text = "".join(flaser(0.2 * k, ranges=rng.uniform(1, 9, 180)) + "\n" for k in range(50))
+    packed = tmp_path / "b.log.gz"
+    content = gzip.compress(text.encode())
+    packed.write_bytes(content[: len(content) // 2])
+    log = read_recorded_log(packed)
+    assert 5 < len(log.recording) < 45
+    assert log.trouble.startswith(f"after line {len(log.scan_time_s)}: ")
+    packed.write_bytes(content[:40])
+    with pytest.raises(RecordingError, match="cut short"):
+        read_recorded_log(packed)
+
+
+WRONG = [
+    (flaser(9.0, beams=90), "expected 180, 181, 360, 361 beams, found 90"),
+    (flaser(9.0, beams=181), "expected 180 beams as before, found 181"),
+    (flaser(9.0, time_s=1.0), "expected time to go on from 100.200000 s, found 1.000000 s"),
+    ("FLASER 180 1.0 2.0", "expected 180 ranges, found 2"),
+    (flaser(9.0).rsplit(" ", 3)[0], "expected 7 numbers in FLASER, found 6"),
+    (flaser(9.0, ranges=("x",)), "expected 180 ranges, found other words"),
+    (flaser("x", time_s=200.0), "expected 7 numbers in FLASER, found other words"),
+    (flaser(float("nan"), time_s=200.0), "expected finite numbers in FLASER"),
+    (flaser(1e7), "expected a pose in metres"),
+    ("FLASER", "expected a number of beams, found nothing"),
+    ("FLASER -3", "expected a number of beams, found -3"),
+    ("ODOM 1 2", "expected 3 numbers in ODOM, found 2"),
+    ("Laser 181 1", "expected an Odometry line before"),
+    ("ROBOTLASER1 0 0", "expected 7 numbers in ROBOTLASER1, found 2"),
+    ("ROBOTLASER1 0 0 1 1 8 0 0", "expected a number of beams, found nothing"),
+    (robotlaser(9.0).rsplit(" ", 3)[0], "expected 12 numbers in ROBOTLASER1, found 11"),
+    (robotlaser(9.0, most=0.0), "expected beams over one turn"),
+]
+
+
+@pytest.mark.parametrize(("line", "found"), WRONG)
+def test_a_wrong_line_is_told_with_its_number_and_the_scans_before_it_are_kept(tmp_path, line, found):
+    log = read(tmp_path, [flaser(0.0), flaser(0.2), line, flaser(300.0)])
+    assert log.trouble.startswith("line 3: "), log.trouble
+    assert found in log.trouble
+    assert "\n" not in log.trouble
+    assert len(log.recording) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (b"", "expected lines FLASER"),
+        (b"\x00\xff" * 5000, "expected lines FLASER"),
+        (b"ODOM 0 0 0 0 0 0 1 robot 1\n", "expected scans, found none"),
+        (b"FLASER 90 1\n", "line 1: expected 180"),
+        (b"x" * (2**20 + 5), "line 1: expected a line of text"),
+    ],
+)
+def test_a_log_without_one_scan_is_refused_in_one_line(tmp_path, content, found):
+    path = tmp_path / "a.log"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"expected a recorded log, found a\.log") as caught:
+        read_recorded_log(path)
+    assert found in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_file_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="a folder"):
+        read_recorded_log(tmp_path)
+    with pytest.raises(RecordingError, match="No such file"):
+        read_recorded_log(tmp_path / "none.log")
+
+
+def test_own_logs_are_told_by_their_contents(tmp_path):
+    np.savez(tmp_path / "log", a=1)
+    (tmp_path / "log.npz").rename(tmp_path / "other")
+    assert is_own_log(tmp_path / "other")
+    assert is_own_log(tmp_path / "missing.npz")
+    assert not is_own_log(written(tmp_path / "a.log", [flaser(0.0)]))
