@@ -16,7 +16,7 @@ from sim.worlds import World, WorldError, listing, load
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
-from slam.robot import Robot
+from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
 
@@ -62,6 +62,10 @@ class TrialConfig:
     mission: MappingMissionConfig = field(default_factory=MappingMissionConfig)
     backend_options: BackendOptions = field(default_factory=BackendOptions)
     """Of every back end, so that one file of settings fits a comparison; `backend` takes its own."""
+
+    def __post_init__(self) -> None:
+        """Let the mission know what the robot states of itself, and nothing else of it."""
+        object.__setattr__(self, "mission", fitted(self.mission, self.robot.spec))
 
     @property
     def limits(self) -> Limits:

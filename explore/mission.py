@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from slam.mapper import Mapper
-from slam.robot import Odometry, Robot
+from slam.robot import Odometry, Robot, RobotSpec, of_robot
 
 from .floor.accumulated_returns import AccumulatedReturns
 from .floor.floor_memory import FloorMemory, FloorMemoryConfig
@@ -31,6 +31,7 @@ from .strategies import Strategy
 class MissionConfig:
     """All that rules a mission but its mapper; each part's settings stand beside its code."""
 
+    robot: RobotSpec = of_robot()
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     floor_memory: FloorMemoryConfig = field(default_factory=FloorMemoryConfig)
@@ -46,13 +47,15 @@ def explore_mission(
     """Drive `robot` until every chain is closed or no open end can be reached, and yield each step.
 
     The `mapper` holds the back end, whose pose is where the robot believes to start. `limited` ends a mission early.
+    What the robot states of itself stands in the settings: `slam.robot.fitted(MissionConfig(), robot_spec)`.
     """
     start = mapper.backend.belief.pose_world[:2].copy()
     following = config.explorer.following
     explorer = Explorer(strategy, start, config.explorer)
     inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
     floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
-    return _mission(robot, mapper, Retreat(inner, floor, config.retreat, following), floor)
+    recent = AccumulatedReturns(config.robot)
+    return _mission(robot, mapper, Retreat(inner, floor, config.retreat, following), floor, recent)
 
 
 def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
@@ -60,11 +63,13 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
 
     Nobody plans, so nobody keeps the free floor.
     """
-    return _mission(robot, mapper, ReplayDriver(scans), None)
+    return _mission(robot, mapper, ReplayDriver(scans), None, AccumulatedReturns())
 
 
-def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
-    graph, recent = VisibilityGraph(), AccumulatedReturns()
+def _mission(
+    robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None, recent: AccumulatedReturns
+) -> Iterator[Step]:
+    graph = VisibilityGraph()
     free_space = FreeSpace() if floor is None else floor.free_space
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     given_up = GivenUp()

@@ -6,27 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.poses import arc
-from slam.robot import MotionCommand, Odometry
-
-
-@dataclass(frozen=True)
-class DriveConfig:
-    """The wheels and how they slip; the defaults lose about 4 degrees of heading per square root of a metre."""
-
-    wheel_base_m: float = 0.4
-    """Distance m between the wheels."""
-    wheel_slip: float = 0.02
-    """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
-    lateral_slip: float = 0.006
-    """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
-    floor: float = 1e-6
-    """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
-    step_max_m: float = 0.15
-    """Longest step m; longer commands are shortened along the same arc."""
-    turn_max_rad: float = float(np.deg2rad(10.0))
-    """Widest turn rad of one step; wider commands are shortened along the same arc."""
-    wheel_speed_m_s: float = 0.3
-    """Speed m/s of the faster wheel, which sets how long a step takes."""
+from slam.robot import MotionCommand, Odometry, RobotSpec, WheelSpec
 
 
 @dataclass(frozen=True)
@@ -39,53 +19,57 @@ class Slip:
     """Sideways, to the left of the middle of the arc."""
 
 
-def clamp(command: MotionCommand, config: DriveConfig) -> MotionCommand:
+def clamp(command: MotionCommand, robot: RobotSpec) -> MotionCommand:
     """Return the command scaled by one factor to within the longest step and the widest turn: same arc, less of it.
+
+    A robot that cannot reverse turns on the spot instead.
 
     Raises ValueError for a command that is not finite.
     """
     forward, turn = abs(command.forward_m), abs(command.turn_rad)
     if not (np.isfinite(forward) and np.isfinite(turn)):
         raise ValueError(f"expected a finite command, found {command}: look where the planner divides")
-    share = min(1.0, config.step_max_m / max(forward, 1e-12), config.turn_max_rad / max(turn, 1e-12))
+    if command.forward_m < 0.0 and not robot.can_reverse:
+        command, forward = MotionCommand(0.0, command.turn_rad), 0.0
+    share = min(1.0, robot.step_m / max(forward, 1e-12), robot.turn_rad / max(turn, 1e-12))
     return MotionCommand(share * command.forward_m, share * command.turn_rad)
 
 
-def wheels(command: MotionCommand, config: DriveConfig) -> tuple[float, float]:
+def wheels(command: MotionCommand, config: WheelSpec) -> tuple[float, float]:
     """Return the ways m of the left and the right wheel."""
-    half = 0.5 * config.wheel_base_m * command.turn_rad
+    half = 0.5 * config.base_m * command.turn_rad
     return command.forward_m - half, command.forward_m + half
 
 
-def seconds(command: MotionCommand, config: DriveConfig) -> float:
-    """Return how long the command takes, s."""
-    return max(abs(way) for way in wheels(command, config)) / config.wheel_speed_m_s
+def seconds(command: MotionCommand, config: WheelSpec, speed_m_s: float) -> float:
+    """Return how long the command takes, s, if the faster wheel goes at this speed."""
+    return max(abs(way) for way in wheels(command, config)) / speed_m_s
 
 
-def _slip_variances(command: MotionCommand, config: DriveConfig) -> Float[np.ndarray, "3"]:
+def _slip_variances(command: MotionCommand, config: WheelSpec) -> Float[np.ndarray, "3"]:
     """Return the variances m^2 of the left, right and lateral slip."""
     left, right = (abs(way) for way in wheels(command, config))
     return np.array(
         [
-            config.wheel_slip**2 * left,
-            config.wheel_slip**2 * right,
+            config.slip**2 * left,
+            config.slip**2 * right,
             config.lateral_slip**2 * 0.5 * (left + right),
         ]
     )
 
 
-def draw_slip(command: MotionCommand, config: DriveConfig, standard_normals: Float[np.ndarray, "3"]) -> Slip:
+def draw_slip(command: MotionCommand, config: WheelSpec, standard_normals: Float[np.ndarray, "3"]) -> Slip:
     """Return the slip of one step from three standard normal draws."""
     left, right, lateral = np.sqrt(_slip_variances(command, config)) * standard_normals
     return Slip(float(left), float(right), float(lateral))
 
 
 def true_motion(
-    command: MotionCommand, slip: Slip, config: DriveConfig, shares: Float[np.ndarray, " n"]
+    command: MotionCommand, slip: Slip, config: WheelSpec, shares: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, "n 3"]:
     """Return where the slipping robot is after these shares of its step: (n, 3) m m rad in the frame of its start."""
     forward = command.forward_m + 0.5 * (slip.left_m + slip.right_m)
-    turn = command.turn_rad + (slip.right_m - slip.left_m) / config.wheel_base_m
+    turn = command.turn_rad + (slip.right_m - slip.left_m) / config.base_m
     half = 0.5 * turn * shares
     chord = forward * shares * np.sinc(half / np.pi)
     sideways = slip.lateral_m * shares
@@ -94,7 +78,7 @@ def true_motion(
     return np.stack([x, y, turn * shares], axis=-1)
 
 
-def odometry(command: MotionCommand, config: DriveConfig) -> Odometry:
+def odometry(command: MotionCommand, config: WheelSpec) -> Odometry:
     """Return what the wheels report: the commanded arc and its first-order covariance, robot frame before it."""
     half = 0.5 * command.turn_rad
     along, across = np.array([np.cos(half), np.sin(half)]), np.array([-np.sin(half), np.cos(half)])
@@ -103,7 +87,7 @@ def odometry(command: MotionCommand, config: DriveConfig) -> Odometry:
     slope = (np.cos(half) - sinc) / half if abs(half) > 1e-3 else -half / 3.0
     by_forward = sinc * along
     by_turn = 0.5 * command.forward_m * (slope * along + sinc * across)
-    to_arc = np.array([[0.5, 0.5, 0.0], [-1.0 / config.wheel_base_m, 1.0 / config.wheel_base_m, 0.0], [0.0, 0.0, 1.0]])
+    to_arc = np.array([[0.5, 0.5, 0.0], [-1.0 / config.base_m, 1.0 / config.base_m, 0.0], [0.0, 0.0, 1.0]])
     by_slip = np.zeros((3, 3))
     by_slip[:2] = np.stack([by_forward, by_turn, across], axis=-1) @ to_arc
     by_slip[2] = to_arc[1]

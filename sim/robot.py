@@ -1,6 +1,6 @@
 """The simulated robot: it owns the truth, and only what `slam.robot` defines leaves it towards the software."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -8,10 +8,10 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
-from slam.robot import MotionCommand, Odometry, Scan
+from slam.robot import MotionCommand, Odometry, RobotSpec, Scan
 
 from .chance import Channel, standard_normals
-from .drive import DriveConfig, clamp, draw_slip, odometry, seconds, true_motion
+from .drive import clamp, draw_slip, odometry, seconds, true_motion
 from .faults import FaultsConfig, bump_rad, slipped, with_dropouts, with_mixed_pixels
 from .lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 
@@ -35,18 +35,22 @@ class Building(Protocol):
 
 
 @dataclass(frozen=True)
-class RobotConfig:
-    """The body, the clock, the two devices, and what is wrong with them without their saying so."""
+class RobotConfig(RobotSpec):
+    """What a simulated robot states of itself, and what only the simulation knows: clock, devices, faults."""
 
-    radius_m: float = 0.2
-    """Radius m of the disc that must not touch a wall."""
     sampling_m: float = 0.005
     """Distance m between the places of a step that are checked for collisions."""
     scan_s: float = 0.1
     """How long one turn of the range finder takes, s."""
     lidar: LidarConfig = field(default_factory=LidarConfig)
-    drive: DriveConfig = field(default_factory=DriveConfig)
+    wheel_speed_m_s: float = 0.3
+    """Speed m/s of the faster wheel, which sets how long a step takes."""
     faults: FaultsConfig = field(default_factory=FaultsConfig)
+
+    @property
+    def spec(self) -> RobotSpec:
+        """What the robot states, and nothing else."""
+        return RobotSpec(**{each.name: getattr(self, each.name) for each in fields(RobotSpec)})
 
 
 @dataclass
@@ -109,8 +113,8 @@ class SimulatedRobot:
         Where the body would touch a wall the robot stops at the last free place of its way, the collision is
         counted, the wheels report the part that was driven, and the bumper that it touched.
         """
-        drive = self.config.drive
-        command = clamp(command, drive)
+        drive = self.config.wheels
+        command = clamp(command, self.config)
         draws = np.zeros(3) if self._errorless else standard_normals(self._seed, Channel.WHEELS, self._drives, 3)
         slip = slipped(draw_slip(command, drive, draws), self.config.faults)
         count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
@@ -127,7 +131,7 @@ class SimulatedRobot:
             self._record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
         self._pose[2] += bump_rad(self.config.faults, self._seed, self._drives)
         self._drives += 1
-        duration = seconds(command, drive)
+        duration = seconds(command, drive, self.config.wheel_speed_m_s)
         self._time_s += duration
         self._record.drive_time_s += duration
         return replace(odometry(command, drive), touched=touched)
@@ -146,6 +150,6 @@ class SimulatedRobot:
         if cell not in self._near:
             centre = (np.array([cell]) + 0.5) * _CELL_M
             # A slipping step is a little longer than the longest command.
-            reach = np.sqrt(0.5) * _CELL_M + 2.0 * self.config.drive.step_max_m + self.config.radius_m
+            reach = np.sqrt(0.5) * _CELL_M + 2.0 * self.config.step_m + self.config.radius_m
             self._near[cell] = self._faces[distance_to_segments(centre, self._faces)[0] <= reach]
         return self._near[cell]

@@ -12,12 +12,14 @@ from .map.extents import WallsConfig
 from .map.merging import MergingConfig
 from .map.openings import OpeningsConfig
 from .map.vertices import VerticesConfig
+from .robot import RobotSpec, of_robot
 
 
 @dataclass(frozen=True)
 class MapperConfig:
     """The rules of the seven steps."""
 
+    robot: RobotSpec = of_robot()
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     vertices: VerticesConfig | None = field(default_factory=VerticesConfig)

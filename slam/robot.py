@@ -1,11 +1,16 @@
 """The robot as this software sees it: all that passes between the two is in this file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
+
+NANO = 9
+"""Sums of what a robot states are rounded to so many digits after the point: 0.2 m and 0.1 m are 0.3 m."""
+TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
+"""A way among walls turns by so much at most, rad/m: robots of slow turns need more steps for it."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,103 @@ class MotionCommand:
 
     forward_m: float
     turn_rad: float
+
+
+class RobotError(ValueError):
+    """A robot that cannot be, told in one line: what was expected, what was found, what to do."""
+
+
+@dataclass(frozen=True)
+class ScannerSpec:
+    """Where the range finder sits, in the robot frame: the origin is the middle of the axle, x points ahead."""
+
+    x_m: float = 0.0
+    """Ahead of the axle."""
+    y_m: float = 0.0
+    """To the left."""
+    heading_rad: float = 0.0
+    """Where its bearing zero points, counter-clockwise from straight ahead."""
+
+
+@dataclass(frozen=True)
+class WheelSpec:
+    """Two driven wheels and how far they slip; the defaults lose 4 degrees of heading per square root of a metre."""
+
+    base_m: float = 0.4
+    """Distance m between the wheels."""
+    slip: float = 0.02
+    """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
+    lateral_slip: float = 0.006
+    """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
+    floor: float = 1e-6
+    """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """What a robot states of itself: planners, mapper, certificate and scores take it from here and nowhere else."""
+
+    radius_m: float = 0.2
+    """Radius of the body, a disc about the middle of the axle; of an outline, its farthest point (`of_outline`)."""
+    step_m: float = 0.15
+    """Longest step; longer commands are shortened along the same arc."""
+    turn_rad: float = float(np.deg2rad(10.0))
+    """Widest turn of one step; wider commands are shortened along the same arc."""
+    can_reverse: bool = True
+    """Whether it can drive backwards."""
+    scanner: ScannerSpec = field(default_factory=ScannerSpec)
+    wheels: WheelSpec = field(default_factory=WheelSpec)
+
+    def __post_init__(self) -> None:
+        """Raise RobotError for a body, a step or wheels that cannot be."""
+        wheels, numbers = self.wheels, (self.scanner.x_m, self.scanner.y_m, self.scanner.heading_rad)
+        above = {"radius_m": self.radius_m, "step_m": self.step_m, "turn_rad": self.turn_rad, "base_m": wheels.base_m}
+        for name, value in above.items():
+            if not 0.0 < value < np.inf:
+                raise RobotError(f"expected a robot's {name} above 0 and finite, found {value:g}: correct it")
+        for name, value in {"slip": wheels.slip, "lateral_slip": wheels.lateral_slip, "floor": wheels.floor}.items():
+            if not 0.0 <= value < np.inf:
+                raise RobotError(f"expected wheels with a {name} of 0 or more, found {value:g}: correct it")
+        if not all(np.isfinite(numbers)):
+            raise RobotError(f"expected a scanner at a finite place on the body, found {numbers}: correct it")
+
+    def beyond(self, metres: float) -> float:
+        """Return the distance from the middle of the body to so far beyond its rim, m."""
+        return round(self.radius_m + metres, NANO)
+
+    def steps_of(self, way_m: float) -> int:
+        """Return how many steps a way takes at most, if it turns no more than ways among walls do."""
+        return round(max(way_m / self.step_m, way_m * TURN_OF_WAY / self.turn_rad))
+
+
+def of_outline(points_m: Float[np.ndarray, "n 2"]) -> float:
+    """Return the radius of the disc about the middle of the axle that holds an outline, m, robot frame."""
+    return float(np.hypot(points_m[:, 0], points_m[:, 1]).max())
+
+
+def of_robot() -> Any:
+    """Return a field of a group of settings that holds what the robot states: no setting of its own (`fitted`)."""
+    return field(default=RobotSpec(), repr=False, metadata={STATED: True})
+
+
+STATED = "stated by the robot"
+"""Marks such a field."""
+
+Settings = TypeVar("Settings")
+
+
+def fitted(settings: Settings, robot: RobotSpec) -> Settings:
+    """Return a group of settings, and all groups within, for a robot."""
+    assert is_dataclass(settings)
+    assert not isinstance(settings, type)
+    changes: dict[str, Any] = {}
+    for each in fields(settings):
+        value = getattr(settings, each.name)
+        if each.metadata.get(STATED):
+            changes[each.name] = robot
+        elif is_dataclass(value) and not isinstance(value, type):
+            changes[each.name] = fitted(value, robot)
+    return replace(settings, **changes)
 
 
 @runtime_checkable

@@ -25,8 +25,9 @@ PREFACE = """# Numbers that one may tune
 
 <!-- made by `make settings` -->
 
-Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, reachable by `--set`), constants, and
-numbers in conditions. The end of a name is its unit (`_m`, `_rad`, `_s`, `_steps`); others are counts or ratios.
+Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, and what a robot states, `XSpec.name`;
+reachable by `--set`), constants, and numbers in conditions. The end of a name is its unit (`_m`, `_rad`, `_s`,
+`_steps`); others are counts or ratios.
 Numbers in conditions that have no words guard the arithmetic or count in geometry (a ring has three corners).
 `make counts` counts them.
 """
@@ -72,7 +73,7 @@ def _settings(file: str, tree: ast.Module) -> list[Number]:
     return [
         Number(file, line, f"{each.name}.{name}", value, "setting", says)
         for each in ast.walk(tree)
-        if isinstance(each, ast.ClassDef) and each.name.endswith("Config")
+        if isinstance(each, ast.ClassDef) and each.name.endswith(("Config", "Spec"))
         for line, name, value, says in _assigned(each.body)
     ]
 

@@ -1,10 +1,21 @@
-"""Methods by name: the settings behind `--preset paper-method`."""
+"""Settings by name: the method behind `--preset paper-method`, the robots behind `--robot`."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
 from typing import Any, Literal
 
-from .settings import NAVIGATION, Record, leaves, nested
+import numpy as np
+
+from sim.logs.archive import regular
+from sim.robot import RobotConfig
+from sim.robots import ROBOTS
+from sim.worlds.drawing import WorldError
+from sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
+from slam.robot import RobotSpec, of_outline
+
+from ..usage import UsageError, did_you_mean
+from .settings import NAVIGATION, Record, leaves, nested, trial_of
 
 PresetName = Literal["paper-method"]
 SWEEP = "mission.explorer.sweep"
@@ -64,3 +75,67 @@ def against_methods(names: Iterable[str], settings: Mapping[str, Any]) -> list[t
     """
     own = {key for name in names if name in METHODS for key, _ in METHODS[name].mapper}
     return [(key, value) for key, value in leaves(settings) if any(f"{key}.".startswith(f"{each}.") for each in own)]
+
+
+ROBOT_KEYS = "keys of `robot` in config.json"
+
+
+def robot_of(name: str | None) -> Record:
+    """Return the settings of a trial behind a bundled robot's name or a robot's file; none without one.
+
+    The file is YAML and holds keys of the group `robot`. An angle may be given in degrees (`turn_deg`), and
+    `outline_m`, corners about the middle of the axle, in place of `radius_m`. Raises UsageError, in one line.
+    """
+    if name is None:
+        return {}
+    path = ROBOTS.get(name, Path(name))
+    try:
+        with regular(path).open("rb") as file:
+            said = plain_mapping(file.read(FILE_MAX + 1), "a robot's YAML", f" with {ROBOT_KEYS}")
+        record = {"robot": _robot_keys(said, RobotConfig())}
+        trial_of(record)
+    except OSError as error:
+        found = f"{path.name} ({error.strerror or type(error).__name__})"
+        near = did_you_mean(name, ROBOTS)
+        raise UsageError(
+            f"expected a robot out of {', '.join(ROBOTS)} or a file, found {found}{near}: name one of these"
+        ) from error
+    except (WorldError, UsageError) as error:
+        raise UsageError(f"{error} (in {path.name})") from error
+    return record
+
+
+def stated(robot: Record) -> Record:
+    """Return of a robot's settings those that it states of itself; a recorded one has no other."""
+    names = {each.name for each in fields(RobotSpec)}
+    return {"robot": {key: value for key, value in robot.get("robot", {}).items() if key in names}}
+
+
+def _robot_keys(said: Mapping[str, Any], group: Any) -> Record:
+    """Return what a file says under the keys of a group of settings; angles in rad, whole numbers for counts."""
+    record: Record = {}
+    for key, value in said.items():
+        name = f"{key.removesuffix('_deg')}_rad" if key.endswith("_deg") else key
+        own = getattr(group, name, None)
+        if key == "outline_m" and isinstance(group, RobotSpec):
+            name, value = "radius_m", of_outline(_corners(value))
+        elif name != key and isinstance(value, float):
+            value = float(np.deg2rad(value))
+        elif isinstance(value, dict) and is_dataclass(own):
+            value = _robot_keys(value, own)
+        elif type(own) is int and isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if name in record:
+            raise UsageError(f"expected {name} once, found {key} beside it: leave one of them out")
+        record[name] = value
+    return record
+
+
+def _corners(value: Any) -> np.ndarray:
+    try:
+        corners = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        corners = np.zeros(0)
+    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3 or not np.all(np.isfinite(corners)):
+        raise UsageError("expected outline_m as three corners [x, y] or more, found something else: correct it")
+    return corners

@@ -16,6 +16,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from sim.logs.archive import ArchiveError, read_archive, regular
+from slam.robot import STATED
 
 from ..usage import UsageError
 from .formats import fault
@@ -196,7 +197,10 @@ def _one_of(shapes: tuple[Shape, ...], value: Any, name: str) -> Any:
 
 def _record(kind: Any, value: Any, name: str) -> Any:
     _expect(isinstance(value, dict), "an object", value, name)
-    hints, known = get_type_hints(kind), [field.name for field in fields(kind) if field.init]
+    hints, known = (
+        get_type_hints(kind),
+        [field.name for field in fields(kind) if field.init and not field.metadata.get(STATED)],
+    )
     for key in known:
         if key not in value:
             raise UnfitError(f"no {_under(name, key)}")

@@ -3,7 +3,6 @@
 import platform
 import subprocess
 from collections.abc import Callable
-from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from .maps.dimensions import dimensions
 from .maps.geojson import map_geojson
 from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
+from .settings import own
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
@@ -123,7 +123,7 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {**stamp(CONFIG), "trial": asdict(config), "versions": versions, "commit": _commit()}
+    return {**stamp(CONFIG), "trial": own(config), "versions": versions, "commit": _commit()}
 
 
 def _picture(result: TrialResult) -> bytes:

@@ -5,15 +5,18 @@ Keys are those of `config.json`, with a dot between an object and what it holds:
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
+
+from slam.robot import STATED, RobotError
 
 from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import json_bytes
 from .formats import CONFIG
+from .older import stated_then, today, told_of
 from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
@@ -39,62 +42,22 @@ def read_settings(path: Path) -> Record:
     return trial
 
 
-RENAMED: dict[str, str | None] = {
-    "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.extraction.sure_gap_m",
-    "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
-    "mission.max_steps": None,
-    "mission.explorer.sweeping.near_m": "mission.explorer.near_m",
-    "mission.explorer.following.looks": "mission.explorer.following.viewpoints",
-    "mission.mapper.bends": "mission.mapper.vertices",
-    "mission.mapper.bends.young_sightings": "mission.mapper.vertices.young_observations",
-    "mission.mapper.chains.bend_sightings": "mission.mapper.chains.vertex_observations",
-    "mission.mapper.duplicates": "mission.mapper.merging",
-    "mission.mapper.duplicates.gate": None,
-    "mission.mapper.faint": "mission.mapper.candidates",
-    "mission.mapper.gaps": "mission.mapper.openings",
-    "mission.mapper.gaps.widest_m": None,
-    "mission.mapper.gaps.corner_m": None,
-    "mission.mapper.kinks": "mission.mapper.change_points",
-    "mission.mapper.torn": "mission.mapper.ambiguity",
-    "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
-    "mission.mapper.walls.trusted_sightings": "mission.mapper.walls.trusted_observations",
-    "mission.mapper.walls.established_sightings": "mission.mapper.walls.established_observations",
-}
-"""Settings of a trial, or groups of them, that had other names in format 1 of `config.json`; the longest name counts.
-None stands where a setting said nothing of its own."""
-
-
-DROPPED = ("mission.mapper.change_points.most_rad",)
-"""Settings of format 2 whose rules are no more."""
-
-
-def renamed(key: str) -> str | None:
-    """Return today's key of a setting of an older format; None where there is none."""
-    parts = key.split(".")
-    for count in range(len(parts), 0, -1):
-        group = ".".join(parts[:count])
-        if group in RENAMED:
-            now = RENAMED[group]
-            return None if now is None or now + key[len(group) :] in DROPPED else now + key[len(group) :]
-    return None if key in DROPPED else key
-
-
 def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:
     """Return what still holds of a trial in an older format, and the keys of what means nothing now.
 
     The defaults take the places of settings that are not there. Raises UnfitError where no world is named.
     """
-    record, unknown = defaults(), []
+    record, unknown, robot = defaults(), [], stated_then(said)
     for key, value in leaves(said):
-        now = renamed(key)
-        if now is None:
+        found = today(key, value, robot)
+        if found is None:
             continue
         try:
-            _place(now, value)
+            _place(*found)
         except UnfitError:
             unknown.append(key)
         else:
-            record = over(record, nested([(now, value)]))
+            record = over(record, nested([found]))
     if not record["world"]:
         raise UnfitError("no trial.world")
     return fit(TrialConfig, record), tuple(unknown)
@@ -161,6 +124,8 @@ def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
         trial: TrialConfig = fit(TrialConfig, record)
     except UnfitError as error:
         raise UsageError(f"expected settings of a trial, found {error}: {SEE}") from error
+    except RobotError as error:
+        raise UsageError(str(error)) from error
     return trial
 
 
@@ -171,8 +136,14 @@ def defaults() -> Record:
 
 def record_of(trial: TrialConfig) -> Record:
     """Return the settings of a trial as they come back from a file."""
-    record: Record = plain(asdict(trial))
+    record: Record = plain(own(trial))
     return record
+
+
+def own(group: Any) -> Record:
+    """Return a group of settings and those within as a nested record; what the robot states stands in `robot` alone."""
+    values = {each.name: getattr(group, each.name) for each in fields(group) if not each.metadata.get(STATED)}
+    return {name: own(value) if is_dataclass(value) else value for name, value in values.items()}
 
 
 def plain(value: Any) -> Any:
@@ -208,13 +179,19 @@ def _place(key: str, value: Any) -> None:
         if kind is None:
             raise UnfitError(f"{key[:80]!r} below {'.'.join(parts[:depth])!r}, which is one value")
         hints = get_type_hints(kind)
-        if part not in hints or part not in kind.__dataclass_fields__:
+        if part not in hints or part not in kind.__dataclass_fields__ or _is_stated(kind, part):
+            if now := told_of(key):
+                raise UnfitError(f"the key {key!r} of older versions (name {now})")
             near = get_close_matches(key, [name for name, _ in leaves(defaults())], 3, 0.5)
             raise UnfitError(f"the unknown key {key[:80]!r}" + (f" (is it {' or '.join(near)}?)" if near else ""))
         kind = hints[part]
     if _inner(kind) is not None and value is not None:
         raise UnfitError(f"{key!r}, which holds several settings: name one of them")
     fit(kind, value, key)
+
+
+def _is_stated(kind: Any, part: str) -> bool:
+    return bool(kind.__dataclass_fields__[part].metadata.get(STATED))
 
 
 def _inner(kind: Any) -> Any:

@@ -15,7 +15,7 @@ from ..artifacts.formats import CONFIG, FORMATS, stamp
 from ..artifacts.reading import Each, UnfitError, fit, read_json, told
 from ..artifacts.results import config_record
 from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
-from ..artifacts.settings import plain
+from ..artifacts.settings import own, plain
 from ..usage import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .scores.score import TrialScores
@@ -55,7 +55,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             # So that the recording is one that `chainslam replay` takes, too.
             config = config_of(self.campaign, done.trial.recording)
-            write(path.with_name(CONFIG), json_bytes({**stamp(CONFIG), "trial": asdict(config)}))
+            write(path.with_name(CONFIG), json_bytes({**stamp(CONFIG), "trial": own(config)}))
             write(path, done.log)
         if done.trial.arm != "recording":
             path = self.path(done.trial)

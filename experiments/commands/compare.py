@@ -10,7 +10,7 @@ import tyro
 
 from explore.planning.navigators import Navigation
 
-from ..artifacts.presets import against_methods
+from ..artifacts.presets import against_methods, robot_of
 from ..artifacts.settings import NAVIGATION, asked, differing, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.story import decisive_arm, story_of
@@ -72,6 +72,9 @@ class Compare:
     navigation: Navigation = "floor"
     """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Presets paper and
     paper-method go by walls."""
+    robot: str | None = None
+    """The robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file (docs/robots.md).
+    --config and --set go before it."""
     config: Path | None = None
     """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
     itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
@@ -96,7 +99,7 @@ class Compare:
         """The campaign that the options describe; raises UsageError where they leave something open."""
         given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
         preset = dict(PRESETS[self.preset]) if self.preset else {}
-        settings = over(nested(preset.pop("settings", ())), asked(self.config, self.set, DECIDED))
+        settings = over(nested(preset.pop("settings", ())), robot_of(self.robot), asked(self.config, self.set, DECIDED))
         if "navigation" in self.given or self.navigation != Compare.navigation:
             settings = over(settings, nested([(NAVIGATION, self.navigation)]))
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}

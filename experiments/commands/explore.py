@@ -10,7 +10,7 @@ from explore.planning.navigators import Navigation
 from explore.step import Step
 from sim.worlds import World
 
-from ..artifacts.presets import PresetName, preset_of
+from ..artifacts.presets import PresetName, preset_of, robot_of
 from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
@@ -48,6 +48,7 @@ SETTLED = (
     "start",
     "scale",
     "preset",
+    "robot",
     "config",
     "set",
 )
@@ -95,6 +96,9 @@ class Explore:
     preset: PresetName | None = None
     """A method by name: paper-method is all that the paper describes, its filter, its matching and its navigation
     (docs/exploration.md). --config, --set and options go before it."""
+    robot: str | None = None
+    """What the robot states of itself, and its devices: a bundled robot (paper, turtlebot, front-scanner) or a YAML
+    file (docs/robots.md). --config, --set and options go before it."""
     config: Path | None = None
     """Settings from this file: a run's `config.json`, or an object of some of its keys. An option that is given goes
     before it, and so does --set."""
@@ -115,12 +119,13 @@ class Explore:
     def trial(self) -> TrialConfig:
         """What decides the run, without where its results go; raises UsageError where no world is named.
 
-        An option wins over --set, that over --config, that over the preset, that over the defaults.
+        An option wins over --set, that over --config, that over the robot's file and the preset, those over the
+        defaults.
         """
         given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
         options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
         base = {} if self.config is None else read_settings(self.config)
-        trial = trial_of(preset_of(self.preset), base, *map(parse_setting, self.set), options)
+        trial = trial_of(preset_of(self.preset), robot_of(self.robot), base, *map(parse_setting, self.set), options)
         if not trial.world:
             raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
         return trial

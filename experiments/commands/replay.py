@@ -12,6 +12,7 @@ from explore.step import Step
 from sim.worlds import World
 from slam.backends import BACKENDS
 
+from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..replays.replay import Association, RecordedRun, ReplayOptions, read_run, replay, replayed, retuned
@@ -37,6 +38,9 @@ class Replay:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
+    robot: str | None = None
+    """What the robot states of itself, in place of what the run's says: a bundled robot (paper, turtlebot,
+    front-scanner) or a YAML file (docs/robots.md), of which the devices are left aside: the log has settled them."""
     config: Path | None = None
     """Settings of the mission and of the back ends from this file, in place of those of the run: a run's `config.json`,
     or an object of some of its keys. --set goes before it."""
@@ -53,7 +57,7 @@ class Replay:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         for name in self.backend:
             choose("back end", name, BACKENDS)
-        run = retuned(read_run(self.log), self.config, self.set)
+        run = retuned(read_run(self.log), self.config, self.set, stated(robot_of(self.robot)))
         out = self.out or self.log.parent / f"replay-{self.association}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
         trial = run.trial

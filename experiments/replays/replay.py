@@ -1,9 +1,9 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -40,7 +40,7 @@ from ..usage import UsageError
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
 
 Association = Literal["own", "true"]
-_NEVER = 10**9
+_NEVER, _NEVER_M = 10**9, 1e9
 OPEN_TO_REPLAYS = ("mission", "backend_options")
 """The settings that a replay may have of its own; the log has settled all others."""
 
@@ -133,10 +133,15 @@ class ReplayedRobot(RecordedRobot):
         return odometry
 
 
-def retuned(run: RecordedRun, config: Path | None, sets: Sequence[str]) -> RecordedRun:
-    """Return a run to be replayed with the settings of a file and of `KEY=VALUE` over its own; raises UsageError."""
+def retuned(
+    run: RecordedRun, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any] | None = None
+) -> RecordedRun:
+    """Return a run to be replayed with the settings of a file and of `KEY=VALUE` over its own; raises UsageError.
+
+    `robot` holds settings of what the robot states, over the run's own.
+    """
     settled = record_of(run.trial).keys() - set(OPEN_TO_REPLAYS)
-    return replace(run, trial=trial_of(record_of(run.trial), asked(config, sets, settled)))
+    return replace(run, trial=trial_of(record_of(run.trial), robot or {}, asked(config, sets, settled)))
 
 
 def replayed(run: RecordedRun, backend: str) -> TrialConfig:
@@ -193,5 +198,5 @@ def replay(
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
     """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
-    walls = replace(config.walls, patience_steps=_NEVER, contradictions=_NEVER, least_m=-1.0, claims=_NEVER)
+    walls = replace(config.walls, patience_m=_NEVER_M, contradictions=_NEVER, least_m=-1.0, claims=_NEVER)
     return replace(config, walls=walls, merging=None)

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.poses import to_robot, wrap
-from slam.robot import Odometry, Scan
+from slam.robot import Odometry, RobotSpec, Scan
 
 SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
-NEAR_M = 0.6
-"""Returns farther off than this matter to no step from here."""
+NEAR_BEYOND_M = 0.4
+"""Returns farther off the body than this matter to no step from here."""
 SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
 """Returns of two scans so near in bearing and distance are of one place: half a beam's step, and four sigmas."""
 
@@ -19,7 +19,8 @@ SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
 class AccumulatedReturns:
     """Returns near the robot, kept in its frame by what the odometry reports."""
 
-    def __init__(self) -> None:
+    def __init__(self, robot: RobotSpec = RobotSpec()) -> None:
+        self._near_m = robot.beyond(NEAR_BEYOND_M)
         self._scans: deque[Float[np.ndarray, "n 2"]] = deque(maxlen=SCANS)
 
     def move(self, odometry: Odometry) -> None:
@@ -30,7 +31,7 @@ class AccumulatedReturns:
     def see(self, scan: Scan) -> None:
         """Remember what a scan hit nearby."""
         points = returns(scan)
-        self._scans.append(points[np.hypot(points[:, 0], points[:, 1]) < NEAR_M])
+        self._scans.append(points[np.hypot(points[:, 0], points[:, 1]) < self._near_m])
 
     @property
     def points_robot(self) -> Float[np.ndarray, "n 2"]:
@@ -39,7 +40,7 @@ class AccumulatedReturns:
 
 
 def steadied(
-    points_robot: Float[np.ndarray, "m 2"], recent_robot: Float[np.ndarray, "r 2"]
+    points_robot: Float[np.ndarray, "m 2"], recent_robot: Float[np.ndarray, "r 2"], robot: RobotSpec = RobotSpec()
 ) -> Float[np.ndarray, "m 2"]:
     """Return points of a scan, those nearby at the mean of the distances that the last scans had there, m.
 
@@ -48,7 +49,7 @@ def steadied(
     (rho, bearing), (before, at) = (
         (np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])) for points in (points_robot, recent_robot)
     )
-    near = rho < NEAR_M
+    near = rho < robot.beyond(NEAR_BEYOND_M)
     turn = np.abs(wrap(bearing[near, None] - at))
     same = (turn < SAME_RAD) & (np.abs(rho[near, None] - before) < SAME_M)
     mean = rho.copy()

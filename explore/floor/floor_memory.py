@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from slam.geometry.lines import distance_to_segments, normals
 from slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import Odometry, Scan
+from slam.robot import Odometry, RobotSpec, Scan, of_robot
 
 from .free_space import FreeSpace
 
@@ -18,6 +18,7 @@ from .free_space import FreeSpace
 class FloorMemoryConfig:
     """Which scans are kept, and when the grid is drawn anew."""
 
+    robot: RobotSpec = of_robot()
     spacing_m: float = 0.25
     """Of the scans taken in one square of this side the last one is kept."""
     walls: int = 8
@@ -30,12 +31,23 @@ class FloorMemoryConfig:
     """So many steps at least, and a tenth of the scans kept, lie between two looks at how far the walls have moved."""
     faith_m: float = 0.01
     """Where no wall nearby tells, a scan moves as the one kept before it did: worth this many metres of wall."""
-    last_scans: int = 100
-    """So many of the last scans are enough to begin the grid anew."""
-    touched_m: float = 0.1
-    """Where the body touched something, the way that it drove is closed this far around."""
-    step_m: float = 0.3
-    """Two poses of one step that lie no farther apart are joined by a way that the robot drove; else the map jumped."""
+    last_m: float = 15.0
+    """The last scans, of the steps that so long a way takes, are enough to begin the grid anew."""
+
+    @property
+    def last_scans(self) -> int:
+        """So many of the last scans are kept to begin the grid anew."""
+        return self.robot.steps_of(self.last_m)
+
+    @property
+    def touched_m(self) -> float:
+        """Where the body touched something, the way that it drove is closed this far around: half its radius."""
+        return 0.5 * self.robot.radius_m
+
+    @property
+    def step_m(self) -> float:
+        """Two poses of one step no farther apart are joined by a way that the robot drove; else the map jumped."""
+        return 2.0 * self.robot.step_m
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
 from slam.geometry.poses import to_world, wrap_positive
-from slam.robot import Scan
+from slam.robot import RobotSpec, Scan, of_robot
 
 _FARTHEST_M = 1e9
 """Cells farther from the origin are not counted any more."""
@@ -19,18 +19,27 @@ _Box = tuple[int, int, int, int]
 class FreeSpaceConfig:
     """The grid and how evidence gathers in it."""
 
+    robot: RobotSpec = of_robot()
     cell_m: float = 0.05
     """Side of a cell: a third of a step."""
     hit: int = 3
     """What one hit adds to a cell; a beam that passes takes one away."""
     limit: int = 6
     """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
-    body_m: float = 0.2
-    """Floor this near to the robot is free: it stands there."""
     cells_max: int = 100_000_000
     """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
-    clearance_limit_m: float = 1.0
-    """Clearances are exact up to here; beyond, they are at least this."""
+    clearance_beyond_m: float = 0.8
+    """Clearances are exact up to the radius and this; beyond, they are at least that."""
+
+    @property
+    def body_m(self) -> float:
+        """Floor this near to the robot is free: it stands there."""
+        return self.robot.radius_m
+
+    @property
+    def clearance_limit_m(self) -> float:
+        """Clearances are exact up to here."""
+        return self.robot.beyond(self.clearance_beyond_m)
 
 
 HALF_DIAGONAL = 0.71

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.poses import J, arc, to_robot
-from slam.robot import MotionCommand, Scan
+from slam.robot import MotionCommand, RobotSpec, Scan, of_robot
 
 from ..floor.accumulated_returns import returns, steadied
 from ..floor.free_space import FreeSpace
@@ -19,10 +19,7 @@ _NOTHING = np.zeros((0, 2))
 class DrivingConfig:
     """How fast one step goes, and how near to a return it may bring the disc."""
 
-    step_m: float = 0.15
-    """Longest step."""
-    turn_rad: float = float(np.deg2rad(10.0))
-    """Widest turn of one step."""
+    robot: RobotSpec = of_robot()
     spin_rad: float = float(np.deg2rad(30.0))
     """With more than this to turn, the robot turns on the spot first."""
     lookahead_m: float = 0.6
@@ -31,14 +28,13 @@ class DrivingConfig:
     """... but no less than this, ..."""
     short_points: int = 8
     """... for so many points of the path, 0.05 m apart."""
-    radius_m: float = 0.2
-    """The robot's disc."""
     margin_m: float = 0.02
     """Least distance kept between disc and returns, unless the step leads away from them."""
     careful_m: float = 0.05
     """Longest step onto floor that was not seen yet."""
-    narrow_m: float = 0.55
-    """Where returns on both sides of the way leave less than this, the robot aims for the middle, slowly ..."""
+    narrow_beyond_m: float = 0.15
+    """Where returns on both sides of the way leave less than this beside the body, the robot aims for the middle,
+    slowly ..."""
     narrow_margin_m: float = 0.01
     """... keeps at least this from them, ..."""
     narrow_spin_rad: float = float(np.deg2rad(4.0))
@@ -47,17 +43,42 @@ class DrivingConfig:
     """Where less than that is left between two sides already, a step may take this much of it, ..."""
     least_margin_m: float = 0.004
     """... down to this. Beside a lone return there is room: that much is below a range's noise."""
-    fits_m: float = 0.425
-    """... and does not try where they leave less than this: returns tell the width to a centimetre. Where it stands
-    between the two, it does fit: """
+    fits_beyond_m: float = 0.025
+    """... and does not try where they leave less than this beside the body: returns tell the width to a centimetre.
+    Where it stands between the two, it does fit: """
     within_m: float = 0.05
     """the line from one to the other passes so near to the robot's middle."""
     beside_m: float = 0.1
     """Beside the way are returns from this far behind the robot to this far beyond its aim."""
-    obstructed_m: float = 0.17
-    """A return this near to the path ahead is in the way: less than the radius, since the path keeps to a grid."""
+    obstructed_within_m: float = 0.03
+    """A return nearer to the path ahead than the radius less this is in the way, since the path keeps to a grid."""
     arrived_m: float = 0.08
     """The end of the path counts as reached within this."""
+
+    @property
+    def radius_m(self) -> float:
+        """The robot's disc."""
+        return self.robot.radius_m
+
+    @property
+    def narrow_m(self) -> float:
+        """A gap between returns of less than this is narrow."""
+        return self.robot.beyond(self.robot.radius_m + self.narrow_beyond_m)
+
+    @property
+    def fits_m(self) -> float:
+        """The body does not fit through a gap of less."""
+        return self.robot.beyond(self.robot.radius_m + self.fits_beyond_m)
+
+    @property
+    def obstructed_m(self) -> float:
+        """A return this near to the path ahead is in the way."""
+        return self.robot.beyond(-self.obstructed_within_m)
+
+    @property
+    def slow_m(self) -> float:
+        """Longest careful step: no longer than any."""
+        return min(self.careful_m, self.robot.step_m)
 
 
 class Pilot:
@@ -95,7 +116,7 @@ class Pilot:
         """Return whether a return of this scan lies on the next metre of the path."""
         ahead = self._points[self._at : self._at + 20]
         # What is beside the robot already is no matter of the path: `command` gets away from it.
-        ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.step_m]
+        ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.robot.step_m]
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
         return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.obstructed_m
 
@@ -116,7 +137,7 @@ class Pilot:
         points, ahead = returns(scan), self._aim(pose_world, self._config.lookahead_m)
         aim, gap_m, narrow = _centred(ahead, points, self._config)
         if gap_m < self._config.narrow_m:
-            steady = steadied(points, recent_robot)
+            steady = steadied(points, recent_robot, self._config.robot)
             aim, gap_m, narrow = _centred(ahead, steady, self._config)
         points = np.concatenate([steady if narrow else points, _NOTHING if narrow else recent_robot, touched_robot])
         if gap_m < self._config.narrow_m:
@@ -125,8 +146,8 @@ class Pilot:
             command = self._clear_step(ahead, pose_world, points)
         if command is not None:
             return self._careful(command, pose_world, free_space)
-        if narrow:
-            back = MotionCommand(-self._config.careful_m, 0.0)
+        if narrow and self._config.robot.can_reverse:
+            back = MotionCommand(-self._config.slow_m, 0.0)
             return back if _is_safe(back, points, self._config, narrow) else None
         turn = _turn_towards(aim, self._config)
         return _away(points, self._config) or (MotionCommand(0.0, turn) if abs(turn) > FACING_RAD else None)
@@ -172,7 +193,7 @@ class Pilot:
         c, s = np.cos(pose_world[2]), np.sin(pose_world[2])
         end = pose_world[:2] + np.array([c * x - s * y, s * x + c * y])
         if np.any(free_space.unknown_at(end + self._config.radius_m * _RIM)):
-            return MotionCommand(min(command.forward_m, self._config.careful_m), command.turn_rad)
+            return MotionCommand(min(command.forward_m, self._config.slow_m), command.turn_rad)
         return command
 
 
@@ -182,12 +203,14 @@ GAIN_SHARE = 0.2
 """Such a step leads out if the gap grows by this share of it: less is noise of the ranges."""
 NEAR_M = 0.1
 """Returns farther off than a step, the body and this are not in the way of a step."""
+AWAY_RAD = 0.17
+"""A step that leads away from a return turns by this, or not."""
 FACING_RAD = 0.02
 """A turn of less is not worth a step."""
 
 
 def _turn_towards(aim_robot: Float[np.ndarray, "2"], config: DrivingConfig) -> float:
-    return float(np.clip(np.arctan2(aim_robot[1], aim_robot[0]), -config.turn_rad, config.turn_rad))
+    return float(np.clip(np.arctan2(aim_robot[1], aim_robot[0]), -config.robot.turn_rad, config.robot.turn_rad))
 
 
 def _towards(
@@ -195,15 +218,17 @@ def _towards(
 ) -> MotionCommand | None:
     """Return a safe step towards the aim, a turn on the spot where it lies far to one side; None where none is safe."""
     way = 1.0
-    if narrow and aim_robot[0] < 0.0:  # each turn on the spot slips aside by a millimetre or two: it backs out
+    if (
+        narrow and aim_robot[0] < 0.0 and config.robot.can_reverse
+    ):  # each turn on the spot slips aside by a millimetre or two: it backs out
         aim_robot, way = -aim_robot, -1.0
     error, distance = float(np.arctan2(aim_robot[1], aim_robot[0])), float(np.hypot(aim_robot[0], aim_robot[1]))
     turn = _turn_towards(aim_robot, config)
     if abs(error) > (config.narrow_spin_rad if narrow else config.spin_rad):
         return MotionCommand(0.0, turn)
-    forward = min(config.step_m * (1.0 - 0.8 * abs(error) / config.spin_rad), distance)
+    forward = min(config.robot.step_m * (1.0 - 0.8 * abs(error) / config.spin_rad), distance)
     if narrow:
-        forward = min(forward, config.careful_m)
+        forward = min(forward, config.slow_m)
     for share in (1.0, 0.5, 0.25):
         command = MotionCommand(way * share * forward, turn)
         if _is_safe(command, points_robot, config, narrow):
@@ -216,14 +241,14 @@ def _away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> Moti
     gaps = np.hypot(points_robot[:, 0], points_robot[:, 1])
     if not len(gaps) or gaps.min() > config.radius_m + 2.0 * config.margin_m:
         return None
-    commands = [
-        MotionCommand(way, turn) for way in (config.careful_m, -config.careful_m) for turn in (-0.17, 0.0, 0.17)
-    ]
+    ways = (config.slow_m, -config.slow_m) if config.robot.can_reverse else (config.slow_m,)
+    turn_rad = min(AWAY_RAD, config.robot.turn_rad)
+    commands = [MotionCommand(way, turn) for way in ways for turn in (-turn_rad, 0.0, turn_rad)]
     ends = np.stack([arc(command.forward_m, command.turn_rad)[:2] for command in commands])
     gap = points_robot - ends[:, None]
     least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
     best = int(np.argmax(least))
-    leads_out = least[best] > gaps.min() + GAIN_SHARE * config.careful_m and _is_safe(
+    leads_out = least[best] > gaps.min() + GAIN_SHARE * config.slow_m and _is_safe(
         commands[best], points_robot, config, narrow=False
     )
     return commands[best] if leads_out else None
@@ -273,7 +298,9 @@ def _is_safe(
     """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
     if not len(points_robot):
         return True
-    near = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.step_m + NEAR_M]
+    near = points_robot[
+        np.hypot(points_robot[:, 0], points_robot[:, 1]) < config.radius_m + config.robot.step_m + NEAR_M
+    ]
     if not len(near):
         return True
     least = _least_gap(command, near)

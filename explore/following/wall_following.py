@@ -16,7 +16,7 @@ from jaxtyping import Float
 from slam.association.joint_compatibility import NO_NIS, Nis
 from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import MotionCommand, Odometry, Scan
+from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
@@ -29,6 +29,7 @@ from .driving import DrivingConfig, Pilot
 class FollowingConfig:
     """The rules of the lowest layer."""
 
+    robot: RobotSpec = of_robot()
     navigation: Navigation = "floor"
     """How the robot finds its way: over the floor seen free, or by sequences of walls."""
     paths: PathConfig = field(default_factory=PathConfig)
@@ -42,14 +43,19 @@ class FollowingConfig:
     """A place to which the way was blocked this often is given up."""
     squeezes: int = 2
     """A gap hardly wider than the body is tried this often."""
-    stall_steps: int = 60
-    """An errand ends when the way to its place grew no shorter for so many steps."""
+    stall_m: float = 9.0
+    """An errand ends when the way to its place grew no shorter for the steps that so long a way takes."""
     shorter_m: float = 0.02
     """Shorter by less than this is no shorter: a path over cells of 0.05 m differs so much from step to step."""
     wider_m: float = 0.01
     """So much farther from walls the way is sought after each failure."""
     apart_m: float = 0.12
     """No look is made from a place this near to an earlier one."""
+
+    @property
+    def stall_steps(self) -> int:
+        """Steps without progress after which an errand ends."""
+        return self.robot.steps_of(self.stall_m)
 
 
 @dataclass(frozen=True)
@@ -161,8 +167,8 @@ class Errand(ABC):
         """Return a planner that keeps farther from walls after each failure."""
         paths = self._config.paths
         margin = paths.margin_m + self._config.wider_m * self._failures
-        squeeze = paths.squeeze_m if self._failures < self._config.squeezes else paths.radius_m + margin
-        wider = replace(paths, margin_m=margin, squeeze_m=squeeze)
+        squeeze = paths.squeeze_beyond_m if self._failures < self._config.squeezes else margin
+        wider = replace(paths, margin_m=margin, squeeze_beyond_m=squeeze)
         return Planner(around.free_space, around.pose_world[:2], wider, window_m)
 
     def _way(self, around: Surroundings, planner: Planner, places: Float[np.ndarray, "n 2"]) -> Way | None:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain, OpenEnd
-from slam.robot import MotionCommand
+from slam.robot import MotionCommand, RobotSpec, of_robot
 
 from ..following.ping_pong import WallErrand
 from ..following.wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
@@ -27,24 +27,35 @@ from .sweep import Sweep, SweepConfig
 class ExplorerConfig:
     """When an end is given up, and for how long."""
 
+    robot: RobotSpec = of_robot()
     following: FollowingConfig = field(default_factory=FollowingConfig)
-    near_m: float = 0.3
-    """Ends, and places to be visited, this near to each other are one: a body's radius and the errors of a map."""
+    near_beyond_m: float = 0.1
+    """Ends, and places to be visited, no farther apart than the radius and this, the errors of a map, are one."""
     moved_m: float = 0.2
     """An end that was set aside is tried again when it has moved this far."""
     attempts: int = 3
-    """So many ends set aside at one place (within `near_m`) are enough: it is not tried again."""
+    """So many ends set aside at one place (as above) are enough: it is not tried again."""
     returns: int = 8
     """An end that was gone so often while the robot was about it, and came back, is set aside."""
     grown: float = 0.1
     """An end that could not be looked at is tried again when so much more of the floor around it is known."""
-    patience_steps: int = 400
-    """A goal that takes longer is set aside."""
+    patience_m: float = 60.0
+    """A goal that takes more steps than so long a way is set aside."""
     second_looks: int = 4
     """Before it ends, the robot turns on the spot this often while there are walls that it saw only once."""
     sweep: bool = True
     """After the last chain, visit what is reachable and unseen."""
     sweeping: SweepConfig = field(default_factory=SweepConfig)
+
+    @property
+    def near_m(self) -> float:
+        """Ends, and places to be visited, this near to each other are one."""
+        return self.robot.beyond(self.near_beyond_m)
+
+    @property
+    def patience_steps(self) -> int:
+        """A goal that takes more steps is set aside."""
+        return self.robot.steps_of(self.patience_m)
 
 
 @dataclass
@@ -142,7 +153,7 @@ class Explorer:
         again = self._looked_again <= self._config.second_looks and bool(around.walls.tentative.any())
         if not again and not gave_up:
             return None
-        return MotionCommand(0.0, self._config.following.driving.turn_rad)
+        return MotionCommand(0.0, self._config.robot.turn_rad)
 
     def _revive(self, ends: dict[Key, OpenEnd]) -> None:
         """Forget what was set aside where the end is gone or has moved: there it may be tried again."""

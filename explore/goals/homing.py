@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain
+from slam.robot import RobotSpec, of_robot
 
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from ..goal import Goal
@@ -21,12 +22,19 @@ from .explorer import Explorer
 class HomingConfig:
     """When the robot is at its start again."""
 
-    home_m: float = 0.2
-    """The robot is at its start again within this distance of it: one radius of the body."""
-    aim_m: float = 0.1
-    """What it drives to: the free places this near to the start, all well within `home_m`."""
+    robot: RobotSpec = of_robot()
     rounds: int = 5
     """What the way home shows is explored too, and the robot goes home again; a bound, so that every mission ends."""
+
+    @property
+    def home_m(self) -> float:
+        """The robot is at its start again within this distance of it: one radius of the body."""
+        return self.robot.radius_m
+
+    @property
+    def aim_m(self) -> float:
+        """What it drives to: the free places this near to the start, all well within `home_m`."""
+        return 0.5 * self.robot.radius_m
 
 
 class Homing:

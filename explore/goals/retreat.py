@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain
-from slam.robot import MotionCommand, Odometry
+from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory
@@ -27,10 +27,9 @@ from .decider import Decider, Decision
 class RetreatConfig:
     """How far back, and how often."""
 
-    touched_back_m: float = 0.1
-    """So far the robot backs out from what it touched: half a radius of the body, ..."""
+    robot: RobotSpec = of_robot()
     locked_back_m: float = 1.0
-    """... and so far where it believed itself locked in: through a door."""
+    """So far the robot backs out where it believed itself locked in: through a door."""
     last_m: float = 2.0
     """A robot that cannot drive back along so much of its way, is locked in."""
     near_m: float = 0.3
@@ -40,6 +39,11 @@ class RetreatConfig:
     rounds: int = 8
     """So often at most, and never twice within `last_m` of way."""
 
+    @property
+    def touched_back_m(self) -> float:
+        """So far the robot backs out from what it touched: half a radius of the body."""
+        return 0.5 * self.robot.radius_m
+
 
 class Retreat:
     """Leaves all to another decider but the way back; undoes what the odometry reported, step by step."""
@@ -47,7 +51,7 @@ class Retreat:
     def __init__(self, inner: Decider, floor: FloorMemory, config: RetreatConfig, following: FollowingConfig) -> None:
         self._inner, self._floor, self._config, self._following = inner, floor, config, following
         self._driven: list[MotionCommand] = []
-        self._touches = Touches(following.paths.radius_m)
+        self._touches = Touches(config.robot.radius_m)
         self._back_m, self._why = 0.0, ""
         self._step, self._rounds, self._since_m = -1, 0, np.inf
         self._was_back = False
@@ -100,7 +104,8 @@ class Retreat:
             last = self._driven.pop()
             self._back_m -= abs(last.forward_m)
             command = MotionCommand(-last.forward_m, -last.turn_rad)
-            if keeps_clear(command, self._points(around), self._following.driving):
+            may = command.forward_m >= 0.0 or self._config.robot.can_reverse
+            if may and keeps_clear(command, self._points(around), self._following.driving):
                 return replace(self._decided, command=command, words=f"back along its way ({self._why})")
         self._why = ""
         return None

@@ -8,9 +8,10 @@ from jaxtyping import Bool, Float, Int
 from skimage.graph import MCP_Geometric
 
 from slam.geometry.lines import normals
+from slam.robot import RobotSpec
 
 from ..floor.free_space import FreeSpace
-from .coarse_grid import BLOCK, blocks_with_any
+from .coarse_grid import block_cells, blocks_with_any
 from .paths import PathConfig, passable, roomy
 
 DIRECTIONS = 16
@@ -38,9 +39,10 @@ class DrivingField:
     def __init__(self, free_space: FreeSpace, start_world: Float[np.ndarray, "2"], config: PathConfig) -> None:
         """Search from `start_world`."""
         self._free_space, self._config = free_space, config
-        self._side_m = BLOCK * free_space.config.cell_m
-        blocks = -(-np.array(free_space.shape) // BLOCK)
-        self._start = np.clip(free_space.cells(start_world[None])[0] // BLOCK, 0, blocks - 1)
+        self._block = block_cells(config.robot.radius_m, free_space.config.cell_m)
+        self._side_m = self._block * free_space.config.cell_m
+        blocks = -(-np.array(free_space.shape) // self._block)
+        self._start = np.clip(free_space.cells(start_world[None])[0] // self._block, 0, blocks - 1)
 
     def metres(self, places_world: Float[np.ndarray, "n 2"], beyond_nearest: bool = True) -> Float[np.ndarray, " n"]:
         """Return how far it is to drive to each place (within a block of it), m; infinite where no way is known.
@@ -63,8 +65,13 @@ class DrivingField:
         """
         at, reach = tuple(cells.T), self._near if only_near else self._far
         free, clearance = self._free_space.evidence[at] < 0, self._free_space.clearance()[at]
-        block = np.clip(cells // BLOCK - reach.first_block, -1, np.array(reach.metres.shape) - 2) + 1
+        block = np.clip(cells // self._block - reach.first_block, -1, np.array(reach.metres.shape) - 2) + 1
         return roomy(free, clearance, self._config) & np.isfinite(reach.metres[tuple(block.T)])
+
+    @property
+    def robot(self) -> RobotSpec:
+        """Whose body it is that drives."""
+        return self._config.robot
 
     @property
     def near_box(self) -> tuple[slice, slice]:
@@ -77,7 +84,7 @@ class DrivingField:
 
     def _box_of_cells(self, reach: int) -> tuple[slice, slice]:
         """Return the cells of the blocks up to `reach` from the start in rows and columns."""
-        low, high = BLOCK * np.maximum(self._start - reach, 0), BLOCK * (self._start + reach + 1)
+        low, high = self._block * np.maximum(self._start - reach, 0), self._block * (self._start + reach + 1)
         return slice(low[0], high[0]), slice(low[1], high[1])
 
     def stands_around(
@@ -105,7 +112,7 @@ class DrivingField:
     def _search(self, reach: int) -> _Reach:
         """Search as far as `reach` blocks from the start in rows and columns."""
         first = np.maximum(self._start - reach, 0)
-        blocks = blocks_with_any(passable(self._free_space, self._box_of_cells(reach), self._config)[0])
+        blocks = blocks_with_any(passable(self._free_space, self._box_of_cells(reach), self._config)[0], self._block)
         start = self._start - first
         starts = start[None]
         if not blocks[tuple(start)]:

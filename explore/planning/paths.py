@@ -9,11 +9,13 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt, label
 from skimage.graph import MCP_Geometric
 
-from ..floor.free_space import FreeSpace
-from .coarse_grid import BLOCK, blocks_with_any, cells_of
+from slam.robot import RobotSpec, of_robot
 
-BESIDE = 5
-"""Paths are sought so many blocks to each side of the shortest way by blocks: 1 m."""
+from ..floor.free_space import FreeSpace
+from .coarse_grid import block_cells, blocks_with_any, cells_of
+
+BESIDE_M = 1.0
+"""Paths are sought so far to each side of the shortest way by blocks."""
 ESCAPE_COST = 30.0
 """What a metre costs where the robot gets away from a wall that it is too near to."""
 
@@ -22,27 +24,47 @@ ESCAPE_COST = 30.0
 class PathConfig:
     """How near to walls a path may lead, and what it pays for it."""
 
-    radius_m: float = 0.2
-    """The robot's disc."""
+    robot: RobotSpec = of_robot()
     margin_m: float = 0.025
     """Least distance m kept beyond the radius, between cell centres."""
-    squeeze_m: float = 0.2
-    """Through gaps narrower than that, down to this clearance between cell centres, the robot squeezes where no other
-    way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells whether it fits."""
+    squeeze_beyond_m: float = 0.0
+    """Through gaps narrower than that, down to this clearance beyond the radius, between cell centres, the robot
+    squeezes where no other way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells
+    whether it fits."""
     squeeze_cost: float = 20.0
     """What a metre of squeezing costs on top."""
-    tight_m: float = 0.3
-    """Around a place where the body did not fit it is not tried again."""
-    standoff_m: float = 0.35
-    """Distance from walls that costs nothing; it yields in narrow passages, the margin does not."""
+    tight_beyond_m: float = 0.1
+    """Within the radius and this of a place where the body did not fit it is not tried again."""
+    standoff_beyond_m: float = 0.15
+    """A body this far from walls pays nothing; it yields in narrow passages, the margin does not."""
     narrow_cost: float = 4.0
     """A metre at the least clearance costs this much more than one at the stand-off."""
     coast_m: float = 3.0
     """Farther than this from any wall the scanner shows too little to tell where the robot is, ..."""
     blind_cost: float = 4.0
     """... and a metre costs so much more: a way along the walls is worth a detour."""
-    escape_m: float = 0.3
-    """Around the robot itself free cells count as passable however near a wall is: it may have to get away."""
+    escape_beyond_m: float = 0.1
+    """So far around the body free cells count as passable however near a wall is: it may have to get away."""
+
+    @property
+    def squeeze_m(self) -> float:
+        """Least clearance between cell centres."""
+        return self.robot.beyond(self.squeeze_beyond_m)
+
+    @property
+    def tight_m(self) -> float:
+        """Where the body did not fit, so far around it is not tried again."""
+        return self.robot.beyond(self.tight_beyond_m)
+
+    @property
+    def standoff_m(self) -> float:
+        """Distance of the middle of the body from walls that costs nothing."""
+        return self.robot.beyond(self.standoff_beyond_m)
+
+    @property
+    def escape_m(self) -> float:
+        """So far around the middle of the body it may get away."""
+        return self.robot.beyond(self.escape_beyond_m)
 
 
 @dataclass(frozen=True)
@@ -69,6 +91,7 @@ class Planner:
     ) -> None:
         """Look at the floor within `window_m` of the start in x and y, or at all of it."""
         self._free_space, self._config = free_space, config
+        self._block = block_cells(config.robot.radius_m, free_space.config.cell_m)
         start = free_space.cells(start_world[None])[0]
         reach = max(free_space.shape) if window_m is None else int(np.ceil(window_m / free_space.config.cell_m))
         self._corner = np.maximum(start - reach, 0)
@@ -113,16 +136,18 @@ class Planner:
         squeezed = np.where(self._passable_blocks, 1.0 + self._config.squeeze_cost, -1.0)
         costs = np.where(self._roomy_blocks, 1.0, squeezed)
         costs[self._blind_blocks & (costs > 0.0)] += self._config.blind_cost
-        ends = np.unique(goals // BLOCK, axis=0)
+        ends = np.unique(goals // self._block, axis=0)
         search = MCP_Geometric(costs)
-        lengths, _ = search.find_costs([tuple(self._start // BLOCK)], [tuple(end) for end in ends], find_all_ends=False)
+        here = tuple(self._start // self._block)
+        lengths, _ = search.find_costs([here], [tuple(end) for end in ends], find_all_ends=False)
         at_ends = lengths[tuple(ends.T)]
         best = int(np.argmin(at_ends))
         if not np.isfinite(at_ends[best]):
             return None
         corridor = np.zeros(costs.shape, dtype=bool)
+        beside = int(np.ceil(BESIDE_M / (self._block * self._free_space.config.cell_m) - 1e-9))
         for r, c in search.traceback(tuple(ends[best])):
-            corridor[max(r - BESIDE, 0) : r + BESIDE + 1, max(c - BESIDE, 0) : c + BESIDE + 1] = True
+            corridor[max(r - beside, 0) : r + beside + 1, max(c - beside, 0) : c + beside + 1] = True
         return corridor
 
     def _cheapest(
@@ -134,10 +159,10 @@ class Planner:
         """
         blocks = np.argwhere(corridor)
         first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
-        box = (slice(BLOCK * first[0], BLOCK * end[0]), slice(BLOCK * first[1], BLOCK * end[1]))
+        corner, past = self._block * first, self._block * end
+        box = (slice(corner[0], past[0]), slice(corner[1], past[1]))
         metre = self._metre(box)
-        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape)] = -1.0
-        corner = BLOCK * first
+        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape, self._block)] = -1.0
         goals, start = goals - corner, self._start - corner
         inside = np.flatnonzero(np.all((goals >= 0) & (goals < metre.shape), axis=1))
         inside = inside[metre[tuple(goals[inside].T)] > 0]
@@ -155,7 +180,7 @@ class Planner:
     def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
         """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
         metre = np.where(self._passable[box], metre_costs(self._clearance[box], self._roomy[box], self._config), -1.0)
-        blind = cells_of(self._blind_blocks, self._passable.shape)[box]
+        blind = cells_of(self._blind_blocks, self._passable.shape, self._block)[box]
         metre[blind & (metre > 0.0)] += self._config.blind_cost
         metre[self._escape[box]] = ESCAPE_COST
         return metre
@@ -168,16 +193,16 @@ class Planner:
 
     @cached_property
     def _roomy_blocks(self) -> Bool[np.ndarray, "p q"]:
-        return blocks_with_any(self._roomy)
+        return blocks_with_any(self._roomy, self._block)
 
     @cached_property
     def _blind_blocks(self) -> Bool[np.ndarray, "p q"]:
         """Which blocks lie too far from any wall to see it well."""
-        return blind_blocks(self._free_space, self._box, self._config.coast_m)
+        return blind_blocks(self._free_space, self._box, self._config)
 
     @cached_property
     def _passable_blocks(self) -> Bool[np.ndarray, "p q"]:
-        return blocks_with_any(self._passable)
+        return blocks_with_any(self._passable, self._block)
 
     def within(self, cells: Bool[np.ndarray, "h w"]) -> "Planner":
         """Return a planner that keeps to some cells of the window, as it is now, and to what is around the robot."""
@@ -268,33 +293,34 @@ def passable(
     return fits | roomy_cells | free_space.driven(box), roomy_cells
 
 
-def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], coast_m: float) -> Bool[np.ndarray, "p q"]:
+def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig) -> Bool[np.ndarray, "p q"]:
     """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
-    side_m = BLOCK * free_space.config.cell_m
-    beside = int(np.ceil(coast_m / side_m))
+    block = block_cells(config.robot.radius_m, free_space.config.cell_m)
+    side_m = block * free_space.config.cell_m
+    beside = int(np.ceil(config.coast_m / side_m))
     (r0, r1, _), (c0, c1, _) = (part.indices(size) for part, size in zip(box, free_space.shape, strict=True))
-    above, left = min(beside, r0 // BLOCK), min(beside, c0 // BLOCK)
-    rows = slice(r0 - BLOCK * above, r1 + BLOCK * beside)
-    columns = slice(c0 - BLOCK * left, c1 + BLOCK * beside)
-    hit = blocks_with_any(free_space.evidence[rows, columns] > 0)
-    shape = -(-(r1 - r0) // BLOCK), -(-(c1 - c0) // BLOCK)
+    above, left = min(beside, r0 // block), min(beside, c0 // block)
+    rows = slice(r0 - block * above, r1 + block * beside)
+    columns = slice(c0 - block * left, c1 + block * beside)
+    hit = blocks_with_any(free_space.evidence[rows, columns] > 0, block)
+    shape = -(-(r1 - r0) // block), -(-(c1 - c0) // block)
     if not hit.any():
         return np.ones(shape, dtype=bool)
     distance = distance_transform_edt(~hit, sampling=side_m)
-    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > coast_m)
+    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > config.coast_m)
 
 
 def roomy(
     is_free: Bool[np.ndarray, "*n"], clearance: Float[np.ndarray, "*n"], config: PathConfig
 ) -> Bool[np.ndarray, "*n"]:
     """Return in which cells the body has room enough, by whether they were seen free and their clearance, m."""
-    return is_free & (clearance >= config.radius_m + config.margin_m)
+    return is_free & (clearance >= config.robot.radius_m + config.margin_m)
 
 
 def metre_costs(
     clearance: Float[np.ndarray, "h w"], is_roomy: Bool[np.ndarray, "h w"], config: PathConfig
 ) -> Float[np.ndarray, "h w"]:
     """Return what a metre costs in each cell, if the body fits there."""
-    least = config.radius_m + config.margin_m
+    least = config.robot.radius_m + config.margin_m
     tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
     return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)

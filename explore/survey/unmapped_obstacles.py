@@ -17,8 +17,8 @@ TOGETHER_CELLS = 5.0
 """Cells hit this near to each other are one thing: from afar beams meet it some centimetres apart."""
 LEAST_CELLS = 3
 """Fewer are single beams that ended on noise."""
-LOOK_M = (0.6, 0.9)
-"""From so far away, faces of a decimetre show beams enough."""
+LOOK_BEYOND_M = (0.4, 0.7)
+"""With the body so far away, faces of a decimetre show beams enough."""
 
 
 def unmapped_obstacles(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
@@ -30,8 +30,9 @@ def unmapped_obstacles(free_space: FreeSpace, walls: StochasticMap) -> list[Floa
 
 def obstacle_viewpoints(thing_world: Float[np.ndarray, "n 2"], field: DrivingField) -> Float[np.ndarray, "m 2"]:
     """Return where the robot can stand to look at a thing from nearby, m; the thing is given as points of it."""
-    places = field.stands_around(thing_world, np.array(LOOK_M))
-    return places[cKDTree(thing_world).query(places)[0] > LOOK_M[0] - 1e-6]
+    look_m = np.array([field.robot.beyond(metres) for metres in LOOK_BEYOND_M])
+    places = field.stands_around(thing_world, look_m)
+    return places[cKDTree(thing_world).query(places)[0] > look_m[0] - 1e-6]
 
 
 def is_mapped(walls: StochasticMap, place_world: Float[np.ndarray, "2"]) -> bool:

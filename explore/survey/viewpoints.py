@@ -8,6 +8,7 @@ from jaxtyping import Float
 from slam.geometry.lines import directions, normals
 from slam.map.chains import HEAD, OpenEnd
 from slam.map.stochastic_map import StochasticMap
+from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
 from ..planning.paths import Planner
@@ -18,10 +19,11 @@ from ..planning.sight import cells_within, sees
 class ViewpointsConfig:
     """The places from which an end is looked at."""
 
-    standoff_m: float = 0.35
-    """Distance at which a wall is followed and its end rounded."""
-    close_m: float = 0.25
-    """Distance of the last, close look."""
+    robot: RobotSpec = of_robot()
+    standoff_beyond_m: float = 0.15
+    """Distance of the body at which a wall is followed and its end rounded."""
+    close_beyond_m: float = 0.05
+    """Distance of the body at the last, close look."""
     slack_m: float = 0.25
     """A place this near to the ideal one will do."""
     near_m: float = 1.2
@@ -30,6 +32,16 @@ class ViewpointsConfig:
     """And where there is none, any place within this."""
     short_m: float = 0.12
     """A line of sight need not come nearer than this to the end itself."""
+
+    @property
+    def standoff_m(self) -> float:
+        """Distance of the middle of the body at which a wall is followed."""
+        return self.robot.beyond(self.standoff_beyond_m)
+
+    @property
+    def close_m(self) -> float:
+        """Distance of the middle of the body at the last, close look."""
+        return self.robot.beyond(self.close_beyond_m)
 
 
 LOOKS = ("in front of", "past", "round", "close to")

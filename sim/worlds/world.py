@@ -7,9 +7,11 @@ import numpy as np
 import shapely
 from jaxtyping import Float, Int
 
+from slam.robot import RobotSpec
+
 from .contour import Contour, visible_contour
 
-ROBOT_RADIUS_M = 0.2
+ROBOT_RADIUS_M = RobotSpec().radius_m
 SENSOR_RANGE_M = 4.0
 
 

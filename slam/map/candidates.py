@@ -13,6 +13,7 @@ from ..estimation.gates import gate_level
 from ..extraction.segments import Segments
 from ..geometry.lines import directions, lines_to_world, normals
 from ..geometry.poses import to_world, wrap
+from ..robot import RobotSpec, of_robot
 
 FACING_COSINE = 0.5
 """Lines that turn by more than 60 degrees from one another are never one, however poor their directions."""
@@ -22,6 +23,7 @@ FACING_COSINE = 0.5
 class CandidatesConfig:
     """When a line of few beams is believed."""
 
+    robot: RobotSpec = of_robot()
     looks: int = 2
     """Places from which it must have been seen ..."""
     apart_m: float = 0.07
@@ -31,12 +33,18 @@ class CandidatesConfig:
     longest_m: float = 0.18
     """Longer ones are not believed: a face of that length shows five beams from near by, and what shows three or four
     is mostly a line from one wall's corner to the next wall."""
-    patience_steps: int = 1000
-    """It is forgotten when it was not seen for so many scans: the second look may be on the way back."""
+    patience_m: float = 150.0
+    """It is forgotten when it was not seen for the steps that so long a way takes: the second look may be on the way
+    back."""
     gate: float = 0.99
     """Probability level of the test whether two observations are of one line."""
     slack_m: float = 0.01
     """What the pose may have drifted between two observations, sigma."""
+
+    @property
+    def patience_steps(self) -> int:
+        """It is forgotten when it was not seen for so many scans."""
+        return self.robot.steps_of(self.patience_m)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ..extraction.segments import EndKind, Segments
 from ..extraction.visible_extent import beam_spacing, owners_of_beams
 from ..geometry.lines import directions
 from ..geometry.poses import to_world
-from ..robot import Scan
+from ..robot import RobotSpec, Scan, of_robot
 from .ray_evidence import RayEvidence, ray_evidence
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
@@ -28,10 +28,11 @@ TRIM_M = 0.5
 class WallsConfig:
     """When a wall is trusted, and when it is forgotten."""
 
+    robot: RobotSpec = of_robot()
     trusted_observations: int = 2
     """A wall is tentative until it was seen this often with enough beams."""
-    patience_steps: int = 15
-    """A tentative wall is forgotten after this many scans without a observation."""
+    patience_m: float = 2.25
+    """A tentative wall is forgotten once it was not observed for the steps that so long a way takes."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
     """Which observations may move the estimate."""
     pass_margin_m: float = 0.1
@@ -46,6 +47,11 @@ class WallsConfig:
     """A wall is forgotten when so many scans in turn gave all its beams to other walls ..."""
     established_observations: int = 10
     """... unless it was seen at least this often."""
+
+    @property
+    def patience_steps(self) -> int:
+        """A tentative wall is forgotten after this many scans without an observation."""
+        return self.robot.steps_of(self.patience_m)
 
 
 class Extents:

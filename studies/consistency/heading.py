@@ -98,8 +98,8 @@ class HeadingStudy:
         """Return what one run is made of."""
         robot = RobotConfig()
         # Both wheels slip on their own, and turn the robot by the difference over the distance between them.
-        slip = np.deg2rad(ring.heading_deg) * robot.drive.wheel_base_m / np.sqrt(2.0)
-        robot = replace(robot, drive=replace(robot.drive, wheel_slip=float(slip)))
+        slip = np.deg2rad(ring.heading_deg) * robot.wheels.base_m / np.sqrt(2.0)
+        robot = replace(robot, wheels=replace(robot.wheels, slip=float(slip)))
         return TrialConfig(
             f"ring-{ring.length_m:g}", ring.backend, ring.strategy, ring.seed, self.p0,
             max_path_m=self.way * ring.length_m, robot=robot,

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from sim.chance import Channel, standard_normals
-from sim.drive import DriveConfig, Slip, clamp, draw_slip, odometry, true_motion, wheels
+from sim.drive import Slip, clamp, draw_slip, odometry, true_motion, wheels
 from slam.geometry.poses import arc
-from slam.robot import MotionCommand
+from slam.robot import MotionCommand, RobotSpec
 
-CONFIG = DriveConfig()
+ROBOT = RobotSpec()
+CONFIG = ROBOT.wheels
 COMMANDS = [
     MotionCommand(0.15, 0.0),
     MotionCommand(0.1, 0.17),
@@ -59,16 +60,16 @@ def test_nees_of_the_motion_is_chi_square():
 
 @pytest.mark.parametrize("command", [MotionCommand(1.0, 0.1), MotionCommand(0.1, -2.0), MotionCommand(-3.0, 3.0)])
 def test_clamping_keeps_the_arc_and_shortens_it(command):
-    short = clamp(command, CONFIG)
-    assert abs(short.forward_m) <= CONFIG.step_max_m * (1 + 1e-12)
-    assert abs(short.turn_rad) <= CONFIG.turn_max_rad * (1 + 1e-12)
+    short = clamp(command, ROBOT)
+    assert abs(short.forward_m) <= ROBOT.step_m * (1 + 1e-12)
+    assert abs(short.turn_rad) <= ROBOT.turn_rad * (1 + 1e-12)
     assert short.forward_m * command.turn_rad == pytest.approx(command.forward_m * short.turn_rad)
-    assert clamp(short, CONFIG).forward_m == pytest.approx(short.forward_m)
+    assert clamp(short, ROBOT).forward_m == pytest.approx(short.forward_m)
 
 
 def test_a_command_that_is_not_finite_is_refused():
     with pytest.raises(ValueError, match="finite"):
-        clamp(MotionCommand(float("nan"), 0.0), CONFIG)
+        clamp(MotionCommand(float("nan"), 0.0), ROBOT)
 
 
 def test_turning_in_place_moves_the_wheels_against_each_other():

@@ -47,8 +47,8 @@ def test_a_ring_without_a_block_is_refused():
 
 def test_wheels_lose_the_heading_that_was_asked_for():
     trial = HeadingStudy().trial(Ring(30.0, 4.0, "adaptive", "graph", 7))
-    drive = trial.robot.drive
-    per_root_metre = np.hypot(drive.wheel_slip, drive.wheel_slip) / drive.wheel_base_m
+    wheels = trial.robot.wheels
+    per_root_metre = np.hypot(wheels.slip, wheels.slip) / wheels.base_m
     assert np.rad2deg(per_root_metre) == pytest.approx(4.0)
     assert (trial.max_path_m, trial.strategy, trial.backend, trial.seed) == (60.0, "adaptive", "graph", 7)
 

@@ -5,6 +5,7 @@ YAML's aliases, merges and tags make a kilobyte into gigabytes and text into obj
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import yaml
 
@@ -15,11 +16,17 @@ DEEPEST = 4
 NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 WORDS: dict[str, bool | None] = {"true": True, "false": False, "null": None, "~": None, "": None}
 
-Value = str | float | bool | None | list["Value"] | dict[str, "Value"]
+Value = Any
+"""Text, a number, a truth or nothing; a list of values; a mapping of text to values."""
 
 
-def plain_mapping(data: bytes) -> dict[str, Value]:
-    """Return the mapping in a YAML file's bytes, every number as a float; raise WorldError for anything else."""
+def plain_mapping(
+    data: bytes, what: str = "a ROS map YAML", holding: str = " with image: and resolution:"
+) -> dict[str, Value]:
+    """Return the mapping in a YAML file's bytes, every number as a float; raise WorldError for anything else.
+
+    `what` it should be, and `holding` which keys, are words for the message.
+    """
     if len(data) > FILE_MAX:
         raise WorldError(f"expected a YAML file of at most {FILE_MAX} bytes, found {len(data)}: shorten it")
     try:
@@ -28,10 +35,10 @@ def plain_mapping(data: bytes) -> dict[str, Value]:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         if isinstance(error, WorldError):
             raise
-        raise WorldError(f"expected a ROS map YAML, found {shorten(str(error))}: correct the file") from None
+        raise WorldError(f"expected {what}, found {shorten(str(error))}: correct the file") from None
     if len(documents) != 1 or not isinstance(documents[0], dict):
         found = shorten(documents[0]) if len(documents) == 1 else f"{len(documents)} documents"
-        raise WorldError(f"expected a ROS map YAML with image: and resolution:, found {found}: correct it")
+        raise WorldError(f"expected {what}{holding}, found {found}: correct it")
     return documents[0]
 
 

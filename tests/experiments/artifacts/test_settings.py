@@ -2,22 +2,22 @@
 
 import json
 import os
-from dataclasses import asdict
 
 import pytest
 
 from experiments.artifacts.files import json_bytes
 from experiments.artifacts.formats import CONFIG, FORMATS
+from experiments.artifacts.older import RENAMED
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.artifacts.settings import (
-    RENAMED,
     defaults,
     leaves,
     nested,
     over,
     parse_setting,
     read_settings,
+    record_of,
     trial_of,
 )
 from experiments.commands.cli import main
@@ -46,7 +46,7 @@ def test_every_setting_stands_in_the_config_and_is_reached_by_its_key():
         if key == "start":
             continue
         words = f"{key}={json.dumps(another(value))}"
-        changed = dict(leaves(json.loads(json_bytes(asdict(trial_of(parse_setting(words)))))))
+        changed = dict(leaves(record_of(trial_of(parse_setting(words)))))
         assert {name for name in changed if changed[name] != LEAVES.get(name)} == {key}
         assert changed[key] == another(value)
 

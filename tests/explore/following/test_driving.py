@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.floor.accumulated_returns import NEAR_M, SCANS, AccumulatedReturns, returns, steadied
+from explore.floor.accumulated_returns import NEAR_BEYOND_M, SCANS, AccumulatedReturns, returns, steadied
 from explore.floor.free_space import FreeSpace
 from explore.following.driving import DrivingConfig, Pilot
 from explore.planning.paths import Path, PathConfig, Planner
@@ -107,7 +107,7 @@ def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
     at = rng.choice(180, 5, replace=False)
     ranges[at] = rng.uniform(0.2, 0.8, 5)
     scan = scan_of(ranges)
-    seen = returns(scan)[np.hypot(*returns(scan).T) < NEAR_M]
+    seen = returns(scan)[np.hypot(*returns(scan).T) < 0.2 + NEAR_BEYOND_M]
     recent.see(scan)
     pose = np.zeros(3)
     for motion in rng.uniform(-0.2, 0.2, (3, 3)):

@@ -28,7 +28,7 @@ def ask(explorer, situation):
 def test_a_goal_that_takes_too_long_is_set_aside_and_says_so(scene_of, patience):
     """The wheels do not carry the robot: whatever it does, it stands where it stood."""
     scene = scene_of(3)
-    pose, explorer = told_at(scene, replace(NO_SWEEP, patience_steps=patience))
+    pose, explorer = told_at(scene, replace(NO_SWEEP, patience_m=patience * 0.15))
     situation = scene.situation(pose, [(0, 1)])
     for _ in range(patience):
         command, aside = ask(explorer, situation)
@@ -40,7 +40,7 @@ def test_a_goal_that_takes_too_long_is_set_aside_and_says_so(scene_of, patience)
 def test_an_end_that_was_given_up_is_tried_again_where_it_moved_but_three_times_only(scene_of):
     """It goes to and fro by 0.25 m, and each time it might be a new one."""
     scene = scene_of(3)
-    pose, explorer = told_at(scene, replace(NO_SWEEP, patience_steps=0))
+    pose, explorer = told_at(scene, replace(NO_SWEEP, patience_m=0.0))
     tried, before = [], ()
     for turn in range(12):
         situation = scene.situation(pose, [(0, 1)])

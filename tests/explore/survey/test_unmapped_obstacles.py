@@ -8,7 +8,7 @@ import pytest
 from explore.goals.ledger import Ledger
 from explore.goals.sweep import Sweep, SweepConfig
 from explore.planning.driving_field import DrivingField
-from explore.survey.unmapped_obstacles import APART_M, LOOK_M, is_mapped, obstacle_viewpoints, unmapped_obstacles
+from explore.survey.unmapped_obstacles import APART_M, LOOK_BEYOND_M, is_mapped, obstacle_viewpoints, unmapped_obstacles
 from slam.geometry.lines import distance_to_segments
 
 
@@ -49,7 +49,7 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
     assert len(places)
     assert np.all(np.isfinite(field.metres(places)))
     nearest = np.hypot(*np.moveaxis(places[:, None] - thing, -1, 0)).min(axis=1)
-    assert np.all((nearest > LOOK_M[0] - 1e-3) & (nearest < LOOK_M[1] + 1e-3))
+    assert np.all((nearest > 0.2 + LOOK_BEYOND_M[0] - 1e-3) & (nearest < 0.2 + LOOK_BEYOND_M[1] + 1e-3))
 
 
 def test_the_last_layer_goes_there_twice_at_most_and_only_when_it_is_on(scene_of):

@@ -62,7 +62,7 @@ def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
 
 def test_a_line_unseen_for_long_is_forgotten() -> None:
     rng = np.random.default_rng(4)
-    faint = LandmarkCandidates(CandidatesConfig(patience_steps=5))
+    faint = LandmarkCandidates(CandidatesConfig(patience_m=5 * 0.15))
     face, nothing = (
         np.array([[1.0, 0.05], [1.0, -0.05]])[::-1],
         look(np.eye(2), np.zeros(3), rng).take(np.zeros(0, int)),
