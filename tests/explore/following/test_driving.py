@@ -128,8 +128,8 @@ def test_commands_are_short_forward_steps_and_small_turns(seed):
     pilot = pilot_to(pose[:2] + rng.uniform(-1.5, 1.5, 2), pose, grid)
     command = pilot.command(pose, scan_of(np.full(180, np.inf)), grid)
     assert command is not None
-    assert 0.0 <= command.forward_m <= CONFIG.step_m
-    assert abs(command.turn_rad) <= CONFIG.turn_rad + 1e-12
+    assert 0.0 <= command.forward_m <= CONFIG.robot.step_m
+    assert abs(command.turn_rad) <= CONFIG.robot.turn_rad + 1e-12
 
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, 3.1, -2.0])
@@ -179,8 +179,8 @@ def test_a_robot_that_faces_the_wrong_way_turns_on_the_spot_the_short_way():
     free = scan_of(np.full(180, np.inf))
     left = pilot_to(np.array([-1.0, 0.2]), pose, grid).command(pose, free, grid)
     right = pilot_to(np.array([-1.0, -0.2]), pose, grid).command(pose, free, grid)
-    assert left == MotionCommand(0.0, CONFIG.turn_rad)
-    assert right == MotionCommand(0.0, -CONFIG.turn_rad)
+    assert left == MotionCommand(0.0, CONFIG.robot.turn_rad)
+    assert right == MotionCommand(0.0, -CONFIG.robot.turn_rad)
 
 
 def between(gap_m, rng, aside_m=0.0):

@@ -17,7 +17,7 @@ from slam.robot import Scan
 
 CONFIG = PathConfig()
 CELL = 0.05
-LEAST = CONFIG.radius_m + CONFIG.margin_m
+LEAST = CONFIG.robot.radius_m + CONFIG.margin_m
 
 
 def explored(seed):
