@@ -10,6 +10,7 @@ from explore.limits import limited
 from explore.mission import explore_mission
 from explore.outcome import Outcome
 from explore.step import Step
+from sim.logs.keyframes import RecordedLog
 from sim.worlds import World
 from slam.estimation.backend import Joint
 from slam.mapper import Mapper
@@ -39,6 +40,8 @@ class TrialResult:
     summary: dict[str, Any]
     smoothed: Smoothed | None = None
     """What the back end made of everything at the end, if it smooths; the scores are of what each step knew."""
+    recorded: RecordedLog | None = None
+    """The log of a real robot, of which no truth is known; None for a simulated run."""
 
 
 Mission = Callable[[Scenario], Iterator[Step]]
@@ -69,10 +72,10 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     """Run a scenario to its end, whatever that is, and return all that was computed."""
     truth = truth_of(scenario.world, scenario.config.robot)
     recorder = Recorder(scenario.robot, Votes(truth))
-    ending = _run(scenario, recorder, watch, mission)
+    ending = ride(scenario, recorder, watch, mission)
     recorder.close()
     if recorder.last is None:
-        summary = _bare_summary(scenario, ending)
+        summary = bare_summary(scenario, ending)
         return TrialResult(scenario, ending, None, recorder.votes, None, None, None, summary)
     log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
     way_world = log.estimated_world[:, :2]
@@ -83,7 +86,8 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
 
 
-def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
+def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
+    """Go through a mission to its end, whatever that is, and return it; the recorder keeps every step."""
     try:
         for step in limited(mission(scenario), scenario.config.limits):
             recorder.add(step)
@@ -100,7 +104,7 @@ def _run(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
     return Ending(Outcome.FAILED, "the mission ended without saying why")
 
 
-def _bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
+def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a single step: null for all that was not measured."""
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"

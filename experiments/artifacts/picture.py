@@ -8,6 +8,8 @@ import shapely
 from jaxtyping import Float
 
 from explore.goal import SetAside
+from explore.step import Step
+from sim.logs.keyframes import RecordedLog
 from sim.worlds import World
 from slam.geometry.poses import compose, inverse, to_world
 from slam.map.chains import Chain
@@ -17,6 +19,8 @@ from viz.figures.maps import Picture, draw_map, png
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..scoring.corners import corners
 from ..scoring.coverage import own_alignment
+from ..scoring.records import Log
+from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 
 
@@ -25,6 +29,8 @@ def picture_of(result: TrialResult) -> bytes:
     if result.log is None or result.last is None:
         raise ValueError("expected a run of at least one step, found none: there is no map to draw")
     log, last, scenario = result.log, result.last, result.scenario
+    if result.recorded is not None:
+        return png(draw_map(_alone(result, log, last, result.recorded)))
     known = [
         (corner.position_world, cov)
         for corner in corners(last.map, last.chains)
@@ -38,6 +44,23 @@ def picture_of(result: TrialResult) -> bytes:
             )
         )
     )  # fmt: skip
+
+
+def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> Picture:
+    """Return the picture of a recorded drive: no truth lies under it, but the path that the wheels tell."""
+    summary, config = result.summary, result.scenario.config
+    words = [
+        f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
+        f"{summary['lines']} walls, {summary['chains_closed']} closed chains",
+    ]
+    return Picture(
+        map=last.map,
+        chains=last.chains,
+        path_world=log.estimated_world,
+        title=f"{result.scenario.world.name}   {config.backend}",
+        subtitle=";  ".join(words),
+        odometry_path_world=odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)]),
+    )
 
 
 def over_truth(

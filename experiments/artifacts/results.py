@@ -12,13 +12,14 @@ from jaxtyping import Float
 
 from explore.certificate import Certificate
 from explore.step import Step
+from sim.logs.keyframes import RecordedLog
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
 from viz.figures.floor_plan import Dimension, floor_plan
 
 from ..scenario import TrialConfig
 from ..scoring.records import Log
-from ..scoring.summary import odometry_path, pose_nees
+from ..scoring.summary import odometry_path, odometry_poses, pose_nees
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
@@ -36,6 +37,7 @@ RECORDING = "run.rrd"
 RUN_FILES = (
     *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.png", "map.pgm"),
     *("map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
+    "trajectory_odometry.tum",
     *(RECORDING, "report.html", "tables.tex"),
 )
 """All that a run leaves, and what `view` and `report` make of it in the same folder."""
@@ -82,17 +84,20 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     certificate = result.certificate
     if log is None or last is None or certificate is None:
         return files
-    smoothed = result.smoothed
+    smoothed, recorded = result.smoothed, result.recorded
     if smoothed is not None:
-        files["trajectory_smoothed.tum"] = lambda: tum(log.time_s, smoothed.poses_world)
+        files["trajectory_smoothed.tum"] = lambda: trajectory(result, log, smoothed.poses_world)
+    if recorded is None:
+        files["trajectory_true.tum"] = lambda: trajectory(result, log, log.true_world)
+    else:
+        files["trajectory_odometry.tum"] = lambda: trajectory(result, log, wheels_alone(log, recorded))
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
         MAP: lambda: npz_bytes(map_arrays(result)),
         "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
         "steps.csv": lambda: steps_csv(log),
-        "trajectory_true.tum": lambda: tum(log.time_s, log.true_world),
-        "trajectory_estimated.tum": lambda: tum(log.time_s, log.estimated_world),
+        "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
         "map.svg": lambda: floor_plan(
             last.map, last.chains, certificate, log.estimated_world, title, _dimensions(result, last, certificate, log)
         ),
@@ -152,17 +157,32 @@ def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
     """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
     return {
         **stamp(LOG),
+        **_sensed(result, log),
+        **({} if result.recorded is not None else _true(result, log)),
+    }
+
+
+def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
+    recorded = result.recorded
+    # Scan matching takes the place of what the wheels reported; the log keeps their reports.
+    wheels = log if recorded is None else recorded.recording
+    return {
         "time_s": log.time_s,
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,
         "sigma_m": log.sigma_m,
         "sigma_share": log.sigma_share,
         "range_max_m": log.range_max_m,
-        "odometry": log.odometry,
-        "odometry_cov": log.odometry_cov,
+        "odometry": wheels.odometry[: len(log)],
+        "odometry_cov": wheels.odometry_cov[: len(log)],
         "touched": log.touched,
         "start_pose": result.scenario.start_estimate,
         "start_cov": result.scenario.start_cov,
+    }
+
+
+def _true(result: TrialResult, log: Log) -> dict[str, Any]:
+    return {
         "true_poses": log.true_world,
         "true_faces": result.votes.truth.faces,
         "true_face_of_beam": log.face_of_beam,
@@ -224,6 +244,20 @@ def steps_csv(log: Log) -> bytes:
         1e3 * log.seconds,
     ]
     return csv_bytes(STEP_COLUMNS, zip(*columns, strict=True))
+
+
+def trajectory(result: TrialResult, log: Log, poses_world: Float[np.ndarray, "s 3"]) -> bytes:
+    """Return the poses of a run's steps in the TUM format; of a recorded drive those of all its scans, on its clock."""
+    recorded = result.recorded
+    if recorded is None:
+        return tum(log.time_s, poses_world)
+    scans = recorded.poses_of_scans(poses_world)
+    return tum(recorded.scan_time_s[: len(scans)], scans)
+
+
+def wheels_alone(log: Log, recorded: RecordedLog) -> Float[np.ndarray, "s 3"]:
+    """Return where the wheels alone say that a recorded robot was, from where the estimate begins."""
+    return odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)])
 
 
 def tum(time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"]) -> bytes:

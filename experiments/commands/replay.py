@@ -2,23 +2,26 @@
 
 import sys
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from explore.step import Step
-from sim.worlds import World
+from sim.logs.recorded_log import is_own_log
 from slam.backends import BACKENDS
 
 from ..artifacts.presets import robot_of, stated
-from ..artifacts.results import REPLAY, config_record, write_results
+from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
-from ..replays.replay import Association, RecordedRun, ReplayOptions, read_run, replay, replayed, retuned
+from ..replays.real_log import RealOptions, read_real_run
+from ..replays.replay import Association, ReplayOptions, read_run, retuned
+from ..replays.sources import OwnLog, RealLog
 from ..scenario import load_world
+from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
-from ..terminal.progress import print_comparison, progress
+from ..terminal.progress import print_comparison, print_recorded, progress
 from ..trial import TrialResult
 from ..usage import UsageError, choose
 from ..views.timelines import TimelineOutput
@@ -26,10 +29,13 @@ from ..views.timelines import TimelineOutput
 
 @dataclass(frozen=True)
 class Replay:
-    """Send a run's own log through one or several back ends: identical scans, the back end alone."""
+    """Send a log through one or several back ends: identical scans, the back end alone.
+
+    A run's own log knows the truth; a real robot's log does not, and is scored by what the map itself tells.
+    """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """The log.npz that a run left, with its config.json beside it."""
+    """The log.npz that a run left, with its config.json beside it; or a CARMEN or dp-slam log, also packed by gzip."""
     backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
     """The estimators (see `chainslam backends`)."""
     association: Association = "own"
@@ -38,6 +44,8 @@ class Replay:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
+    every: int = 1
+    """Of a real robot's log, map one of so many keyframes (the scans that are 0.1 m or 5 degrees apart)."""
     robot: str | None = None
     """What the robot states of itself, in place of what the run's says: a bundled robot (paper, turtlebot,
     front-scanner) or a YAML file (docs/robots.md), of which the devices are left aside: the log has settled them."""
@@ -47,7 +55,8 @@ class Replay:
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
     """One of these settings by its key in `config.json`, as `mission.mapper.matching.gate=0.95`; may be given again."""
     out: Path | None = None
-    """Folder for the results, one folder for each of several back ends; by default replay-ASSOCIATION beside LOG."""
+    """Folder for the results, one folder for each of several back ends; by default replay-ASSOCIATION beside LOG,
+    and for a real robot's log replay-LOG."""
     force: bool = False
     """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
     rrd: Path | None = None
@@ -57,28 +66,24 @@ class Replay:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         for name in self.backend:
             choose("back end", name, BACKENDS)
-        run = retuned(read_run(self.log), self.config, self.set, stated(robot_of(self.robot)))
-        out = self.out or self.log.parent / f"replay-{self.association}"
+        source = self._source()
+        out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
-        trial = run.trial
-        world = load_world(trial.world, trial.start, trial.scale)
-        options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry)
         with ExitStack() as stack:
             for folder in folders.values():
                 prepare(folder)
                 stack.enter_context(held(folder))
-            configs = {name: config_record(replayed(run, name)) | {REPLAY: asdict(options)} for name in folders}
+            configs = {name: source.config(name) for name in folders}
             for name, folder in folders.items():
                 if folder.samefile(self.log.parent):
                     raise UsageError(
                         f"expected another folder than that of the log, found {folder}: name another --out"
                     )
                 refuse_others(folder, configs[name], self.force)
-            title = f"{world.name}, seed {trial.seed}, replayed with {self.association} association"
-            recording = TimelineOutput(title, self.backend, world, trial.errorless, self.rrd)
+            recording = self._timeline(source)
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
-                result = self._one(run, name, options, world, recording)
+                result = self._one(source, name, recording)
                 settle(folder, configs[name])
                 problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)
@@ -86,18 +91,53 @@ class Replay:
                 if status == INTERRUPTED:
                     break
             problems += recording.close()
-        print_comparison(summaries, f"{trial.world}, seed {trial.seed}, {self.association} association")
+        self._print(source, summaries)
         print(f"results in {out}")
         for problem in problems:
             print(f"chainslam: not written: {problem}", file=sys.stderr)
         return status or (1 if problems else 0)
 
-    def _one(
-        self, run: RecordedRun, name: str, options: ReplayOptions, world: World, recording: TimelineOutput
-    ) -> TrialResult:
+    def _source(self) -> OwnLog | RealLog:
+        robot = stated(robot_of(self.robot))
+        if is_own_log(self.log):
+            if self.every != 1:
+                raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
+            run = retuned(read_run(self.log), self.config, self.set, robot)
+            options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry)
+            return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.scale))
+        if self.association != "own" or self.perfect_extraction or self.perfect_odometry:
+            raise UsageError(
+                "expected a log that knows the truth for --association true, --perfect-extraction and"
+                f" --perfect-odometry, found {self.log.name}: leave them out"
+            )
+        real = RealLog(read_real_run(self.log, RealOptions(self.every), self.config, self.set, robot))
+        if real.run.log.trouble:
+            say(
+                f"chainslam: {self.log.name}, {real.run.log.trouble}: {len(real.run.log.scan_time_s)} scans before it"
+                " are used",
+                stderr=True,
+            )
+        return real
+
+    def _kind(self, source: OwnLog | RealLog) -> str:
+        return self.association if isinstance(source, OwnLog) else self.log.name.partition(".")[0]
+
+    def _timeline(self, source: OwnLog | RealLog) -> TimelineOutput:
+        if isinstance(source, RealLog):
+            return TimelineOutput(source.title, self.backend, None, True, self.rrd)
+        return TimelineOutput(source.title, self.backend, source.world, source.run.trial.errorless, self.rrd)
+
+    def _print(self, source: OwnLog | RealLog, summaries: list[dict[str, Any]]) -> None:
+        if isinstance(source, RealLog):
+            print_recorded(summaries, source.title)
+            return
+        trial = source.run.trial
+        print_comparison(summaries, f"{trial.world}, seed {trial.seed}, {self.association} association")
+
+    def _one(self, source: OwnLog | RealLog, name: str, recording: TimelineOutput) -> TrialResult:
         """Replay through one back end, and stop between two steps where that is asked for."""
         with (
-            progress(f"replaying with {name}", float(len(run.recording))) as show,
+            progress(f"replaying with {name}", float(source.scans)) as show,
             first_interrupt_waits() as stop_if_asked,
         ):
 
@@ -105,5 +145,6 @@ class Replay:
                 show(step)
                 stop_if_asked()
 
-            recorded = recording.watch(name, lambda step: run.true_poses_world[step.index], watch)
-            return replay(run, name, options, recorded, world)
+            if isinstance(source, RealLog):
+                return source.go(name, recording.watch(name, None, watch, source.wheels_pose))
+            return source.go(name, recording.watch(name, source.true_pose, watch))

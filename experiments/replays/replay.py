@@ -96,7 +96,10 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
         raise UsageError(str(error)) from error
     missing = [name for name in TRUTH if name not in arrays]
     if missing:
-        raise UsageError(f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run")
+        raise UsageError(
+            f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run,"
+            " or a real robot's log itself"
+        )
     poses, cov, faces = arrays["true_poses"], arrays["start_cov"], arrays["true_face_of_beam"]
     numbers = (poses, cov, arrays["start_pose"], arrays["true_faces"])
     known = faces.min(initial=-1) >= -1 and faces.max(initial=-1) < len(arrays["true_faces"])

@@ -132,8 +132,8 @@ def summarise(
         ],
         **_map_scores(scenario, log, votes, step, joint, sketches),
         **_pose_scores(log, config.errorless),
-        "step_ms": _spread_ms(log.seconds),
-        "planning_ms": _spread_ms(log.planning_seconds),
+        "step_ms": spread_ms(log.seconds),
+        "planning_ms": spread_ms(log.planning_seconds),
     }
 
 
@@ -228,7 +228,8 @@ def map_anees(
         return None
 
 
-def _spread_ms(seconds: Float[np.ndarray, " s"]) -> dict[str, float]:
+def spread_ms(seconds: Float[np.ndarray, " s"]) -> dict[str, float]:
+    """Return mean, median, 95th percentile and largest of some times, ms."""
     ms = 1e3 * seconds
     return {
         "mean": float(ms.mean()),

@@ -173,6 +173,26 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
     plain_console().print(table)
 
 
+def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
+    """Print one column for each back end that mapped a real robot's log on standard output."""
+    table = Table(title=title, title_justify="left")
+    columns = {
+        "status": "status",
+        "scans mapped": "steps",
+        "path by the wheels, m": "path_length_m",
+        "walls": "lines",
+        "walls twice": "duplicate_lines",
+        "closed chains": "chains_closed",
+        "computing ms a step": "step_ms",
+    }
+    table.add_column("", no_wrap=True)
+    for summary in summaries:
+        table.add_column(summary["backend"], justify="right", overflow="fold")
+    for name, key in columns.items():
+        table.add_row(name, *(_short(summary.get(key)) for summary in summaries))
+    plain_console().print(table)
+
+
 def _short(value: Any) -> str:
     if isinstance(value, dict):
         return _short(value["mean"])

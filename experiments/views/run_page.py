@@ -18,6 +18,7 @@ from ..artifacts.maps.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
 from ..artifacts.settings import NAVIGATION, differing, options_of
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
+from ..replays.sources import RECORDED, was_real
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..usage import UsageError
 from .numbers import NONE, number, percent
@@ -63,9 +64,12 @@ def run_page(folder: Path) -> Page:
     trials = [config.trial for config in configs]
     names = [trial.backend for trial in trials]
     first = trials[0]
-    options = read_options(homes[0] / "config.json")
+    is_real = was_real(configs[0].replay)
+    options = ReplayOptions() if is_real else read_options(homes[0] / "config.json")
     how = (
-        f"A recorded drive{_by_truth(options)}"
+        "The drive of a real robot"
+        if is_real
+        else f"A recorded drive{_by_truth(options)}"
         if first.strategy == STRATEGY_OF_REPLAYS
         else f"A robot drives by {first.strategy}"
     )
@@ -75,7 +79,7 @@ def run_page(folder: Path) -> Page:
         if (home / "map.png").is_file()
     ]
     plans = tuple(filter(None, map(_plan, homes, names)))
-    drawn = draw_all([read_pictured(home) for home in homes if (home / "map.npz").is_file()])
+    drawn = {} if is_real else draw_all([read_pictured(home) for home in homes if (home / "map.npz").is_file()])
     pictures = tuple(PagePicture(png(draw()), CAPTIONS[kind]) for kind, draw in drawn.items())
     curves = {name: curve for name, said in zip(names, summaries, strict=True) if (curve := said.get("coverage_curve"))}
     if curves:
@@ -84,12 +88,12 @@ def run_page(folder: Path) -> Page:
         "The run in numbers", ("what", *names),
         tuple((words, *(_told(s.get(key), scale) for s in summaries)) for key, (words, scale) in FIGURES.items()),
     )  # fmt: skip
+    where = f"{how} ({Path(first.world).name})" if is_real else f"{how} in {Path(first.world).stem}, seed {first.seed}"
     return Page(
         f"{Path(first.world).stem}: {', '.join(names)}",
-        f"{how} in {Path(first.world).stem}, seed {first.seed}: what was mapped, how far is it off, and does the"
-        " estimator know?",
+        f"{where}: what was mapped, how far is it off, and does the estimator know?",
         tuple(_answer(name, summary) for name, summary in zip(names, summaries, strict=True)),
-        _command(first, names, options),
+        _command_real(first, names, configs[0].replay) if is_real else _command(first, names, options),
         (*configs[0].versions.items(), ("commit", str(configs[0].commit)[:10])),
         (
             *filled(
@@ -141,6 +145,8 @@ def _answer(name: str, summary: dict[str, Any]) -> str:
     words = f"{name}: {summary['status']} after {number(summary['path_length_m'])} m ({summary['reason']});"
     if summary.get("coverage") is not None:
         words += f" {percent(summary['coverage'])} % of the reachable contour mapped;"
+    if summary.get("pose_rmse_m") is None:
+        return f"{words} {summary['lines']} walls, {number(summary['duplicate_lines'])} of them twice."
     words += f" the pose {_told(summary['pose_rmse_m'], 100.0)} cm off (rms)"
     if summary.get("pose_anees") is None:
         return f"{words}."
@@ -195,6 +201,15 @@ def _by_truth(options: ReplayOptions) -> str:
     }
     told = [name for name, by_truth in parts.items() if by_truth]
     return f" with true {' and '.join(told)}" if told else ""
+
+
+def _command_real(trial: TrialConfig, names: list[str], said: Any) -> str:
+    """Return the command that maps a real robot's log again."""
+    tuned = [(key, value) for key, value in differing(trial) if key.split(".")[0] in OPEN_TO_REPLAYS]
+    words = ["chainslam", "replay", trial.world, "--backend", *names, *options_of(tuned)]
+    for key, value in sorted(said[RECORDED].items()):
+        words += [f"--{key}", str(value)]
+    return shlex.join([*words, "--out", "DIR"])
 
 
 def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> str:

@@ -22,7 +22,7 @@ from ..scoring.summary import nees_of_poses
 if TYPE_CHECKING:
     from viz.timeline import Timeline
 
-TruePose = Callable[[Step], Float[np.ndarray, "3"]]
+PoseOf = Callable[[Step], Float[np.ndarray, "3"]]
 Watch = Callable[[Step], None]
 
 
@@ -45,12 +45,18 @@ class TimelineOutput:
         if rrd is not None or view:
             self._try(lambda: self._begin(title, backends, world, errorless, view))
 
-    def watch(self, backend: str, true_pose_of: TruePose, also: Watch = lambda step: None) -> Watch:
+    def watch(
+        self,
+        backend: str,
+        true_pose_of: PoseOf | None,
+        also: Watch = lambda step: None,
+        wheels_pose_of: PoseOf | None = None,
+    ) -> Watch:
         """Return what takes in each step of one back end, beside whatever else watches."""
 
         def add(step: Step) -> None:
             if (timeline := self._timeline) is not None:
-                self._try(lambda: timeline.add(backend, step, np.asarray(true_pose_of(step))))
+                self._try(lambda: timeline.add(backend, step, _told(true_pose_of, step), _told(wheels_pose_of, step)))
 
         def watch(step: Step) -> None:
             # Recorded first: what else watches may stop the run here, and this step belongs to it.
@@ -116,6 +122,10 @@ class TimelineOutput:
             what = "the viewer" if self._rrd is None else str(self._rrd)
             why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
             self._problem = f"{what}: {' '.join(why.split()) or type(error).__name__}"
+
+
+def _told(pose_of: PoseOf | None, step: Step) -> Float[np.ndarray, "3"] | None:
+    return None if pose_of is None else np.asarray(pose_of(step))
 
 
 def true_rings(world: World) -> tuple[Float[np.ndarray, "_ 2"], ...]:

@@ -66,6 +66,8 @@ class Picture:
     corner_covs: Float[np.ndarray, "c 2 2"] = field(default_factory=lambda: np.zeros((0, 2, 2)))
     true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
     """Rings of the true floor, the exterior first; empty where the truth is not known."""
+    odometry_path_world: Float[np.ndarray, "s 3"] | None = None
+    """Where the wheels alone say the robot was."""
 
 
 def draw_map(picture: Picture) -> Figure:
@@ -121,7 +123,8 @@ def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
 
 
 def _extent(picture: Picture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
-    points = [picture.path_world[:, :2], picture.map.ends_world.reshape(-1, 2), *picture.true_floor]
+    wheels = () if picture.odometry_path_world is None else (picture.odometry_path_world[:, :2],)
+    points = [picture.path_world[:, :2], *wheels, picture.map.ends_world.reshape(-1, 2), *picture.true_floor]
     stacked = np.concatenate(points)
     return stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
 
@@ -202,6 +205,9 @@ def _paths(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     if true is not None:
         axes.plot(true[:, 0], true[:, 1], color=palette.PATH_TRUE, linewidth=2.2, alpha=0.55, zorder=2.4)
         handles.append(Line2D([], [], color=palette.PATH_TRUE, linewidth=2.2, alpha=0.55, label="true path"))
+    if (wheels := picture.odometry_path_world) is not None:
+        axes.plot(wheels[:, 0], wheels[:, 1], color=palette.PATH_ODOMETRY, linewidth=0.8, zorder=2.3)
+        handles.append(Line2D([], [], color=palette.PATH_ODOMETRY, linewidth=0.8, label="odometry alone"))
     path = picture.path_world
     axes.plot(path[:, 0], path[:, 1], color=palette.PATH_ESTIMATED, linewidth=0.9, zorder=2.5)
     handles.append(Line2D([], [], color=palette.PATH_ESTIMATED, linewidth=0.9, label="estimated path"))

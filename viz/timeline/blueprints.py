@@ -11,6 +11,7 @@ from .layers.map_layers import style
 from .layers.model_layer import TIMES
 from .layers.robot_layers import POSE_TIMES
 from .layers.sights import UNITS_PER_M
+from .layers.wheels import WHEELS
 from .recording import SIM_TIME, STEP
 
 WHITE = (255, 255, 255)
@@ -74,9 +75,11 @@ def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.Spatial2
     start, end = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     so_far = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=end) for line in (STEP, SIM_TIME)])
     return rrb.Spatial2DView(
-        origin="/", contents=["/world/truth/**", f"/world/{backend}/**"], visual_bounds=_bounds(seen_world, 0.6),
+        origin="/", contents=["/world/truth/**", f"{WHEELS}/**", f"/world/{backend}/**"],
+        visual_bounds=_bounds(seen_world, 0.6),
         name=f"{backend}: map over the truth  (robot's 3σ ×{POSE_TIMES:.0f})", background=WHITE,
-        defaults=[style(2.6, 24.0)], overrides={"/world/truth/path": so_far, f"/world/{backend}/path": so_far},
+        defaults=[style(2.6, 24.0)],
+        overrides=dict.fromkeys(("/world/truth/path", WHEELS, f"/world/{backend}/path"), so_far),
     )  # fmt: skip
 
 

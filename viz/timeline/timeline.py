@@ -17,6 +17,7 @@ from .lane import Lane
 from .layers.campaign import Row, Summary
 from .layers.model_plane import Plane
 from .layers.truth import NeesOf, TruthLayer
+from .layers.wheels import WheelsLayer
 from .recording import RerunRecording
 from .words import legend
 
@@ -45,17 +46,27 @@ class Timeline:
         self._rings = tuple(true_rings_world)
         truth = TruthLayer(self._out, self._rings)
         self._lanes = {backend: Lane(self._out, backend, truth, nees_of) for backend in backends}
+        self._wheels = WheelsLayer(self._out)
         self._summary: Summary | None = None
         self._fixtures(title)
         if self._is_live:
             self._out.layout(self._layout())
 
-    def add(self, backend: str, step: Step, true_pose_world: Float[np.ndarray, "3"] | None = None) -> None:
-        """Take in one step of one back end, before that back end moves on."""
+    def add(
+        self,
+        backend: str,
+        step: Step,
+        true_pose_world: Float[np.ndarray, "3"] | None = None,
+        wheels_pose_world: Float[np.ndarray, "3"] | None = None,
+    ) -> None:
+        """Take in one step of one back end, before that back end moves on; the wheels' path is drawn where given."""
         lane = self._lanes[backend]
+        if wheels_pose_world is not None:
+            self._wheels.add(step, wheels_pose_world)
         lane.add(step, true_pose_world)
         if len(lane) >= (LIVE_BLOCK if self._is_live else BLOCK):
             lane.flush()
+            self._wheels.flush()
 
     def add_campaign(self, trials: Sequence[Row], steps: Sequence[Row]) -> None:
         """Add a campaign's summary from its tables (see `Summary`)."""
@@ -65,6 +76,7 @@ class Timeline:
         """Send what is left, and return the bytes of the .rrd file; none where a viewer has it all."""
         for lane in self._lanes.values():
             lane.flush()
+        self._wheels.flush()
         if not self._is_live:
             self._out.layout(self._layout())
         return self._out.finish()

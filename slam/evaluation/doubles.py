@@ -1,0 +1,46 @@
+"""Walls that stand in a map twice, told by their geometry alone: where no truth is known, nothing else can tell."""
+
+import numpy as np
+from jaxtyping import Float
+
+from ..geometry.lines import directions, normals, through
+from ..geometry.poses import wrap
+
+TURN_RAD = float(np.deg2rad(5.0))
+APART_M = 0.2
+"""Farther apart than this, two lines that face one way may well be two walls, as those of a niche."""
+OVERLAP_M = 0.2
+
+
+def doubles(ends_world: Float[np.ndarray, "n 2 2"]) -> list[tuple[int, int]]:
+    """Return the rows (earlier, later) of lines that overlap an earlier one of the same side over 0.2 m or more.
+
+    Each line is counted once, with the first one that it doubles: their directions differ by less than 5 degrees, and
+    where they overlap they are less than 0.2 m apart. Ends (m, world frame) have the free side on the left.
+    """
+    n = len(ends_world)
+    if n < 2:
+        return []
+    lines = through(ends_world)
+    found = []
+    for later in range(1, n):
+        alpha = lines[later, 0]
+        along = np.sort(ends_world[: later + 1] @ directions(alpha), axis=1)
+        low, high = np.maximum(along[:later, 0], along[later, 0]), np.minimum(along[:later, 1], along[later, 1])
+        one_way = np.abs(wrap(lines[:later, 0] - alpha)) < TURN_RAD
+        middle = 0.5 * (low + high)
+        apart = np.abs(_across_at(ends_world[:later], alpha, middle) - lines[later, 1])
+        first = np.flatnonzero(one_way & (high - low >= OVERLAP_M) & (apart < APART_M))
+        if len(first):
+            found.append((int(first[0]), later))
+    return found
+
+
+def _across_at(
+    ends: Float[np.ndarray, "m 2 2"], alpha: np.floating, along_m: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, " m"]:
+    """Return how far off along the normal of `alpha` each line is, where it passes `along_m` along `alpha`'s line."""
+    t, across = ends @ directions(alpha), ends @ normals(alpha)
+    length = np.where(np.abs(t[:, 1] - t[:, 0]) > 1e-9, t[:, 1] - t[:, 0], 1e-9)
+    share = (along_m - t[:, 0]) / length
+    return np.asarray(across[:, 0] + share * (across[:, 1] - across[:, 0]))

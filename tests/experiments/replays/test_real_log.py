@@ -1,0 +1,160 @@
+"""`replay` of a real robot's log: the same products as of a run of ours, and null where only the truth could tell."""
+
+import json
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from experiments.commands.cli import main
+
+ROOM = (6.0, 4.0)
+MADE = {
+    *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.png", "steps.csv"),
+    *("trajectory_estimated.tum", "trajectory_odometry.tum"),
+}
+
+
+def seen_from(pose):
+    """Ranges of 180 beams in an empty room whose lower left corner is the origin."""
+    angles = pose[2] + np.deg2rad(np.arange(180) - 90.0)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    with np.errstate(divide="ignore"):
+        x = np.where(cosine > 0, (ROOM[0] - pose[0]) / cosine, -pose[0] / cosine)
+        y = np.where(sine > 0, (ROOM[1] - pose[1]) / sine, -pose[1] / sine)
+    return np.minimum(x, y)
+
+
+def drive(scans=24, drift=0.0):
+    """True poses and those of wheels that lose a little heading in every step."""
+    true = np.array([[1.0 + 0.05 * k, 1.5, 0.02 * k] for k in range(scans)])
+    return true, true + np.outer(np.arange(scans), [0.0, 0.0, drift])
+
+
+def write_log(path, scans=24, drift=0.002, noise=0.005):
+    rng = np.random.default_rng(3)
+    lines = []
+    for k, (true, wheels) in enumerate(zip(*drive(scans, drift), strict=True)):
+        ranges = seen_from(true) + rng.normal(0.0, noise, 180)
+        lines.append(" ".join(map(str, ["FLASER", 180, *ranges, *wheels, *wheels, 9e8 + 0.5 * k, "robot", 0.5 * k])))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def replayed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("real")
+    log = write_log(folder / "room.log")
+    words = ["replay", str(log), "--backend", "full-ekf", "block-ekf", "--rrd", str(folder / "a.rrd")]
+    assert main([*words, "--out", str(folder / "out")]) == 0
+    return folder
+
+
+def test_a_real_log_leaves_the_files_of_a_run_but_for_the_truth(replayed):
+    for backend in ("full-ekf", "block-ekf"):
+        assert {path.name for path in (replayed / "out" / backend).iterdir()} == MADE
+    with np.load(replayed / "out" / "full-ekf" / "log.npz") as arrays:
+        assert not [name for name in arrays.files if name.startswith("true")]
+
+
+def test_the_paths_hold_all_scans_on_the_logs_own_clock_and_the_estimate_beats_the_wheels(replayed):
+    true, _ = drive(drift=0.0)
+    errors = {}
+    for name in ("estimated", "odometry"):
+        path = np.loadtxt(replayed / "out" / "full-ekf" / f"trajectory_{name}.tum")
+        np.testing.assert_allclose(path[:, 0], 9e8 + 0.5 * np.arange(24))
+        heading = 2 * np.arctan2(path[:, 6], path[:, 7])
+        errors[name] = np.abs(heading - (true[:, 2] - true[0, 2]))[-1]
+    assert errors["estimated"] < 0.3 * errors["odometry"]
+
+
+def test_the_summary_has_every_key_of_a_run_and_null_for_what_only_the_truth_tells(replayed, tmp_path):
+    assert main(["explore", "paper-fig4", "--max-steps", "3", "--out", str(tmp_path)]) == 0
+    ours, theirs = (json.loads((f / "summary.json").read_text()) for f in (tmp_path, replayed / "out" / "full-ekf"))
+    assert ours.keys() == theirs.keys()
+    for key in ("pose_rmse_m", "pose_anees", "map_anees", "coverage", "swept", "false_matches", "collisions"):
+        assert theirs[key] is None
+    assert theirs["status"] == "complete"
+    assert theirs["lines"] >= 3
+    assert theirs["duplicate_lines"] == 0
+    assert theirs["step_ms"]["mean"] > 0
+
+
+def test_the_timeline_has_the_wheels_path_beside_the_result_and_no_truth(replayed):
+    paths = {str(path) for path in RrdReader(replayed / "a.rrd").store().schema().entity_paths()}
+    assert "/world/odometry/path" in paths
+    assert not [path for path in paths if path.startswith("/world/truth")]
+    rows = sum(
+        chunk.num_rows for chunk in RrdReader(replayed / "a.rrd").stream().filter(content="/world/odometry/path")
+    )
+    steps = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
+    assert rows == steps + 1, "one row for each step, sent once for both back ends, and one for the style"
+
+
+def test_a_report_is_made_of_it(replayed, capsys):
+    assert main(["report", str(replayed / "out")]) == 0
+    page = (replayed / "out" / "report.html").read_text()
+    assert "The drive of a real robot (room.log)" in page
+    assert "chainslam replay room.log --backend block-ekf full-ekf --every 1 --out DIR" in page
+
+
+def test_the_same_command_leaves_the_same_bytes_and_another_is_refused_in_its_folder(replayed, tmp_path, capsys):
+    words = ["replay", str(replayed / "room.log"), "--out", str(tmp_path)]
+    assert main(words) == 0
+    for name in ("trajectory_estimated.tum", "map.npz", "log.npz"):
+        assert (tmp_path / name).read_bytes() == (replayed / "out" / "full-ekf" / name).read_bytes()
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main([*words, "--every", "2"]) == 2
+    assert "a replay of other options" in capsys.readouterr().err
+
+
+def test_settings_reach_the_mapper_and_every_second_keyframe_is_mapped(replayed, tmp_path):
+    words = ["replay", str(replayed / "room.log"), "--out", str(tmp_path), "--every", "2"]
+    assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
+    config, summary = (json.loads((tmp_path / name).read_text()) for name in ("config.json", "summary.json"))
+    assert config["trial"]["mission"]["mapper"]["matching"]["gate"] == 0.95
+    assert config["replay"] == {"recorded": {"every": 2}}
+    whole = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
+    assert summary["steps"] == -(-whole // 2)
+    assert len(np.loadtxt(tmp_path / "trajectory_estimated.tum")) == 24
+
+
+def test_what_is_good_of_a_damaged_log_is_mapped_and_one_line_tells_where_it_ends(tmp_path, capsys):
+    log = write_log(tmp_path / "room.log")
+    content = log.read_text()
+    log.write_text(content[: len(content) * 2 // 3])
+    assert main(["replay", str(log), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert said[0].startswith("chainslam: room.log, line 17: ")
+    assert said[0].endswith("16 scans before it are used")
+    assert len(np.loadtxt(tmp_path / "out" / "trajectory_estimated.tum")) == 16
+
+
+BAD = {
+    "no log": ([], b"hello\n", "expected a recorded log, found room.log: expected lines FLASER"),
+    "empty": ([], b"", "found none of them"),
+    "truth": (["--association", "true"], None, "expected a log that knows the truth"),
+    "every": (["--every", "0"], None, "found --every 0"),
+    "settled": (["--set", "seed=4"], None, "'seed'"),
+    "back end": (["--backend", "none"], None, "expected a back end out of"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_replayed_is_told_in_one_line(tmp_path, capsys, case):
+    options, content, found = BAD[case]
+    log = write_log(tmp_path / "room.log", 3)
+    if content is not None:
+        log.write_bytes(content)
+    assert main(["replay", str(log), *options, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.strip()
+    assert found in said
+    assert "\n" not in said
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+def test_every_is_refused_for_a_runs_own_log(replayed, capsys):
+    assert main(["replay", str(replayed / "out" / "full-ekf" / "log.npz"), "--every", "2"]) == 2
+    assert "leave it out" in capsys.readouterr().err
