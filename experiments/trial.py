@@ -82,7 +82,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, way_world)
     summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending, recorder.sketches)
     summary |= {"certificate": certificate_record(certificate)}
-    smoothed = smooth(scenario.backend, last.map, len(log))
+    smoothed = smooth(scenario.backend, last.map, log.unstated_motion)
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
 
 
@@ -109,6 +109,7 @@ def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
         " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges"
+        " nis nis_in_band unstated_motions lost_steps wheel_noise_factor"
         " false_merges return_to_start certificate step_ms planning_ms"
     )
     return {

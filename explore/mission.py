@@ -19,6 +19,7 @@ from .goal import GivenUp
 from .goals.decider import Driver
 from .goals.explorer import Explorer, ExplorerConfig
 from .goals.homing import Homing, HomingConfig
+from .goals.lost import Lost, LostConfig
 from .goals.replay_driver import ReplayDriver
 from .goals.retreat import Retreat, RetreatConfig
 from .outcome import Outcome
@@ -37,6 +38,7 @@ class MissionConfig:
     floor_memory: FloorMemoryConfig = field(default_factory=FloorMemoryConfig)
     retreat: RetreatConfig = field(default_factory=RetreatConfig)
     homing: HomingConfig = field(default_factory=HomingConfig)
+    lost: LostConfig = field(default_factory=LostConfig)
     return_to_start: bool = False
     """Once there is nothing left to explore, drive back to where the mission began."""
 
@@ -55,7 +57,8 @@ def explore_mission(
     inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
     floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
     recent = AccumulatedReturns(config.robot)
-    return _mission(robot, mapper, Retreat(inner, floor, config.retreat, following), floor, recent)
+    driver = Lost(Retreat(inner, floor, config.retreat, following), config.lost)
+    return _mission(robot, mapper, driver, floor, recent)
 
 
 def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
@@ -78,11 +81,17 @@ def _mission(
         began = time.perf_counter()
         scan = robot.sense()
         update = mapper.step(scan, given_up.keys)
-        if floor is not None:
+        localisation = update.localisation
+        if localisation.unstated_motion is not None:
+            recent.move(localisation.unstated_motion)
+            if floor is not None:
+                floor.move(localisation.unstated_motion)
+        if floor is not None and not localisation.is_lost:
             floor.see(update.map, scan)
         decides = time.thread_time()
         seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
-        graph.observe(update.map, update.chains, followed_wall(update.map), seen)
+        if not localisation.is_lost:
+            graph.observe(update.map, update.chains, followed_wall(update.map), seen)
         around = Surroundings(
             walls=update.map,
             free_space=free_space,
@@ -91,7 +100,8 @@ def _mission(
             graph=graph.graph,
             odometry=odometry,
             seen=tuple(seen),
-            nis=update.nis,
+            nis=localisation.nis,
+            is_lost=localisation.is_lost,
         )
         decision = driver.decide(around, update.chains, graph.graph)
         given_up = decision.given_up
@@ -109,6 +119,7 @@ def _mission(
             map=update.map,
             chains=update.chains,
             merged=update.merged,
+            localisation=localisation,
             free_space=free_space,
             graph=graph.graph,
             decision=decision,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import networkx as nx
 import numpy as np
 from jaxtyping import Float, Int
 
 from slam.association.matching import Matches
+from slam.association.recovery import Localisation
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
@@ -50,6 +51,8 @@ class Step:
     """Processor time of what the step decided: the visibility graph, the choice, the way, the command."""
     merged: tuple[tuple[int, int], ...] = ()
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
+    localisation: Localisation = field(default_factory=Localisation)
+    """How well the scan fits where the robot was believed to be, and what was made of that."""
 
     @property
     def set_aside(self) -> tuple[SetAside, ...]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from .association.ambiguity import AmbiguityConfig
 from .association.matching import MatchingConfig
+from .association.recovery import RecoveryConfig
 from .extraction.config import ExtractionConfig
 from .map.candidates import CandidatesConfig
 from .map.chains import ChainConfig
@@ -34,3 +35,5 @@ class MapperConfig:
     `vertices` is None."""
     merging: MergingConfig | None = field(default_factory=MergingConfig)
     """None where one wall may stand in the map twice."""
+    recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
+    """None where the robot is taken at its word."""

@@ -1,16 +1,18 @@
 """The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from .association.ambiguity import observed_either_way
-from .association.joint_compatibility import NO_NIS, Nis
-from .association.matching import KnownWalls, Matches
+from .association.joint_compatibility import Nis
+from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
+from .association.motion_noise import MotionInnovation, MotionNoise
+from .association.recovery import Localisation, unstated_motion
 from .association.view import View
 from .config import MapperConfig
 from .estimation.backend import Backend, Observations
@@ -27,6 +29,8 @@ from .robot import Odometry, Scan
 
 NONE = np.zeros(0, dtype=np.int64)
 """No rows."""
+AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
+"""The motion between two scans that were taken at one place."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,21 @@ class MapUpdate:
     chains: tuple[Chain, ...]
     merged: tuple[tuple[int, int], ...]
     """Ids (kept, dropped) of the landmarks that were found to be one wall."""
-    nis: Nis = NO_NIS
-    """Of the matches that localised the robot, before they did; those beyond their gate were left out."""
+    localisation: Localisation = field(default_factory=Localisation)
+
+
+@dataclass(frozen=True)
+class Localised:
+    """A scan beside the map, up to the fourth step."""
+
+    view: View
+    first: Observations
+    """The matches that localise the robot."""
+    nis: Nis
+    innovation: MotionInnovation | None
+    """What they say of the last motion's noise."""
+    matches: Matches
+    """The matches from the pose that those lead to."""
 
 
 @runtime_checkable
@@ -72,30 +89,40 @@ class Mapper:
         method = METHODS[config.matching.method]
         self._method = method if matcher is None else replace(method, matcher=matcher)
         self._keeper = MapKeeper(backend, config)
+        noise = None if config.recovery is None else config.recovery.noise
+        self._noise = None if noise is None else MotionNoise(noise)
+        self._odometry = AT_REST
+        self._chains: tuple[Chain, ...] = ()
+        self._is_lost = False
 
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by the odometry."""
-        self.backend.predict(odometry)
+        self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
+        self.backend.predict(self._odometry)
 
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
         # 1. Extract features from the sensory input.
         segments, walls = self._features(scan)
-        # 2. Match observed features to the best fitting equivalents in the map.
-        view = self._view(scan, segments, walls)
-        clear = view.match_clear()
-        # 3. Localise the robot with matched features (here as a pure function, to match again).
-        first = self._reliable(clear, segments)
-        relocated, nis = view.localised(first), view.nis(first)
-        # 4. Match features with their re-prediction from the new robot pose.
-        matches = view.match_again(clear, relocated)
+        # 2 to 4. Match them, localise the robot, and match again.
+        found = self._localised(scan, segments, walls)
+        motion = self._recovery(scan, found, walls)
+        self._odometry = AT_REST
+        if self._is_lost:
+            return self._nothing_taken_in(segments, walls)
+        if motion is not None:
+            self.backend.predict(motion)
+            segments, walls = self._features(scan)
+            found = self._localised(scan, segments, walls)
+        matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(first, self._reliable(matches, segments) or self._ambiguous(view, matches))
+        self.backend.update(found.first, self._reliable(matches, segments) or self._ambiguous(found.view, matches))
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
-        chains = self._keeper.connect(walls, scan, set_aside)
-        return MapUpdate(segments, matches, owners, walls, chains, merged, nis)
+        self._chains = self._keeper.connect(walls, scan, set_aside)
+        localisation = Localisation(found.nis, motion, False, self._weighed(found, motion))
+        return MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
@@ -104,6 +131,41 @@ class Mapper:
             return self._pieces(scan), walls
         segments = self._segments(scan, walls, self.config.vertices)
         return segments, self._keeper.without(mistaken(segments, walls, self.config.vertices), walls)
+
+    def _localised(self, scan: Scan, segments: Segments, walls: StochasticMap) -> Localised:
+        # 2. Match observed features to the best fitting equivalents in the map.
+        view = self._view(scan, segments, walls)
+        clear = view.match_clear()
+        # 3. Localise the robot with matched features (here as a pure function, to match again).
+        first = self._reliable(clear, segments)
+        # 4. Match features with their re-prediction from the new robot pose.
+        matches = view.match_again(clear, view.localised(first))
+        return Localised(view, first, *view.surprise(first, self._odometry), matches)
+
+    def _recovery(self, scan: Scan, found: Localised, walls: StochasticMap) -> Odometry | None:
+        """Return the motion that the odometry did not report and this scan shows; notes whether the robot is lost."""
+        if self.config.recovery is None:
+            return None
+        motion, self._is_lost = unstated_motion(
+            scan, found.view, found.matches, walls, self._is_lost, self.config.recovery
+        )
+        return motion
+
+    def _nothing_taken_in(self, segments: Segments, walls: StochasticMap) -> MapUpdate:
+        """Return the map as it was: a scan from nobody knows where tells nothing of it."""
+        nobody = np.full(len(segments), -1, dtype=np.int64)
+        factor = 1.0 if self._noise is None else self._noise.factor
+        localisation = Localisation(is_lost=True, noise_factor=factor)
+        return MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation)
+
+    def _weighed(self, found: Localised, motion: Odometry | None) -> float:
+        """Weigh what a scan says of the wheels; return how many times as large as stated their noise was."""
+        if self._noise is None:
+            return 1.0
+        factor = self._noise.factor
+        if motion is None and found.innovation is not None:
+            self._noise.see(found.innovation)
+        return factor
 
     def _view(self, scan: Scan, segments: Segments, walls: StochasticMap) -> View:
         """Return the scan beside the walls that it can show."""

@@ -10,7 +10,7 @@ from sim.logs import recorded_robot
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 6,
+    CONFIG: 7,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -23,11 +23,10 @@ FORMATS = {
 """By name; `config.json` is that of a run, of a campaign and of merged campaigns."""
 OLDEST = {CONFIG: 1, "summary.json": 1}
 """The first format that can still be looked at and replayed, where that is not the one of now. Format 1 of
-`config.json` had other names for some settings (`settings.RENAMED`), and a campaign no `settings`: nothing goes on.
-Format 2 had one setting more (`settings.DROPPED`), format 3 no `matching.method`, format 4 no
-`robot.faults`. Until format 5 the body and the step stood at
-several places (`older.MOVED`). Format 1 of `summary.json` had no
-`coverage_curve`."""
+`config.json` had other names for some settings (`older.RENAMED`), and a campaign no `settings`: nothing goes on.
+Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, format 4 no `robot.faults`. Until
+format 5 the body and the step stood at several places (`older.MOVED`), until format 6 no robot was ever lost
+(`mission.lost`, `mission.mapper.recovery`). Format 1 of `summary.json` had no `coverage_curve`."""
 
 
 def stamp(name: str) -> dict[str, int]:

@@ -18,6 +18,7 @@ from slam.geometry.poses import wrap
 from viz.figures.floor_plan import Dimension, floor_plan
 
 from ..scenario import TrialConfig
+from ..scoring.innovations import nis_in_band, windowed_nis
 from ..scoring.records import Log
 from ..scoring.summary import odometry_path, odometry_poses, pose_nees
 from ..trial import TrialResult
@@ -48,7 +49,8 @@ STEP_COLUMNS = (
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
     *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
     *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
-    *("odometry_error_m", "collisions", "reason", "step_ms"),
+    *("odometry_error_m", "collisions", "nis", "nis_dof", "nis_window", "nis_in_band", "unstated_motion", "lost"),
+    *("wheel_noise_factor", "reason", "step_ms"),
 )
 """Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
 with the poses beside it, all that `pose_nees` is made of."""
@@ -240,6 +242,13 @@ def steps_csv(log: Log) -> bytes:
         *log.estimated_cov[:, rows, columns_of_cov].T,
         wheels,
         np.cumsum(log.touched),
+        log.nis,
+        log.nis_dof,
+        windowed_nis(log),
+        nis_in_band(log).astype(int),
+        log.unstated_motion.astype(int),
+        log.is_lost.astype(int),
+        log.wheel_noise_factor,
         log.reasons,
         1e3 * log.seconds,
     ]

@@ -121,5 +121,5 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, log.estimated_world[:, :2])
     summary = summarise_unwitnessed(scenario, log, votes, last, ending)
     summary |= {"certificate": certificate_record(certificate)}
-    smoothed = smooth(made, last.map, len(log))
+    smoothed = smooth(made, last.map, log.unstated_motion)
     return TrialResult(scenario, ending, log, votes, last, recorder.joint, certificate, summary, smoothed, run.log)

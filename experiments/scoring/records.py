@@ -46,6 +46,16 @@ class Log:
     """Wall-clock time of each step, sense to command."""
     planning_seconds: Float[np.ndarray, " s"]
     """Processor time of each step's decisions."""
+    nis: Float[np.ndarray, " s"]
+    """Normalised innovation squared of the matches that localised the robot."""
+    nis_dof: Int[np.ndarray, " s"]
+    """Its degrees of freedom; 0 where nothing localised it."""
+    unstated_motion: Bool[np.ndarray, " s"]
+    """Whether the scan showed a motion that the odometry had not reported."""
+    is_lost: Bool[np.ndarray, " s"]
+    """Whether the scan fitted nowhere and was not taken in."""
+    wheel_noise_factor: Float[np.ndarray, " s"]
+    """How many times as large as stated the wheels' noise was taken to be."""
     reasons: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -111,6 +121,11 @@ class Recorder:
                 "set_aside": len(step.set_aside),
                 "seconds": step.seconds,
                 "planning_seconds": step.planning_seconds,
+                "nis": step.localisation.nis.squared,
+                "nis_dof": step.localisation.nis.dof,
+                "unstated_motion": step.localisation.unstated_motion is not None,
+                "is_lost": step.localisation.is_lost,
+                "wheel_noise_factor": step.localisation.noise_factor,
                 "reasons": step.decision.words,
             }
         )

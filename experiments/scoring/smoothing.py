@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from slam.estimation.backend import Backend, Joint, Smoother
 from slam.map.stochastic_map import StochasticMap
@@ -20,18 +20,18 @@ class Smoothed:
     """The pose at the last step and all lines."""
 
 
-def smooth(backend: Backend, last: StochasticMap, steps: int) -> Smoothed | None:
-    """Let a back end finish after so many steps; None if it does not smooth or broke off within a step.
+def smooth(backend: Backend, last: StochasticMap, unstated_motion: Bool[np.ndarray, " s"]) -> Smoothed | None:
+    """Let a back end finish; None if it does not smooth or broke off within a step.
 
-    Every belief before it goes stale.
+    `unstated_motion` tells at which of the steps a second motion was predicted. Every belief before it goes stale.
     """
     try:
         if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
             return None
-        poses = backend.finish()[:steps]
+        poses, rows = backend.finish(), np.arange(len(unstated_motion)) + np.cumsum(unstated_motion)
         belief = backend.belief
-        if len(poses) < steps or not np.array_equal(belief.ids, last.ids):
+        if len(poses) <= rows[-1] or not np.array_equal(belief.ids, last.ids):
             return None
-        return Smoothed(poses, replace(last, belief=belief), belief.joint(belief.ids))
+        return Smoothed(poses[rows], replace(last, belief=belief), belief.joint(belief.ids))
     except Exception:  # whatever a back end raises after a failed run must not cost the results so far
         return None

@@ -27,6 +27,7 @@ from .coverage import (
     own_alignment,
     sample,
 )
+from .innovations import innovation_scores
 from .records import Log, Sketch
 from .swept import swept
 
@@ -132,6 +133,7 @@ def summarise(
         ],
         **_map_scores(scenario, log, votes, step, joint, sketches),
         **_pose_scores(log, config.errorless),
+        **innovation_scores(log),
         "step_ms": spread_ms(log.seconds),
         "planning_ms": spread_ms(log.planning_seconds),
     }

@@ -15,6 +15,7 @@ from slam.extraction.segments import Segments
 
 from ..scenario import Scenario
 from .association import Votes
+from .innovations import innovation_scores
 from .records import Log
 from .summary import Ending, run_keys, spread_ms
 from .truth import Truth
@@ -88,6 +89,7 @@ def summarise_unwitnessed(scenario: Scenario, log: Log, votes: Votes, step: Step
         "merges": votes.merges,
         "distances": {},
         **dict.fromkeys(WITNESSED.split()),
+        **innovation_scores(log),
         "step_ms": spread_ms(log.seconds),
         "planning_ms": spread_ms(log.planning_seconds),
     }

@@ -117,6 +117,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("pose ANEES (1 is ideal)", _number(summary["pose_anees"])),
         ("pose NEES in the 95 % band", _number(summary["pose_nees_in_band"])),
         ("map ANEES (1 is ideal)", _number(summary["map_anees"])),
+        *_faults(summary),
     ]
     if home := summary["return_to_start"]:
         rows.append(("from the start: believed, true", f"{home['distance_m']:.2f} m, {home['distance_true_m']:.2f} m"))
@@ -141,6 +142,18 @@ def _own_frame(summary: dict[str, Any]) -> list[tuple[str, str]]:
 def _way_back(share: float | None) -> list[tuple[str, str]]:
     """Return a row where the robot has locked itself in, or its map contradicts the way that it took."""
     return [] if share is None or share > 0.9 else [("of its way it can drive again", f"{100 * share:.0f} %")]
+
+
+def _faults(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return rows for what the robot noticed of itself; none where nothing was wrong."""
+    told = {
+        "motions that the odometry did not report": summary["unstated_motions"],
+        "steps without a place in the map": summary["lost_steps"],
+    }
+    rows = [(words, str(count)) for words, count in told.items() if count]
+    if summary["wheel_noise_factor"] != 1.0:
+        rows.append(("noise of the wheels, times as stated", f"{summary['wheel_noise_factor']:g}"))
+    return rows
 
 
 def _counts(summary: dict[str, Any]) -> str:

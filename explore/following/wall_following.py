@@ -77,6 +77,8 @@ class Surroundings:
     """Ids of the walls that the scan shows."""
     nis: Nis = NO_NIS
     """How far they lay from where the belief predicted them."""
+    is_lost: bool = False
+    """The scan fits nowhere in the map, so nobody knows where the robot is."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, 3]:

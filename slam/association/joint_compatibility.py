@@ -56,27 +56,23 @@ def relocate(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -
     """Condition the joint Gaussian on observations of some of its lines (paper, step 3), as a pure function."""
     if not len(observed.ids):
         return joint
-    seen = _seen_halfway(joint, ids, observed)
+    seen, _ = seen_halfway(joint, ids, observed)
     gain = seen.gain()
     return Joint(joint.mean + gain @ seen.e, joint.cov - gain @ seen.PHt.T, joint.anchors)
 
 
-def joint_nis(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> Nis:
-    """Return the NIS of observations of some lines of the joint Gaussian, all together."""
-    if not len(observed.ids):
-        return NO_NIS
-    seen = _seen_halfway(joint, ids, observed)
-    return Nis(float(seen.e @ np.linalg.solve(seen.S, seen.e)), len(seen.e))
-
-
-def _seen_halfway(joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations) -> JointObservations:
+def seen_halfway(
+    joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations
+) -> tuple[JointObservations, Innovations]:
+    """Join observations of some of the joint's lines, linearised halfway to where they put the pose; and each alone."""
     rows = np.searchsorted(ids, observed.ids)
     means = joint.mean[3:].reshape(-1, 2)[rows]
     model = innovations(joint.mean[:3], joint.anchors[rows], means, observed.lines, observed.cov)
     seen = taken_together(joint, rows, model)
     step = seen.gain() @ seen.e
     turn = step[3 + 2 * rows] - step[2]
-    return taken_together(joint, rows, halfway(model, observed.lines, observed.cov, turn))
+    model = halfway(model, observed.lines, observed.cov, turn)
+    return taken_together(joint, rows, model), model
 
 
 def compatible(seen: JointObservations, gate: float, together: float) -> Int[np.ndarray, " k"]:

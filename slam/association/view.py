@@ -6,9 +6,11 @@ import numpy as np
 
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
-from .joint_compatibility import Nis, joint_nis
+from ..robot import Odometry
+from .joint_compatibility import Nis
 from .matching import KnownWalls, Matches, MatchingConfig
 from .methods import Method
+from .motion_noise import MotionInnovation, motion_root, surprise
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ class View:
         """Return pose and walls as they are known once some walls were observed."""
         return self.method.relocate(self.joint, self.walls.ids, first)
 
-    def nis(self, first: Observations) -> Nis:
-        """Return how far observations lie from where the belief before the scan predicts them."""
-        return joint_nis(self.joint, self.walls.ids, first)
+    def surprise(self, first: Observations, odometry: Odometry) -> tuple[Nis, MotionInnovation | None]:
+        """Return how far observations lie from where the belief puts them after `odometry`, and what they say of it."""
+        return surprise(self.joint, self.walls.ids, first, motion_root(odometry, float(self.joint.mean[2])))
 
     def match_again(self, clear: Matches, relocated: Joint) -> Matches:
         """Return the matches from the new pose: of the remaining segments, beside the clear ones, or of all."""

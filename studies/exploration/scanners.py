@@ -24,7 +24,7 @@ from ..runner.trials import one
 
 HEAD = (
     "scanner; fault", "complete", "coverage, least", "contours", "steps, median", "steps over those without",
-    "pose ANEES, median", "map ANEES, median", "collisions",
+    "pose ANEES, median", "map ANEES, median", "collisions", "motions found", "lost", "wheel noise",
 )  # fmt: skip
 NAMES = ("case", "world", "backend", "seed", "max_steps")
 SCANNERS = {
@@ -38,6 +38,12 @@ FAULTS = {
     "5 % dropouts": FaultsConfig(dropout=0.05),
     "half of the edges mixed": FaultsConfig(mixed=0.5),
 }
+WHEELS = {
+    "bumps of 8 degrees": FaultsConfig(bump=0.02),
+    "bumps of 60 degrees": FaultsConfig(bump=0.01, bump_rad=float(np.deg2rad(60.0))),
+    "slip of three times": FaultsConfig(slip=3.0),
+}
+"""What the wheels do not report."""
 
 
 def cases() -> Mapping[str, RobotConfig]:
@@ -52,6 +58,9 @@ def cases() -> Mapping[str, RobotConfig]:
     robots["541 beams, 10 m; noise of 1 % of the range, stated"] = RobotConfig(
         lidar=LidarConfig(beams=541, range_max_m=10.0, sigma_share=0.01)
     )
+    robots |= {
+        f"541 beams; {fault}": RobotConfig(lidar=SCANNERS["541 beams"], faults=wrong) for fault, wrong in WHEELS.items()
+    }
     return robots
 
 
@@ -82,7 +91,7 @@ class ScannersStudy:
         ]
         tasks = [((key[0], key[3]), [key]) for key in keys]
         rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, self), self.jobs))
-        plain_console(width=150).print(table(rows))
+        plain_console(width=170).print(table(rows))
 
     def trial(self, case: str, seed: int) -> TrialConfig:
         """Return the trial of one robot."""
@@ -112,7 +121,8 @@ def table(rows: Sequence[Row]) -> Table:
             case, f"{sum(row['status'] == 'complete' for row in own)} of {len(own)}",
             f"{min(row['coverage'] for row in own):.3f}", closed, f"{np.median([row['steps'] for row in own]):.0f}",
             f"{np.exp(np.mean(np.log(ratios))):.2f}" if ratios and ";" in case else "", *anees,
-            str(sum(row["collisions"] for row in own)),
+            str(sum(row["collisions"] for row in own)), str(sum(row["unstated_motions"] for row in own)),
+            str(sum(row["lost_steps"] > 0 for row in own)), _median(own, "wheel_noise_factor"),
         )  # fmt: skip
     return shown
 

@@ -58,7 +58,9 @@ def log_of(estimated=None, **changes):
         "face_of_beam": np.full((3, BEAMS), -1), "path_length_m": np.array([0.0, 0.1, 0.25]),
         "open_ends": np.array([1, 2, 4]), "lines": np.array([3, 3, 3]), "tentative": np.array([0, 0, 1]),
         "closed_chains": np.array([0, 0, 1]), "set_aside": np.zeros(3, int), "seconds": np.array([0.006, 0.001, 0.002]),
-        "planning_seconds": np.array([0.0005, 0.0001, 0.0003]), "reasons": ("", "", ""),
+        "planning_seconds": np.array([0.0005, 0.0001, 0.0003]), "nis": np.zeros(3), "nis_dof": np.zeros(3, int),
+        "unstated_motion": np.zeros(3, bool), "is_lost": np.zeros(3, bool), "wheel_noise_factor": np.ones(3),
+        "reasons": ("", "", ""),
     }  # fmt: skip
     return Log(**(kept | changes))
 

@@ -5,6 +5,7 @@ from studies.exploration.scanners import ScannersStudy, cases, table
 
 def row(case, seed, steps, **more):
     plain = {"status": "complete", "coverage": 1.0, "contours_closed": 3, "contours_reachable": 3, "collisions": 0}
+    plain |= {"unstated_motions": 1, "lost_steps": 0, "wheel_noise_factor": 1.0}
     return {"case": case, "seed": seed, "steps": steps, "pose_anees": 1.0, "map_anees": 2.0} | plain | more
 
 
@@ -26,6 +27,8 @@ def test_a_case_is_the_robot_that_its_name_tells():
     for name, robot in robots.items():
         assert (robot.faults.dropout > 0) == ("dropouts" in name)
         assert (robot.faults.mixed > 0) == ("mixed" in name)
+        assert (robot.faults.bump > 0) == ("bumps" in name)
+        assert (robot.faults.slip > 1) == ("slip" in name)
         assert (robot.lidar.sigma_share > 0) == ("noise of" in name)
         assert f"{robot.lidar.beams:,} beams" in name
         assert ScannersStudy().trial(name, 3).robot == robot

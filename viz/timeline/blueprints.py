@@ -6,7 +6,7 @@ import numpy as np
 import rerun.blueprint as rrb
 from jaxtyping import Float
 
-from .layers.curves import CHAINS, CLOSED, ENDS, LINES, LOG_NEES, NEES, PATH, POSE_BAND, STEP_MS, TRACE
+from .layers.curves import CHAINS, CLOSED, ENDS, LINES, LOG_NEES, NEES, NIS, PATH, POSE_BAND, STEP_MS, TRACE
 from .layers.map_layers import style
 from .layers.model_layer import TIMES
 from .layers.robot_layers import POSE_TIMES
@@ -16,6 +16,7 @@ from .recording import SIM_TIME, STEP
 
 WHITE = (255, 255, 255)
 STEP_MS_NAME, STEP_MS_SPAN = "computing time of a step, ms (cut at 200)", (0.0, 200.0)
+NIS_NAME, NIS_SPAN = "NIS of each scan over its dof, 1 is ideal (cut at 5)", (0.0, 5.0)
 TRACE_NAME = "trace of the pose covariance, m² + rad²"
 
 
@@ -36,6 +37,7 @@ def one_run(backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -
             curve_view(LINES, "walls"),
             curve_view((CHAINS, CLOSED), "chains"),
             curve_view(PATH, "path, m"),
+            curve_view(NIS, NIS_NAME, NIS_SPAN),
         ),
         row_shares=[2.2, 1.4, 1, 1],
     )
@@ -63,6 +65,7 @@ def comparison(backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], pl
         rrb.Tabs(
             curve_view(LINES, "walls"), curve_view(ENDS, "open ends"), curve_view((CHAINS, CLOSED), "chains"),
             curve_view(PATH, "path, m"), curve_view(STEP_MS, STEP_MS_NAME, STEP_MS_SPAN),
+            curve_view(NIS, NIS_NAME, NIS_SPAN),
         ),
         _legend(),
         column_shares=[1.4, 1.2, 1, 0.8],

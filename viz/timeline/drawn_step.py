@@ -12,6 +12,7 @@ from explore.goals.decider import Decision
 from explore.planning.visibility_graph import NEIGHBOUR
 from explore.step import Step
 from slam.association.matching import Matches
+from slam.association.recovery import Localisation
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
 from slam.robot import Scan
@@ -86,6 +87,7 @@ class DrawnStep:
     scan: Scan
     segments: Segments
     matches: Matches
+    localisation: Localisation
     owners: Int[np.ndarray, " s"]
     walls: DrawnWalls
     decision: Decision
@@ -122,6 +124,7 @@ class Keeper:
             scan=step.scan,
             segments=step.segments,
             matches=step.matches,
+            localisation=step.localisation,
             owners=step.walls_of_segments,
             walls=DrawnWalls(ids, means, anchors, walls.extents.copy(), colours, ellipses, step.chains),
             decision=step.decision,

@@ -1,5 +1,6 @@
 """A run whose estimator finds no solution any more ends as failed, with all that it has computed."""
 
+import numpy as np
 import pytest
 
 from experiments.scenario import TrialConfig
@@ -45,4 +46,4 @@ class Broken:
 
 
 def test_a_smoother_that_broke_down_costs_no_results():
-    assert smooth(Broken(), None, 3) is None
+    assert smooth(Broken(), None, np.zeros(3, dtype=bool)) is None

@@ -12,7 +12,14 @@ from tests.experiments.by_hand import COVS, OFF, TRUE, log_of
 
 def test_each_column_is_that_of_its_name():
     log = log_of(
-        reasons=("begins", "follows", "ends"), set_aside=np.array([0, 1, 2]), touched=np.array([True, False, True])
+        reasons=("begins", "follows", "ends"),
+        set_aside=np.array([0, 1, 2]),
+        touched=np.array([True, False, True]),
+        nis=np.array([0.0, 3.0, 9.0]),
+        nis_dof=np.array([0, 4, 4]),
+        unstated_motion=np.array([False, True, False]),
+        is_lost=np.array([False, False, True]),
+        wheel_noise_factor=np.array([1.0, 1.0, 3.0]),
     )
     rows = list(csv.DictReader(steps_csv(log).decode().splitlines()))
     table = {name: [row[name] for row in rows] for name in STEP_COLUMNS}
@@ -29,7 +36,9 @@ def test_each_column_is_that_of_its_name():
         "sigma_heading_rad": np.sqrt(COVS[:, 2, 2]),
         "cov_xx": COVS[:, 0, 0], "cov_xy": COVS[:, 0, 1], "cov_xt": COVS[:, 0, 2], "cov_yy": COVS[:, 1, 1],
         "cov_yt": COVS[:, 1, 2], "cov_tt": COVS[:, 2, 2], "odometry_error_m": [0.0, 0.5, 0.3], "collisions": [1, 1, 2],
-        "step_ms": [6.0, 1.0, 2.0],
+        "step_ms": [6.0, 1.0, 2.0], "nis": [0.0, 3.0, 9.0], "nis_dof": [0, 4, 4], "nis_in_band": [0, 1, 1],
+        "nis_window": [0.0, 0.75, 1.5],
+        "unstated_motion": [0, 1, 0], "lost": [0, 0, 1], "wheel_noise_factor": [1.0, 1.0, 3.0],
     }  # fmt: skip
     for name, values in expected.items():
         assert [float(value) for value in table.pop(name)] == pytest.approx(list(values), abs=1e-6), name

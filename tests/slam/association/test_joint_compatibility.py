@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slam.association.joint_compatibility import NO_NIS, JointObservations, compatible, joint_nis, relocate
+from slam.association.joint_compatibility import JointObservations, compatible, relocate
 from slam.estimation.backend import Joint, Observations
 from slam.estimation.models import innovations, lines_robot
 from slam.geometry.poses import wrap
@@ -67,27 +67,6 @@ def test_relocation_by_nothing_is_no_relocation():
     joint = Joint(np.zeros(5), np.eye(5), np.ones((1, 2)))
     nothing = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
     assert relocate(joint, np.array([5]), nothing) is joint
-
-
-def test_the_nis_of_honest_observations_is_of_a_chi_square_variable():
-    """Poses and lines are drawn from the joint Gaussian, observations from their covariance."""
-    rng = np.random.default_rng(11)
-    anchors = np.array([[3.0, 1.0], [-1.0, 2.5], [0.5, -2.0]])
-    mean = np.concatenate([np.zeros(3), np.column_stack([[0.0, 1.9, -1.5], np.zeros(3)]).ravel()])
-    root = 2e-3 * rng.standard_normal((9, 9))
-    joint, ids = Joint(mean, root @ root.T, anchors), np.array([2, 5, 6])
-    cov = np.tile(np.diag([0.002, 0.001]) ** 2, (3, 1, 1))
-    found = []
-    for _ in range(400):
-        state = rng.multivariate_normal(mean, joint.cov)
-        lines = lines_robot(state[:3], anchors, state[3:].reshape(-1, 2)) + rng.normal(0.0, [0.002, 0.001], (3, 2))
-        found.append(joint_nis(joint, ids, Observations(ids, lines, cov)))
-    squared = np.array([nis.squared for nis in found])
-    assert {nis.dof for nis in found} == {6}
-    assert squared.mean() == pytest.approx(6.0, abs=4.0 * np.sqrt(12.0 / 400))
-    assert squared.var() == pytest.approx(12.0, rel=0.4)
-    nothing = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    assert joint_nis(joint, ids, nothing) == NO_NIS
 
 
 def test_the_observation_that_the_others_contradict_is_dropped_though_alone_it_would_pass():

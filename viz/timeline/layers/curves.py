@@ -12,9 +12,9 @@ from ..drawn_step import DrawnStep
 from ..recording import RerunRecording
 from .map_layers import goal_words
 
-NEES, LOG_NEES, TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS = (
+NEES, LOG_NEES, TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS, NIS = (
     *("nees", "nees_log10", "pose_trace", "path_length_m", "open_ends"),
-    *("lines", "chains", "closed_chains", "step_ms"),
+    *("lines", "chains", "closed_chains", "step_ms", "nis"),
 )
 POSE_BAND = chi2_band(3)
 """The 95 % band of the pose's NEES."""
@@ -30,7 +30,7 @@ class CurvesLayer:
 
     def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._backend = out, backend
-        for plot in (TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS):
+        for plot in (TRACE, PATH, ENDS, LINES, CHAINS, CLOSED, STEP_MS, NIS):
             more = (", closed", 4.0) if plot == CLOSED else ()
             out.fixed(f"/plots/{plot}/{backend}", curve_style(backend, *more))
 
@@ -45,6 +45,7 @@ class CurvesLayer:
             CHAINS: [len(row.walls.chains) for row in rows],
             CLOSED: [sum(chain.is_closed for chain in row.walls.chains) for row in rows],
             STEP_MS: [1e3 * row.seconds for row in rows],
+            NIS: [row.localisation.nis.squared / max(row.localisation.nis.dof, 1) for row in rows],
         }
         for plot, values in curves.items():
             self._out.values(f"/plots/{plot}/{self._backend}", block.moments, np.array(values, dtype=np.float64))
@@ -57,6 +58,7 @@ class DecisionsLayer:
         self._out, self._entity = out, f"/decisions/{backend}"
         self._goal: object = None
         self._doing = ""
+        self._noise_factor = 1.0
         self._aside: set[tuple[int, int]] = set()
 
     def send(self, block: Block) -> None:
@@ -81,6 +83,7 @@ class DecisionsLayer:
             if decision.walls_to_follow:
                 news.append((f"follow walls {' '.join(map(str, decision.walls_to_follow))}", "INFO"))
         self._goal = said
+        news += self._faults(row)
         if row.ended is not None:
             news.append((f"{row.ended}: {decision.words}", "INFO"))
         elif decision.words and decision.words != self._doing:
@@ -88,4 +91,16 @@ class DecisionsLayer:
             why = "" if goal is None else f" ({goal.reason})"
             news.append((decision.words.removesuffix(why), "DEBUG"))
         self._doing = decision.words
+        return news
+
+    def _faults(self, row: DrawnStep) -> list[tuple[str, str]]:
+        """Return what the robot noticed of itself: a motion that was not reported, wheels worse than stated."""
+        found, news = row.localisation, []
+        if found.unstated_motion is not None:
+            x, y, turn = found.unstated_motion.motion
+            words = f"re-localised: moved by {np.hypot(x, y):.2f} m and {np.degrees(turn):.0f} degrees, unreported"
+            news.append((words, "WARN"))
+        if found.noise_factor != self._noise_factor:
+            news.append((f"the wheels slip {found.noise_factor:g} times as far as stated", "WARN"))
+            self._noise_factor = found.noise_factor
         return news

@@ -1,0 +1,46 @@
+"""How far scans lay from where the estimate put them, without any truth: what a robot can watch on its way."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from slam.estimation.gates import gate_level
+
+from .records import Log
+
+WINDOW = 20
+"""Scans whose innovations are taken together."""
+
+
+def windowed_nis(log: Log) -> Float[np.ndarray, " s"]:
+    """Return the NIS of the last `WINDOW` scans over its degrees of freedom; 1 is ideal, 0 where none was matched."""
+    squared, dof = (_last(values) for values in (log.nis, log.nis_dof))
+    return np.asarray(squared / np.maximum(dof, 1.0))
+
+
+def nis_in_band(log: Log) -> Bool[np.ndarray, " s"]:
+    """Return whether the NIS of the last `WINDOW` scans is inside the two-sided 95 % band of its chi-square."""
+    squared, dof = (_last(values) for values in (log.nis, log.nis_dof))
+    bands = {n: (gate_level(0.025, n), gate_level(0.975, n)) for n in np.unique(dof[dof > 0]).astype(int).tolist()}
+    inside = [n > 0 and bands[int(n)][0] <= value <= bands[int(n)][1] for value, n in zip(squared, dof, strict=True)]
+    return np.array(inside, dtype=bool)
+
+
+def innovation_scores(log: Log) -> dict[str, Any]:
+    """Return the keys of `summary.json` that tell what the robot itself noticed of its estimate."""
+    total = int(log.nis_dof.sum())
+    return {
+        "nis": float(log.nis.sum()) / total if total else None,
+        "nis_in_band": float(np.mean(nis_in_band(log)[log.nis_dof > 0])) if total else None,
+        "unstated_motions": int(np.count_nonzero(log.unstated_motion)),
+        "lost_steps": int(np.count_nonzero(log.is_lost)),
+        "wheel_noise_factor": float(log.wheel_noise_factor[-1]),
+    }
+
+
+def _last(values: Float[np.ndarray, " s"] | np.ndarray) -> Float[np.ndarray, " s"]:
+    """Return the sum of each value and those before it, `WINDOW` in all."""
+    sums = np.concatenate([np.zeros(1), np.cumsum(values, dtype=np.float64)])
+    ends = np.arange(1, len(values) + 1)
+    return np.asarray(sums[ends] - sums[np.maximum(ends - WINDOW, 0)])

@@ -1,0 +1,59 @@
+"""What a robot does while its scans fit nowhere in the map: it turns on the spot, and gives up after a turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+
+from slam.map.chains import Chain
+from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
+
+from ..following.wall_following import Surroundings
+from ..goal import GivenUp
+from ..outcome import Outcome
+from .decider import Decision, Driver
+
+
+@dataclass(frozen=True)
+class LostConfig:
+    """How long a robot looks for itself."""
+
+    robot: RobotSpec = of_robot()
+    turns: float = 1.1
+    """A robot that found nowhere after so many turns on the spot gives up."""
+
+    @property
+    def steps(self) -> int:
+        """How many steps they take."""
+        return int(np.ceil(self.turns * 2.0 * np.pi / self.robot.turn_rad))
+
+
+class Lost:
+    """Leaves all to another driver but the steps at which the robot does not know where it is."""
+
+    def __init__(self, inner: Driver, config: LostConfig = LostConfig()) -> None:
+        self._inner, self._config = inner, config
+        self._step, self._since = -1, -1
+        self._given_up = GivenUp()
+
+    def moved(self, command: MotionCommand, odometry: Odometry) -> None:
+        """Take note of what the odometry reported of a command."""
+        self._inner.moved(command, odometry)
+
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do next: what the inner driver says, or a turn on the spot, or at last nothing more."""
+        self._step += 1
+        if not around.is_lost:
+            self._since = -1
+            decision = self._inner.decide(around, chains, graph)
+            self._given_up = decision.given_up
+            return decision
+        if self._since < 0:
+            self._since = self._step
+        if self._step - self._since >= self._config.steps:
+            words = f"lost at step {self._since}: its beams go through known walls, and no place in the map fits"
+            return Decision(None, words, given_up=self._given_up, outcome=Outcome.FAILED)
+        words = f"lost since step {self._since}: turns to find its place"
+        return Decision(MotionCommand(0.0, self._config.robot.turn_rad), words, given_up=self._given_up)

@@ -1,0 +1,97 @@
+"""Whether the wheels slip more than they state, and how much, told from where scans put the robot after each motion.
+
+With S the covariance of a scan's innovations e under the stated noise, and G the root of the noise that the last motion
+added to the pose, noise f times as large makes it S + (f² - 1) H G G' H'. Along the axes of A = G' H' S^-1 H G the
+likelihood of f falls into three terms: with w = G' H' S^-1 e, of variance a (1 + (f² - 1) a) on an axis of eigenvalue
+a. So a scan leaves three pairs (a, w), and a window of them tells the likeliest f, and how sure it is that f is not 1.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..estimation.backend import Joint, Observations
+from ..geometry.poses import rotation
+from ..robot import Odometry
+from .joint_compatibility import NO_NIS, Nis, seen_halfway
+
+
+@dataclass(frozen=True)
+class MotionNoiseConfig:
+    """When the stated noise of the wheels is no longer believed."""
+
+    window: int = 50
+    """Scans that are weighed together."""
+    chance: float = 1e-6
+    """Honest wheels are taken for worse so rarely, by the likelihood ratio."""
+
+
+FACTORS = np.array([0.5, 0.7, 1.5, 2.0, 3.0, 4.0, 6.0])
+"""How many times the standard deviation that is believed now is tried."""
+
+
+@dataclass(frozen=True)
+class MotionInnovation:
+    """What one scan says of the noise of the last motion, along three independent axes."""
+
+    a: Float[np.ndarray, "3"]
+    """How well the scan tells the motion's noise, from 0 to 1: the share of the innovation's variance that it makes."""
+    w: Float[np.ndarray, "3"]
+    """Of mean zero and variance a if the noise is as stated."""
+
+
+def surprise(
+    joint: Joint, ids: Int[np.ndarray, " n"], observed: Observations, motion_root: Float[np.ndarray, "3 3"]
+) -> tuple[Nis, MotionInnovation | None]:
+    """Return the NIS of observations of some lines of the joint Gaussian, and what they say of the last motion.
+
+    `motion_root` is G, world frame, with G G' the covariance that the motion added to the pose.
+    """
+    if not len(observed.ids):
+        return NO_NIS, None
+    seen, model = seen_halfway(joint, ids, observed)
+    HG = model.H_pose.reshape(-1, 3) @ motion_root
+    weighted = np.linalg.solve(seen.S, np.column_stack([seen.e, HG]))
+    a, axes = np.linalg.eigh(HG.T @ weighted[:, 1:])
+    innovation = MotionInnovation(np.clip(a, 0.0, 1.0), axes.T @ (HG.T @ weighted[:, 0]))
+    return Nis(float(seen.e @ weighted[:, 0]), len(seen.e)), innovation
+
+
+def motion_root(odometry: Odometry, heading_rad: float) -> Float[np.ndarray, "3 3"]:
+    """Return G of a motion, world frame, that ended in a heading; its covariance may be singular."""
+    variances, axes = np.linalg.eigh(odometry.cov)
+    G = np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
+    G[:2] = rotation(heading_rad - odometry.motion[2]) @ G[:2]
+    return G
+
+
+class MotionNoise:
+    """How many times as large as stated the noise of the wheels is taken to be; 1 until scans show otherwise."""
+
+    def __init__(self, config: MotionNoiseConfig = MotionNoiseConfig()) -> None:
+        self.factor = 1.0
+        self._config = config
+        self._seen: deque[MotionInnovation] = deque(maxlen=config.window)
+
+    def believed(self, odometry: Odometry) -> Odometry:
+        """Return odometry with the noise that it is taken to have."""
+        return odometry if self.factor == 1.0 else replace(odometry, cov=self.factor**2 * odometry.cov)
+
+    def see(self, innovation: MotionInnovation) -> None:
+        """Weigh one scan more; changes `factor` where all in the window leave no doubt."""
+        self._seen.append(innovation)
+        gains = gains_of(np.array([one.a for one in self._seen]), np.array([one.w for one in self._seen]))
+        best = int(np.argmax(gains))
+        if gains[best] > -np.log(self._config.chance):
+            factor = max(1.0, self.factor * float(FACTORS[best]))
+            if factor != self.factor:
+                self.factor = factor
+                self._seen.clear()
+
+
+def gains_of(a: Float[np.ndarray, "n 3"], w: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " f"]:
+    """Return by how much each of `FACTORS` raises the log-likelihood of n scans over that of the believed noise."""
+    c = FACTORS[:, None, None] ** 2 - 1.0
+    return np.asarray(0.5 * np.sum(c * w**2 / (1.0 + c * a) - np.log1p(c * a), axis=(1, 2)))

@@ -1,0 +1,62 @@
+"""A robot without a place turns on the spot, and gives up after a turn; one with a place is left alone."""
+
+from dataclasses import dataclass
+
+import networkx as nx
+import pytest
+
+from explore.goals.decider import Decision
+from explore.goals.lost import Lost, LostConfig
+from explore.outcome import Outcome
+from slam.robot import MotionCommand
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+"""The surroundings are stood in for."""
+
+
+@dataclass
+class Around:
+    is_lost: bool
+
+
+class Inner:
+    """Counts how often it is asked."""
+
+    asked = moved_by = 0
+
+    def decide(self, around, chains, graph):
+        self.asked += 1
+        return Decision(MotionCommand(0.1, 0.0), "drives")
+
+    def moved(self, command, odometry):
+        self.moved_by += 1
+
+
+def drive(lost):
+    inner = Inner()
+    driver = Lost(inner, LostConfig(turns=3 * 10.0 / 360.0))
+    return inner, [driver.decide(Around(is_lost), (), nx.DiGraph()) for is_lost in lost]
+
+
+def test_a_robot_that_knows_its_place_is_left_alone():
+    inner, decisions = drive([False] * 5)
+    assert inner.asked == 5
+    assert {decision.words for decision in decisions} == {"drives"}
+
+
+def test_a_lost_robot_turns_on_the_spot_and_goes_on_once_it_is_found():
+    inner, decisions = drive([False, True, True, False, True])
+    assert inner.asked == 2
+    turning = [decisions[k] for k in (1, 2, 4)]
+    assert all(decision.command.forward_m == 0.0 and decision.command.turn_rad > 0.0 for decision in turning)
+    assert "lost since step 1" in decisions[2].words
+    assert "lost since step 4" in decisions[4].words
+
+
+def test_a_robot_that_stays_lost_fails_and_says_since_when():
+    _, decisions = drive([False, False, True, True, True, True])
+    last = decisions[-1]
+    assert last.command is None
+    assert last.outcome is Outcome.FAILED
+    assert last.words.startswith("lost at step 2")
+    assert [decision.command is None for decision in decisions[:-1]] == [False] * 5

@@ -1,0 +1,58 @@
+"""A scan laid on a whole map: the true place is found, and where two are alike none is named."""
+
+import numpy as np
+import pytest
+
+from sim.lidar import LidarConfig, RangeFinder, noisy
+from slam.association.place_search import place_of
+from slam.extraction.extract import extract
+from slam.geometry.poses import wrap
+from slam.robot import Scan
+from tests.slam.extraction.test_extract import loop
+from tests.slam.map.test_openings import map_of as walls_of
+
+CROOKED = loop((0, 0), (6, 0), (6, 2), (4.5, 2), (4.5, 4.2), (2, 4.2), (2, 3), (0, 3))
+SQUARE = loop((0, 0), (4, 0), (4, 4), (0, 4))
+CONFIG = LidarConfig(beams=360, range_max_m=8.0)
+
+
+def scan_at(faces, pose, rng):
+    finder = RangeFinder(faces, CONFIG)
+    ranges = noisy(finder.cast(pose)[0], np.full(360, 0.01), rng.standard_normal(360), CONFIG.range_max_m)
+    return Scan(finder.bearings_rad, ranges, 0.01, CONFIG.range_max_m, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_scan_is_found_wherever_it_was_taken_and_whatever_is_believed(seed):
+    rng = np.random.default_rng(seed)
+    pose = np.array([rng.uniform(1.0, 4.0), rng.uniform(0.5, 2.5), rng.uniform(-np.pi, np.pi)])
+    segments = extract(scan_at(CROOKED, pose, rng))
+    place = place_of(segments, walls_of(CROOKED, np.zeros(3)))
+    assert np.hypot(*(place - pose)[:2]) < 0.1
+    assert abs(wrap(place[2] - pose[2])) < np.deg2rad(2.0)
+
+
+def test_in_a_square_room_no_place_is_named_unless_one_is_likely():
+    rng = np.random.default_rng(0)
+    pose = np.array([1.2, 1.5, 0.4])
+    segments = extract(scan_at(SQUARE, pose, rng))
+    assert place_of(segments, walls_of(SQUARE, np.zeros(3))) is None
+    np.testing.assert_array_equal(place_of(segments, walls_of(SQUARE, np.zeros(3)), likely_world=pose), pose)
+
+
+def test_a_likely_place_that_explains_little_is_not_taken():
+    rng = np.random.default_rng(0)
+    pose = np.array([1.2, 1.5, 0.4])
+    segments = extract(scan_at(CROOKED, pose, rng))
+    place = place_of(segments, walls_of(CROOKED, np.zeros(3)), likely_world=pose + 0.5)
+    assert np.hypot(*(place - pose)[:2]) < 0.1
+
+
+def test_a_scan_of_another_building_has_no_place():
+    segments = extract(scan_at(SQUARE, np.array([1.2, 1.5, 0.4]), np.random.default_rng(0)))
+    assert place_of(segments, walls_of(CROOKED, np.zeros(3))) is None
+
+
+def test_an_empty_map_has_no_place():
+    segments = extract(scan_at(SQUARE, np.array([1.2, 1.5, 0.4]), np.random.default_rng(0)))
+    assert place_of(segments, walls_of(SQUARE[:0], np.zeros(3))) is None

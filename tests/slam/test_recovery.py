@@ -1,0 +1,123 @@
+"""A robot that was moved and does not know: the mapper says so, finds its place, or says that it has none."""
+
+import numpy as np
+import pytest
+
+from sim.lidar import LidarConfig, RangeFinder, noisy
+from slam.backends import BACKENDS
+from slam.config import MapperConfig
+from slam.geometry.poses import compose, wrap
+from slam.mapper import Mapper
+from slam.robot import Odometry, Scan
+from tests.slam.extraction.test_extract import HALL, loop
+from tests.slam.test_mapper import ODOMETRY_COV, P0
+
+CONFIG = LidarConfig(beams=360, range_max_m=6.0)
+ELSEWHERE = loop((40, 0), (43, 0), (44, 1.5), (43.4, 3.1), (40.5, 3.5), (39, 1.5))
+WORLD = np.concatenate([HALL, ELSEWHERE])
+START = np.array([2.1, 2.0, 0.3])
+STEP = np.array([0.05, 0.0, 0.02])
+STEPS = 12
+
+
+class Drive:
+    """A mapper that is driven through the hall, with noise in the scans; the odometry tells what it is told to tell."""
+
+    def __init__(self, backend="full-ekf", config=MapperConfig(), seed=0, steps=STEPS):
+        self.rng, self.finder = np.random.default_rng(seed), RangeFinder(WORLD, CONFIG)
+        self.mapper = Mapper(BACKENDS[backend].make(START.copy(), P0.copy()), config)
+        self.pose = START.copy()
+        self.updates = [self.see()]
+        for _ in range(steps):
+            self.move(STEP)
+
+    def see(self):
+        noise = self.rng.standard_normal(360)
+        ranges = noisy(self.finder.cast(self.pose)[0], np.full(360, 0.01), noise, CONFIG.range_max_m)
+        return self.mapper.step(Scan(self.finder.bearings_rad, ranges, 0.01, CONFIG.range_max_m, 0.0))
+
+    def move(self, motion, unreported=(0.0, 0.0, 0.0), cov=ODOMETRY_COV):
+        self.mapper.predict(Odometry(motion, cov))
+        self.pose = compose(compose(self.pose, motion), np.asarray(unreported))
+        self.updates.append(self.see())
+        return self.updates[-1]
+
+    @property
+    def off(self):
+        """How far off the estimate is, m and degrees."""
+        error = self.mapper.backend.belief.pose_world - self.pose
+        return np.hypot(*error[:2]), np.rad2deg(abs(wrap(error[2])))
+
+
+@pytest.mark.parametrize(("backend", "turn_deg"), [*((name, -8.0) for name in BACKENDS), ("full-ekf", 20.0)])
+def test_a_turn_that_nobody_reported_is_found_at_the_next_scan(backend, turn_deg):
+    drive = Drive(backend)
+    walls = len(drive.updates[-1].map)
+    update = drive.move(STEP, [0.0, 0.0, np.deg2rad(turn_deg)])
+    assert np.rad2deg(update.localisation.unstated_motion.motion[2]) == pytest.approx(turn_deg, abs=1.0)
+    assert len(update.map) == walls
+    assert drive.off[0] < 0.05
+    assert drive.off[1] < 0.5
+    later = [drive.move(STEP).localisation for _ in range(5)]
+    assert all(one.unstated_motion is None and not one.is_lost for one in later)
+
+
+def test_a_robot_taken_at_its_word_keeps_the_turn():
+    drive = Drive(config=MapperConfig(recovery=None))
+    update = drive.move(STEP, [0.0, 0.0, np.deg2rad(20.0)])
+    assert update.localisation.unstated_motion is None
+    assert drive.off[1] > 10.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_robot_that_tells_the_truth_is_never_doubted(seed):
+    drive, rng = Drive(seed=seed), np.random.default_rng(100 + seed)
+    for _ in range(50):
+        drive.move(STEP, rng.multivariate_normal(np.zeros(3), ODOMETRY_COV))
+    told = [update.localisation for update in drive.updates]
+    assert all(one.unstated_motion is None and not one.is_lost and one.noise_factor == 1.0 for one in told)
+    dof = sum(one.nis.dof for one in told)
+    assert 0.8 < sum(one.nis.squared for one in told) / dof < 1.2
+
+
+def test_a_robot_carried_across_the_hall_is_found_by_a_search_of_the_map():
+    drive = Drive()
+    relative = _relative(drive.pose, np.array([0.8, 2.8, -2.5]))
+    update = drive.move(np.zeros(3), relative)
+    assert update.localisation.unstated_motion is not None
+    assert drive.off[0] < 0.1
+
+
+def test_a_robot_carried_to_another_building_is_lost_and_keeps_its_map():
+    drive = Drive()
+    before = drive.updates[-1]
+    there = np.array([41.5, 1.5, 0.3])
+    home, motion = drive.pose.copy(), _relative(drive.pose, there)
+    update = drive.move(np.zeros(3), motion)
+    assert update.localisation.is_lost
+    assert update.map.ids.tolist() == before.map.ids.tolist()
+    assert (update.walls_of_segments == -1).all()
+    assert drive.move(STEP).localisation.is_lost
+    back = drive.move(np.zeros(3), _relative(drive.pose, home))
+    assert not back.localisation.is_lost
+    assert drive.off[0] < 0.1
+
+
+def test_wheels_that_slip_more_than_they_state_are_found_out():
+    drive, rng = Drive(), np.random.default_rng(5)
+    cov = np.diag([0.003, 0.003, 0.004]) ** 2
+    told = []
+    for _ in range(40):
+        slip = 4.0 * rng.standard_normal(3) * np.sqrt(np.diagonal(cov))
+        told.append(drive.move(-STEP if len(told) % 2 else STEP, slip, cov).localisation.noise_factor)
+    assert told[0] == 1.0
+    assert told[-1] >= 2.0
+
+
+def _relative(from_world, to_world):
+    return np.array([*_turned(to_world[:2] - from_world[:2], -from_world[2]), wrap(to_world[2] - from_world[2])])
+
+
+def _turned(vector, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]]) @ vector
