@@ -16,6 +16,7 @@ from sim.worlds import World, WorldError, listing, load
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
+from slam.estimation.mounting import start_of_scanner
 from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
@@ -94,7 +95,7 @@ class Scenario:
     strategy: Strategy | None
     """None where a recorded robot is ridden."""
     start_estimate: Float[np.ndarray, "3"]
-    """Where the back end believes to start, world frame, m m rad."""
+    """Where the body is believed to start, world frame, m m rad."""
     start_cov: Float[np.ndarray, "3 3"]
 
 
@@ -151,8 +152,14 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
         config,
         world,
         SimulatedRobot(world, config.seed, config.errorless, config.robot),
-        BACKENDS[config.backend].make(start.copy(), cov.copy(), config.backend_options),
+        make_backend(config, start, cov),
         strategy,
         start,
         cov,
     )
+
+
+def make_backend(config: TrialConfig, start_world: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> Backend:
+    """Return the back end of a trial for a body that is believed to start at a pose: it follows the scanner."""
+    start, start_cov = start_of_scanner(start_world, cov, config.robot.scanner)
+    return BACKENDS[config.backend].make(start.copy(), start_cov.copy(), config.backend_options)

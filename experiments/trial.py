@@ -82,7 +82,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, way_world)
     summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending, recorder.sketches)
     summary |= {"certificate": certificate_record(certificate)}
-    smoothed = smooth(scenario.backend, last.map, log.unstated_motion)
+    smoothed = smooth(scenario.backend, last.map, log.unstated_motion, scenario.config.robot.scanner)
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
 
 

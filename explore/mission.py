@@ -48,17 +48,22 @@ def explore_mission(
 ) -> Iterator[Step]:
     """Drive `robot` until every chain is closed or no open end can be reached, and yield each step.
 
-    The `mapper` holds the back end, whose pose is where the robot believes to start. `limited` ends a mission early.
-    What the robot states of itself stands in the settings: `slam.robot.fitted(MissionConfig(), robot_spec)`.
+    The `mapper` holds the back end, which begins where the scanner is believed to be (`start_of_scanner`). `limited`
+    ends a mission early.
+    What the robot states of itself stands in the settings: `slam.robot.fitted(MissionConfig(), robot_spec)`; the same
+    for the mapper's. Raises ValueError where they are of two robots.
     """
-    start = mapper.backend.belief.pose_world[:2].copy()
+    if mapper.config.robot != config.robot:
+        raise ValueError(
+            "expected a mapper and a mission of one robot, found those of two: `fitted` both to what it states"
+        )
+    start = mapper.belief.pose_world[:2].copy()
     following = config.explorer.following
     explorer = Explorer(strategy, start, config.explorer)
     inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
     floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
-    recent = AccumulatedReturns(config.robot)
     driver = Lost(Retreat(inner, floor, config.retreat, following), config.lost)
-    return _mission(robot, mapper, driver, floor, recent)
+    return _mission(robot, mapper, driver, floor)
 
 
 def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
@@ -66,13 +71,12 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
 
     Nobody plans, so nobody keeps the free floor.
     """
-    return _mission(robot, mapper, ReplayDriver(scans), None, AccumulatedReturns())
+    return _mission(robot, mapper, ReplayDriver(scans), None)
 
 
-def _mission(
-    robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None, recent: AccumulatedReturns
-) -> Iterator[Step]:
-    graph = VisibilityGraph()
+def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
+    spec = mapper.config.robot
+    graph, recent = VisibilityGraph(), AccumulatedReturns(spec)
     free_space = FreeSpace() if floor is None else floor.free_space
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     given_up = GivenUp()
@@ -126,6 +130,7 @@ def _mission(
             path_length_m=path_length,
             seconds=time.perf_counter() - began,
             planning_seconds=decided,
+            robot=spec,
         )
         if decision.command is None:
             return

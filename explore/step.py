@@ -13,7 +13,7 @@ from slam.association.recovery import Localisation
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import Odometry, Scan
+from slam.robot import Odometry, RobotSpec, Scan
 
 from .floor.free_space import FreeSpace
 from .goal import SetAside
@@ -53,6 +53,8 @@ class Step:
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
     localisation: Localisation = field(default_factory=Localisation)
     """How well the scan fits where the robot was believed to be, and what was made of that."""
+    robot: RobotSpec = RobotSpec()
+    """What the robot states of itself: its body, and where on it the scan was taken."""
 
     @property
     def set_aside(self) -> tuple[SetAside, ...]:

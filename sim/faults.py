@@ -28,6 +28,12 @@ class FaultsConfig:
     """How far a bump turns the robot rad; the wheels report nothing of it."""
     slip: float = 1.0
     """How many times as far as stated the wheels slip."""
+    scanner_ahead_m: float = 0.0
+    """How much farther ahead than stated the scanner sits m."""
+    scanner_left_m: float = 0.0
+    """How much farther to the left m."""
+    scanner_turned_rad: float = 0.0
+    """By how much more than stated it is turned rad, counter-clockwise."""
 
 
 def with_mixed_pixels(

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
-from slam.robot import MotionCommand, Odometry, RobotSpec, Scan
+from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Channel, standard_normals
 from .drive import clamp, draw_slip, odometry, seconds, true_motion
@@ -46,6 +46,16 @@ class RobotConfig(RobotSpec):
     wheel_speed_m_s: float = 0.3
     """Speed m/s of the faster wheel, which sets how long a step takes."""
     faults: FaultsConfig = field(default_factory=FaultsConfig)
+
+    @property
+    def true_scanner(self) -> ScannerSpec:
+        """Where the scanner really sits."""
+        stated, faults = self.scanner, self.faults
+        return ScannerSpec(
+            stated.x_m + faults.scanner_ahead_m,
+            stated.y_m + faults.scanner_left_m,
+            stated.heading_rad + faults.scanner_turned_rad,
+        )
 
     @property
     def spec(self) -> RobotSpec:
@@ -93,7 +103,8 @@ class SimulatedRobot:
 
     def sense(self) -> Scan:
         """Return the scan at the present place and record the truth about it."""
-        ranges, faces = self._finder.cast(self._pose)
+        scanner = self.config.true_scanner
+        ranges, faces = self._finder.cast(self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot))
         lidar, faults, step = self.config.lidar, self.config.faults, len(self._record.poses_world)
         ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._seed, step)
         if not self._errorless:

@@ -15,7 +15,8 @@ from .association.motion_noise import MotionInnovation, MotionNoise
 from .association.recovery import Localisation, unstated_motion
 from .association.view import View
 from .config import MapperConfig
-from .estimation.backend import Backend, Observations
+from .estimation.backend import Backend, Belief, Observations
+from .estimation.mounting import belief_of_body, odometry_of_body, odometry_of_scanner
 from .extraction.config import ExtractionConfig
 from .extraction.extract import NO_VERTICES, extract
 from .extraction.segments import Segments
@@ -35,7 +36,7 @@ AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
 
 @dataclass(frozen=True)
 class MapUpdate:
-    """What one scan did to the map."""
+    """What one scan did to the map, in the frame of the body."""
 
     segments: Segments
     matches: Matches
@@ -74,7 +75,10 @@ class Extractor(Protocol):
 
 
 class Mapper:
-    """Drives one back end through the seven steps; extractor and matcher may be replaced by oracles."""
+    """Drives one back end through the seven steps; extractor and matcher may be replaced by oracles.
+
+    The back end's pose is that of the scanner (`start_of_scanner`): what comes in is of the body, and what goes out.
+    """
 
     def __init__(
         self,
@@ -95,8 +99,14 @@ class Mapper:
         self._chains: tuple[Chain, ...] = ()
         self._is_lost = False
 
+    @property
+    def belief(self) -> Belief:
+        """Where the body is believed to be, and the map."""
+        return belief_of_body(self.backend.belief, self.config.robot.scanner)
+
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by the odometry."""
+        odometry = odometry_of_scanner(odometry, self.config.robot.scanner)
         self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
         self.backend.predict(self._odometry)
 
@@ -122,7 +132,7 @@ class Mapper:
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = self._keeper.connect(walls, scan, set_aside)
         localisation = Localisation(found.nis, motion, False, self._weighed(found, motion))
-        return MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
+        return self._told(MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation))
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
@@ -156,7 +166,20 @@ class Mapper:
         nobody = np.full(len(segments), -1, dtype=np.int64)
         factor = 1.0 if self._noise is None else self._noise.factor
         localisation = Localisation(is_lost=True, noise_factor=factor)
-        return MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation)
+        return self._told(MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation))
+
+    def _told(self, update: MapUpdate) -> MapUpdate:
+        """Return what is told of a scan: all in the frame of the body."""
+        scanner, motion = self.config.robot.scanner, update.localisation.unstated_motion
+        if scanner.is_at_axle:
+            return update
+        of_body = None if motion is None else odometry_of_body(motion, scanner)
+        return replace(
+            update,
+            segments=update.segments.on_body(scanner),
+            map=replace(update.map, belief=belief_of_body(update.map.belief, scanner)),
+            localisation=replace(update.localisation, unstated_motion=of_body),
+        )
 
     def _weighed(self, found: Localised, motion: Odometry | None) -> float:
         """Weigh what a scan says of the wheels; return how many times as large as stated their noise was."""

@@ -15,7 +15,7 @@ TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
 
 @dataclass(frozen=True)
 class Scan:
-    """One turn of the range finder, in the robot frame."""
+    """One turn of the range finder, in its own frame: where it sits on the body says `RobotSpec`."""
 
     bearings_rad: Float[np.ndarray, " k"]
     """Strictly increasing, evenly spaced beam directions, counter-clockwise from straight ahead."""
@@ -109,6 +109,21 @@ class ScannerSpec:
     """To the left."""
     heading_rad: float = 0.0
     """Where its bearing zero points, counter-clockwise from straight ahead."""
+
+    @property
+    def is_at_axle(self) -> bool:
+        """Whether it sees from the middle of the body."""
+        return self.x_m == self.y_m == self.heading_rad == 0.0
+
+    @property
+    def pose_robot(self) -> Float[np.ndarray, "3"]:
+        """X m, y m, heading rad."""
+        return np.array([self.x_m, self.y_m, self.heading_rad])
+
+    @property
+    def off_m(self) -> float:
+        """How far it sits from the middle of the axle."""
+        return float(np.hypot(self.x_m, self.y_m))
 
 
 @dataclass(frozen=True)

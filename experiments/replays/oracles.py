@@ -29,6 +29,7 @@ class Witness:
 
     truth: Truth
     poses_world: Float[np.ndarray, "s 3"]
+    """Of the scanner."""
     face_of_beam: Int[np.ndarray, "s k"]
     at: int = 0
     """The scan that is being mapped."""

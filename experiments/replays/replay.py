@@ -24,8 +24,8 @@ from sim.logs.recorded_robot import (
 from sim.robot import TrueRecord
 from sim.worlds import World
 from slam.association.methods import METHODS, Matcher
-from slam.backends import BACKENDS
 from slam.config import MapperConfig
+from slam.estimation.mounting import scanner_poses
 from slam.extraction.extract import extract
 from slam.mapper import Extractor, Mapper
 from slam.robot import MotionCommand, Odometry, Scan
@@ -33,7 +33,7 @@ from slam.robot import MotionCommand, Odometry, Scan
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import read_config, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
-from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world
+from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world, make_backend
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
 from ..usage import UsageError
@@ -172,10 +172,11 @@ def replay(
     recording = run.recording
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))
-    backend_made = BACKENDS[backend].make(run.start_pose.copy(), run.start_cov.copy(), config.backend_options)
+    backend_made = make_backend(config, run.start_pose, run.start_cov)
     robot = ReplayedRobot(run, recording)
     scenario = Scenario(config, world, robot, backend_made, None, run.start_pose, run.start_cov)
-    witness = Witness(truth_of(world, config.robot), run.true_poses_world, run.true_face_of_beam)
+    scanner_world = scanner_poses(run.true_poses_world, config.robot.true_scanner)
+    witness = Witness(truth_of(world, config.robot), scanner_world, run.true_face_of_beam)
     if len(witness.truth.faces) <= int(run.true_face_of_beam.max(initial=-1)):
         raise UsageError(f"expected the world that the log was made in, found another {config.world}: bring it back")
     oracle = TrueAssociation(witness) if options.association == "true" else None

@@ -6,7 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from slam.estimation.backend import Backend, Joint, Smoother
+from slam.estimation.mounting import belief_of_body, body_poses
 from slam.map.stochastic_map import StochasticMap
+from slam.robot import ScannerSpec
 
 
 @dataclass(frozen=True)
@@ -20,16 +22,18 @@ class Smoothed:
     """The pose at the last step and all lines."""
 
 
-def smooth(backend: Backend, last: StochasticMap, unstated_motion: Bool[np.ndarray, " s"]) -> Smoothed | None:
-    """Let a back end finish; None if it does not smooth or broke off within a step.
+def smooth(
+    backend: Backend, last: StochasticMap, unstated_motion: Bool[np.ndarray, " s"], scanner: ScannerSpec
+) -> Smoothed | None:
+    """Let a back end, which follows the scanner, finish; None if it does not smooth or broke off within a step.
 
     `unstated_motion` tells at which of the steps a second motion was predicted. Every belief before it goes stale.
     """
     try:
         if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
             return None
-        poses, rows = backend.finish(), np.arange(len(unstated_motion)) + np.cumsum(unstated_motion)
-        belief = backend.belief
+        poses, rows = body_poses(backend.finish(), scanner), np.arange(len(unstated_motion)) + np.cumsum(unstated_motion)
+        belief = belief_of_body(backend.belief, scanner)
         if len(poses) <= rows[-1] or not np.array_equal(belief.ids, last.ids):
             return None
         return Smoothed(poses[rows], replace(last, belief=belief), belief.joint(belief.ids))

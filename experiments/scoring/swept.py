@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
 from sim.worlds import World
+from slam.estimation.mounting import scanner_poses
 from slam.geometry.poses import wrap_positive
 from slam.robot import Scan
 
@@ -90,6 +91,7 @@ def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
     if region.is_empty:
         return floor.seen
     floor.cover(region.buffer(config.radius_m))
+    region = world.lookouts(config.radius_m, config.true_scanner.off_m)
     finder = RangeFinder(world.faces, LidarConfig(LOOKOUT_BEAMS, range_max_m=config.lidar.range_max_m))
     for ring in (region.exterior, *region.interiors):
         places = shapely.get_coordinates(ring.segmentize(LOOKOUT_M))
@@ -111,9 +113,9 @@ def swept(
     bearings_rad: Float[np.ndarray, " k"],
     ranges_m: Float[np.ndarray, "s k"],
 ) -> float:
-    """Return the share of the visible floor that scans at these true poses have seen."""
+    """Return the share of the visible floor that scans at these true poses of the body have seen."""
     target = visible_floor(world, config)
     floor = Floor(world.free)
-    for pose, ranges in zip(poses_world, ranges_m, strict=True):
+    for pose, ranges in zip(scanner_poses(poses_world, config.true_scanner), ranges_m, strict=True):
         floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
     return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from explore.floor.free_space import FreeSpace
+from explore.floor.accumulated_returns import returns
+from explore.floor.free_space import FreeSpace, FreeSpaceConfig
 from explore.step import Step
 from slam.geometry.poses import inverse, to_world
 from viz.figures.animation import Frame, animated, shown_steps
@@ -53,19 +54,18 @@ class _Film:
         self.frames: list[Frame] = []
         self._shown = set(shown_steps(count))
         self._poses: list[np.ndarray] = []
-        self._floor = FreeSpace()
+        self._floor: FreeSpace | None = None
 
     def add(self, step: Step) -> None:
         pose = step.pose_world.copy()
         self._poses.append(pose)
+        floor = self._floor = self._floor or FreeSpace(FreeSpaceConfig(step.robot))
         is_shown = step.index in self._shown
         if is_shown or step.index % EVERY_SCAN == 0:
-            self._floor.integrate(pose, step.scan)
+            floor.integrate(pose, step.scan)
         if not is_shown:
             return
-        scan, walls = step.scan, step.map
-        hit = np.isfinite(scan.ranges_m)
-        along = np.stack([np.cos(scan.bearings_rad[hit]), np.sin(scan.bearings_rad[hit])], axis=1)
+        walls = step.map
         self.frames.append(
             Frame(
                 step=step.index,
@@ -75,9 +75,9 @@ class _Film:
                 ids=tuple(walls.ids.tolist()),
                 ends_world=walls.ends_world.copy(),
                 chains=step.chains,
-                hits_world=to_world(scan.ranges_m[hit, None] * along, pose),
-                seen=self._floor.evidence < 0,
-                seen_origin_world=self._floor.origin_world.copy(),
-                cell_m=self._floor.config.cell_m,
+                hits_world=to_world(returns(step.scan, step.robot.scanner), pose),
+                seen=floor.evidence < 0,
+                seen_origin_world=floor.origin_world.copy(),
+                cell_m=floor.config.cell_m,
             )
         )

@@ -5,8 +5,8 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import to_robot, wrap
-from slam.robot import Odometry, RobotSpec, Scan
+from slam.geometry.poses import to_robot, to_world, wrap
+from slam.robot import Odometry, RobotSpec, Scan, ScannerSpec
 
 SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
@@ -20,7 +20,7 @@ class AccumulatedReturns:
     """Returns near the robot, kept in its frame by what the odometry reports."""
 
     def __init__(self, robot: RobotSpec = RobotSpec()) -> None:
-        self._near_m = robot.beyond(NEAR_BEYOND_M)
+        self._near_m, self._scanner = robot.beyond(NEAR_BEYOND_M), robot.scanner
         self._scans: deque[Float[np.ndarray, "n 2"]] = deque(maxlen=SCANS)
 
     def move(self, odometry: Odometry) -> None:
@@ -30,7 +30,7 @@ class AccumulatedReturns:
 
     def see(self, scan: Scan) -> None:
         """Remember what a scan hit nearby."""
-        points = returns(scan)
+        points = returns(scan, self._scanner)
         self._scans.append(points[np.hypot(points[:, 0], points[:, 1]) < self._near_m])
 
     @property
@@ -57,8 +57,9 @@ def steadied(
     return points_robot * (mean / np.maximum(rho, 1e-9))[:, None]
 
 
-def returns(scan: Scan) -> Float[np.ndarray, "m 2"]:
-    """Return the points that the scan hit, robot frame, m."""
+def returns(scan: Scan, scanner: ScannerSpec) -> Float[np.ndarray, "m 2"]:
+    """Return the points that the scan of a scanner on the body hit, robot frame, m."""
     hit = np.isfinite(scan.ranges_m)
     bearing, distance = scan.bearings_rad[hit], scan.ranges_m[hit]
-    return np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
+    points = np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1)
+    return points if scanner.is_at_axle else to_world(points, scanner.pose_robot)

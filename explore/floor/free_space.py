@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
-from slam.geometry.poses import to_world, wrap_positive
+from slam.geometry.poses import compose, to_world, wrap_positive
 from slam.robot import RobotSpec, Scan, of_robot
 
 _FARTHEST_M = 1e9
@@ -170,8 +170,11 @@ class FreeSpace:
         self._mark(0, self.shape[0], 0, self.shape[1])
 
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
-        """Take in one scan at an estimated pose; raises FloorTooLargeError for a pose too far from all others."""
-        cell = self.config.cell_m
+        """Take in one scan at an estimated pose of the body; raises FloorTooLargeError for one too far from others."""
+        cell, scanner = self.config.cell_m, self.config.robot.scanner
+        body_world = pose_world[:2]
+        if not scanner.is_at_axle:
+            pose_world = compose(pose_world, scanner.pose_robot)
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
         reach = scan.shown_m
@@ -180,7 +183,7 @@ class FreeSpace:
         here = self.cells(pose_world[None, :2])[0]
         box = self._box(here, tips, scan)
         window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
-        free, body = self._seen_free(pose_world, scan, reach, box)
+        free, body = self._seen_free(pose_world, body_world, scan, reach, box)
         free[tuple(hits.T)] = body[tuple(hits.T)] = False
         change = -free.astype(np.int8)
         change[tuple(hits.T)] = self.config.hit
@@ -197,15 +200,24 @@ class FreeSpace:
         step = float(scan.bearings_rad[1] - scan.bearings_rad[0])
         # Two beams and the arc between them: it stands out beyond the line from tip to tip.
         beyond = scan.range_max_m * (1.0 - np.cos(step))
-        spare = int(np.ceil(max(beyond, self.config.body_m) / self.config.cell_m)) + 1
+        body_m = self.config.body_m + self.config.robot.scanner.off_m
+        spare = int(np.ceil(max(beyond, body_m) / self.config.cell_m)) + 1
         r0, c0 = (np.minimum(tips.min(axis=0), here) - spare).tolist()
         r1, c1 = (np.maximum(tips.max(axis=0), here) + spare + 1).tolist()
         return r0, r1, c0, c1
 
     def _seen_free(
-        self, pose_world: Float[np.ndarray, "3"], scan: Scan, reach: Float[np.ndarray, " k"], box: _Box
+        self,
+        pose_world: Float[np.ndarray, "3"],
+        body_world: Float[np.ndarray, "2"],
+        scan: Scan,
+        reach: Float[np.ndarray, " k"],
+        box: _Box,
     ) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-        """Cells of a part of the grid before the nearer of the two beams beside them, and those within the body."""
+        """Cells of a part of the grid before the nearer of the two beams beside them, and those within the body.
+
+        The pose is the scanner's.
+        """
         here = self.cells(pose_world[None, :2])
         offset, (r, c) = self.points(here)[0] - pose_world[:2], here[0].tolist()
         x = (np.arange(box[2] - c, box[3] - c) * self.config.cell_m + offset[0]).astype(np.float32)
@@ -220,8 +232,12 @@ class FreeSpace:
         between[: k - 1] = np.minimum(shown[:-1], shown[1:])
         if scan.is_full_turn:
             between[k - 1 :] = min(shown[-1], shown[0])
-        body = distance < self.config.body_m
-        return (distance < between[beam]) | body, distance < self.config.body_m - HALF_DIAGONAL * self.config.cell_m
+        from_body = distance
+        if not self.config.robot.scanner.is_at_axle:
+            off = (pose_world[:2] - body_world).astype(np.float32)
+            from_body = np.hypot(x[None, :] + off[0], y[:, None] + off[1])
+        body = from_body < self.config.body_m
+        return (distance < between[beam]) | body, from_body < self.config.body_m - HALF_DIAGONAL * self.config.cell_m
 
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""

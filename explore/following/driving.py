@@ -117,7 +117,7 @@ class Pilot:
         ahead = self._points[self._at : self._at + 20]
         # What is beside the robot already is no matter of the path: `command` gets away from it.
         ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.robot.step_m]
-        gap = to_robot(ahead, pose_world)[:, None] - returns(scan)
+        gap = to_robot(ahead, pose_world)[:, None] - returns(scan, self._config.robot.scanner)
         return bool(gap.size) and float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.obstructed_m
 
     def command(
@@ -134,7 +134,7 @@ class Pilot:
         a narrow place the noise of so many would leave none. What the body touched, `touched_robot`, always
         counts.
         """
-        points, ahead = returns(scan), self._aim(pose_world, self._config.lookahead_m)
+        points, ahead = returns(scan, self._config.robot.scanner), self._aim(pose_world, self._config.lookahead_m)
         aim, gap_m, narrow = _centred(ahead, points, self._config)
         if gap_m < self._config.narrow_m:
             steady = steadied(points, recent_robot, self._config.robot)

@@ -112,7 +112,7 @@ class Retreat:
 
     def _points(self, around: Surroundings) -> Float[np.ndarray, "n 2"]:
         """Return what stands in the way back, robot frame, m."""
-        return np.concatenate([returns(around.scan), around.recent_robot])
+        return np.concatenate([returns(around.scan, self._config.robot.scanner), around.recent_robot])
 
     def _knows_its_way(self, around: Surroundings) -> bool:
         """Return whether the floor leads back along the last metres, and to all but a little of the way before."""

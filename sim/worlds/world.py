@@ -60,6 +60,17 @@ class World:
         at = shapely.Point(self.start[:2])
         return inner[int(np.argmin(shapely.distance(inner, at)))] if len(inner) else shapely.Polygon()
 
-    def reachable_contour(self, radius_m: float = ROBOT_RADIUS_M, range_m: float = SENSOR_RANGE_M) -> Contour:
-        """Return the parts of the faces in line of sight within range of some place that the disc can reach."""
-        return visible_contour(self.faces, self.face_rings, self.reachable(radius_m), radius_m, range_m)
+    def reachable_contour(
+        self, radius_m: float = ROBOT_RADIUS_M, range_m: float = SENSOR_RANGE_M, scanner_m: float = 0.0
+    ) -> Contour:
+        """Return the parts of the faces in line of sight within range of some place that the scanner can reach.
+
+        It sits so far from the middle of the disc, `scanner_m`, which turns to any side.
+        """
+        lookouts, off_m = self.lookouts(radius_m, scanner_m), min(scanner_m, radius_m)
+        return visible_contour(self.faces, self.face_rings, lookouts, radius_m - off_m, range_m)
+
+    def lookouts(self, radius_m: float, scanner_m: float) -> shapely.Polygon:
+        """Return where a scanner so far from the middle of a disc can be; one beyond its rim counts as on it."""
+        reachable, off_m = self.reachable(radius_m), min(scanner_m, radius_m)
+        return reachable if off_m <= 0.0 or reachable.is_empty else reachable.buffer(off_m, quad_segs=16)

@@ -1,10 +1,14 @@
 """What extraction hands to matching: the straight pieces of one scan."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+
+from ..geometry.lines import directions, normals
+from ..geometry.poses import to_world
+from ..robot import ScannerSpec
 
 
 class EndKind(IntEnum):
@@ -20,10 +24,10 @@ class EndKind(IntEnum):
 
 @dataclass(frozen=True)
 class Segments:
-    """The straight pieces of one scan, in the robot frame, ordered counter-clockwise."""
+    """The straight pieces of one scan, in the scanner's frame, ordered counter-clockwise."""
 
     lines: Float[np.ndarray, "n 2"]
-    """(alpha rad, r m): n(alpha) points from the seen side into the wall, so r > 0 here."""
+    """(alpha rad, r m): n(alpha) points from the seen side into the wall, so r > 0 in the scanner's frame."""
     cov: Float[np.ndarray, "n 2 2"]
     """Covariance of (alpha, r), propagated from the radial noise."""
     ends: Float[np.ndarray, "n 2 2"]
@@ -46,6 +50,17 @@ class Segments:
     def lengths_m(self) -> Float[np.ndarray, " n"]:
         """How long each seen piece is."""
         return np.hypot(*(self.ends[:, 1] - self.ends[:, 0]).T)
+
+    def on_body(self, scanner: ScannerSpec) -> "Segments":
+        """Return the segments in the frame of the body, whose origin may lie behind the line of one of them."""
+        if scanner.is_at_axle:
+            return self
+        alpha, mount = self.lines[:, 0] + scanner.heading_rad, scanner.pose_robot
+        r = self.lines[:, 1] + normals(alpha) @ mount[:2]
+        G = np.tile(np.eye(2), (len(self), 1, 1))
+        G[:, 1, 0] = directions(alpha) @ mount[:2]
+        cov = G @ self.cov @ G.transpose(0, 2, 1)
+        return replace(self, lines=np.stack([alpha, r], axis=-1), cov=cov, ends=to_world(self.ends, mount))
 
     def take(self, index: np.ndarray) -> "Segments":
         """Return the chosen segments (integer or boolean index), in the order asked for."""

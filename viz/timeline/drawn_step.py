@@ -15,7 +15,7 @@ from slam.association.matching import Matches
 from slam.association.recovery import Localisation
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
-from slam.robot import Scan
+from slam.robot import RobotSpec, Scan
 
 from .colours import WallColours
 
@@ -97,13 +97,14 @@ class DrawnStep:
     swept: Swept | None
     path_length_m: float
     seconds: float
+    robot: RobotSpec
 
 
 class Keeper:
     """Keeps of the steps of one back end what is drawn."""
 
     def __init__(self) -> None:
-        self._own = FreeSpace(FreeSpaceConfig(cell_m=OWN_CELL_M))
+        self._own: FreeSpace | None = None
         self._graph_shown: tuple[object, bytes] = ((), b"")
         self._colours = WallColours()
         self._coloured = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint32))
@@ -134,6 +135,7 @@ class Keeper:
             swept=self._swept(step, last),
             path_length_m=step.path_length_m,
             seconds=step.seconds,
+            robot=step.robot,
         )
 
     def _recoloured(self, ids: Int[np.ndarray, " n"], colours: UInt32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -158,7 +160,7 @@ class Keeper:
     def _swept(self, step: Step, last: bool) -> Swept | None:
         free_space = step.free_space
         if not free_space.evidence.size:
-            free_space = self._own
+            free_space = self._own = self._own or FreeSpace(FreeSpaceConfig(step.robot, OWN_CELL_M))
             if last or step.index % EVERY_OWN_SCAN == 0:
                 free_space.integrate(step.pose_world, step.scan)
         if not last and step.index % EVERY_SWEPT:

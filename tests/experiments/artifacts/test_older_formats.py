@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from experiments.artifacts.formats import CONFIG, FORMATS
+from experiments.artifacts.older import RENAMED
 from experiments.artifacts.saved import read_config
-from experiments.artifacts.settings import RENAMED, defaults, leaves
+from experiments.artifacts.settings import defaults, leaves
 from experiments.commands.cli import main
 from experiments.commands.view import recordings_at
 

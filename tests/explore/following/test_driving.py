@@ -15,6 +15,7 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 few = settings(max_examples=80, deadline=None, derandomize=True)
 CONFIG = DrivingConfig()
+AT_AXLE = CONFIG.robot.scanner
 BEARINGS = -np.pi + np.arange(180) * np.deg2rad(2.0)
 
 
@@ -51,9 +52,9 @@ def test_the_disc_keeps_clear_of_all_returns_on_the_whole_step(seed):
     ranges[rng.random(180) < rng.uniform(0, 0.95)] = np.inf
     scan = scan_of(ranges)
     command = pilot.command(pose, scan, grid)
-    if command is None or command.forward_m == 0.0 or not len(returns(scan)):
+    if command is None or command.forward_m == 0.0 or not len(returns(scan, AT_AXLE)):
         return
-    points = returns(scan)
+    points = returns(scan, AT_AXLE)
     places = np.stack([arc(s * command.forward_m, s * command.turn_rad)[:2] for s in np.linspace(0, 1, 100)])
     gap = np.hypot(*np.moveaxis(points - places[:, None], -1, 0))
     now = gap[0].min()
@@ -75,7 +76,7 @@ def test_no_step_leads_nearer_to_a_lone_corner_that_is_within_the_margin(ahead, 
     command = pilot_to(np.array([1.0, 0.0]), pose, grid).command(pose, scan, grid)
     assert command is not None
     places = np.stack([arc(s * command.forward_m, s * command.turn_rad)[:2] for s in np.linspace(0, 1, 50)])
-    gap = np.hypot(*(returns(scan)[0] - places).T)
+    gap = np.hypot(*(returns(scan, AT_AXLE)[0] - places).T)
     assert gap.min() >= gap[0] - 5e-4  # between the samples of its own check
 
 
@@ -107,7 +108,7 @@ def test_what_was_hit_before_is_kept_in_the_robots_frame(seed):
     at = rng.choice(180, 5, replace=False)
     ranges[at] = rng.uniform(0.2, 0.8, 5)
     scan = scan_of(ranges)
-    seen = returns(scan)[np.hypot(*returns(scan).T) < 0.2 + NEAR_BEYOND_M]
+    seen = returns(scan, AT_AXLE)[np.hypot(*returns(scan, AT_AXLE).T) < 0.2 + NEAR_BEYOND_M]
     recent.see(scan)
     pose = np.zeros(3)
     for motion in rng.uniform(-0.2, 0.2, (3, 3)):
@@ -199,7 +200,7 @@ def test_between_two_walls_the_mean_of_five_scans_is_nearer_to_the_truth_than_on
         recent = AccumulatedReturns()
         for _ in range(SCANS):
             recent.see(between(0.45, rng))
-        points = returns(between(0.45, rng))
+        points = returns(between(0.45, rng), AT_AXLE)
         widths.append(
             [seen[seen[:, 1] > 0, 1].min() - seen[seen[:, 1] < 0, 1].max()]
             for seen in (points, steadied(points, recent.points_robot))

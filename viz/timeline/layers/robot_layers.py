@@ -5,6 +5,7 @@ import rerun as rr
 from jaxtyping import Float
 
 from slam.geometry.lines import directions, normals
+from slam.geometry.poses import to_world
 
 from ... import palette
 from ...shapes import ellipses, spread
@@ -107,4 +108,5 @@ class ScanLayer:
         seen = np.isfinite(ranges)
         row, beam = np.nonzero(seen)
         along = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-        self._out.points(f"{self._entity}/scan", block.moments, seen.sum(axis=1), ranges[row, beam, None] * along[beam])
+        points = to_world(ranges[row, beam, None] * along[beam], block.rows[0].robot.scanner.pose_robot)
+        self._out.points(f"{self._entity}/scan", block.moments, seen.sum(axis=1), points)
