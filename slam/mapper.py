@@ -26,7 +26,7 @@ from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
 from .map.vertices import VerticesConfig, laid_across, mistaken, vertices_within
 from .map_keeper import MapKeeper
-from .robot import Odometry, Scan
+from .robot import Odometry, RobotError, Scan
 
 NONE = np.zeros(0, dtype=np.int64)
 """No rows."""
@@ -105,7 +105,12 @@ class Mapper:
         return belief_of_body(self.backend.belief, self.config.robot.scanner)
 
     def predict(self, odometry: Odometry) -> None:
-        """Move the robot's estimate by the odometry."""
+        """Move the robot's estimate by the odometry; raises RobotError for a motion that states no error at all."""
+        if not odometry.states_its_error:
+            raise RobotError(
+                "expected the covariance of a motion's error, found zero: state how far the wheels slip, 1e-6 m and rad"
+                " at least"
+            )
         odometry = odometry_of_scanner(odometry, self.config.robot.scanner)
         self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
         self.backend.predict(self._odometry)

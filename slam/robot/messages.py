@@ -1,0 +1,186 @@
+"""What passes between a robot and this software: a scan and odometry come, a motion command goes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from .spec import RobotError
+
+FEW_BEAMS, FEW_SHARE = 3, 0.1
+"""More returns at exactly the maximum range than both of these are none."""
+UNEVEN = 0.05
+"""Beams are evenly spaced where each step is the mean one to within this share of it."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One turn of the range finder, in its own frame: where it sits on the body says `RobotSpec`.
+
+    Raises RobotError for what no scan is. `Scan.ordered` takes bearings as drivers give them.
+    """
+
+    bearings_rad: Float[np.ndarray, " k"]
+    """Strictly increasing, evenly spaced beam directions, counter-clockwise from straight ahead."""
+    ranges_m: Float[np.ndarray, " k"]
+    """Distance along each beam. As ROS drivers say it (REP 117): +inf where nothing came back, NaN where the beam tells
+    nothing, as below the scanner's minimum range."""
+    sigma_m: float | Float[np.ndarray, " k"]
+    """Standard deviation of the radial error, one for all beams or one for each."""
+    range_max_m: float
+    """Returns beyond this are rejected; a beam without a return is free up to here."""
+    time_s: float
+    """When the scan was complete."""
+    sigma_share: float = 0.0
+    """Standard deviation as a share of the range, beside `sigma_m`; both add by squares."""
+
+    def __post_init__(self) -> None:
+        """Raise RobotError for bearings out of order and for returns that are none."""
+        _check_bearings(self.bearings_rad, len(self.ranges_m))
+        none = "give +inf for a beam without a return, NaN for one that tells nothing"
+        if count := int(np.count_nonzero(self.ranges_m <= 0.0)):
+            raise RobotError(f"expected ranges above 0 m, found {count} of {len(self.ranges_m)} at 0 or below: {none}")
+        count = int(np.count_nonzero(self.ranges_m == self.range_max_m))
+        if count > max(FEW_BEAMS, FEW_SHARE * len(self.ranges_m)):
+            raise RobotError(
+                f"expected returns, found {count} at exactly the maximum of {self.range_max_m:g} m: {none}"
+            )
+        if not self.range_max_m > 0.0 or not np.all(np.asarray(self.sigma_m) >= 0.0):
+            raise RobotError(
+                "expected a maximum range above 0 m and a noise of 0 m or more, found others: correct them"
+            )
+
+    @classmethod
+    def ordered(
+        cls,
+        bearings_rad: Float[np.ndarray, " k"],
+        ranges_m: Float[np.ndarray, " k"],
+        sigma_m: float | Float[np.ndarray, " k"],
+        range_max_m: float,
+        time_s: float,
+        sigma_share: float = 0.0,
+    ) -> "Scan":
+        """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first."""
+        bearings = np.unwrap(bearings_rad)
+        beams = np.arange(len(bearings))
+        if len(bearings) > 1 and bearings[-1] < bearings[0]:
+            beams = beams[::-1]
+        if len(beams) > 2 and abs(bearings[-1] - bearings[0]) > 2 * np.pi - 0.5 * abs(bearings[1] - bearings[0]):
+            beams = beams[:-1]
+        sigma = sigma_m if isinstance(sigma_m, float) else sigma_m[beams]
+        return cls(bearings[beams], ranges_m[beams], sigma, range_max_m, time_s, sigma_share)
+
+    @cached_property
+    def passed_m(self) -> Float[np.ndarray, " k"]:
+        """How far each beam surely went on, m: to its return, or to the maximum range; 0 where it tells nothing.
+
+        Scanners lose single returns. So a beam without one went on only where both its neighbours have none either.
+        """
+        before, after = self._beside
+        sure = np.isposinf(self.ranges_m) & np.isposinf(before) & np.isposinf(after)
+        return np.where(np.isfinite(self.ranges_m), self.ranges_m, np.where(sure, self.range_max_m, 0.0))
+
+    @cached_property
+    def shown_m(self) -> Float[np.ndarray, " k"]:
+        """How far each beam shows free floor, m; where a return is missing alone, the nearer of its neighbours' says.
+
+        0 where beams tell nothing.
+        """
+        before, after = self._beside
+        lone = ~np.isfinite(self.ranges_m) & np.isfinite(np.maximum(before, after))
+        free = np.where(np.isposinf(self.ranges_m), self.range_max_m, self.ranges_m)
+        shown = np.where(lone, np.minimum(before, after), free)
+        return np.where(np.isnan(shown), 0.0, shown)
+
+    @cached_property
+    def _beside(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+        """Return the ranges of the beams before and after each; +inf beyond the ends of less than a full turn."""
+        first, last = (self.ranges_m[0], self.ranges_m[-1]) if self.is_full_turn else (np.inf, np.inf)
+        around = np.concatenate([[last], self.ranges_m, [first]])
+        return around[:-2], around[2:]
+
+    @property
+    def sigmas_m(self) -> Float[np.ndarray, " k"]:
+        """The standard deviation of each beam's radial error, m; at its measured range, where noise grows with it."""
+        sigmas = np.broadcast_to(np.asarray(self.sigma_m, dtype=np.float64), self.ranges_m.shape)
+        if self.sigma_share <= 0.0:
+            return sigmas
+        return np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
+
+    @property
+    def is_full_turn(self) -> bool:
+        """Whether the first beam follows the last one (a 360 degree scanner)."""
+        step = (self.bearings_rad[-1] - self.bearings_rad[0]) / (len(self.bearings_rad) - 1)
+        return bool(len(self.bearings_rad) * step > 2 * np.pi - 0.5 * step)
+
+
+def _check_bearings(bearings_rad: Float[np.ndarray, " k"], count: int) -> None:
+    """Raise RobotError where beams are not evenly spaced in ascending order over at most one turn."""
+    found, todo = "", "`Scan.ordered` puts them in order"
+    if len(bearings_rad) != count or count < 2:
+        found, todo = f"{len(bearings_rad)} bearings of {count} ranges", "give as many of both, two at least"
+    elif not np.all(np.isfinite(bearings_rad)):
+        found, todo = "some that are no numbers", "correct them"
+    else:
+        steps = np.diff(bearings_rad)
+        mean = float(steps.sum()) / (count - 1)
+        if mean <= 0.0:
+            found = "descending ones"
+        elif np.abs(steps - mean).max() > UNEVEN * mean:
+            found = f"steps of {np.rad2deg(steps.min()):.3g} to {np.rad2deg(steps.max()):.3g} degrees"
+        elif mean * count > 2 * np.pi + 0.5 * mean:
+            found = (
+                f"{np.rad2deg(mean * (count - 1)):.5g} degrees from the first to the last: a beam stands there twice"
+            )
+    if found:
+        raise RobotError(
+            f"expected bearings in ascending order, evenly spaced over a turn at most, found {found}: {todo}"
+        )
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Motion since the last step as the robot measured it, in the robot frame before the motion.
+
+    Raises RobotError for numbers that are none.
+    """
+
+    motion: Float[np.ndarray, "3"]
+    """x m, y m, heading rad."""
+    cov: Float[np.ndarray, "3 3"]
+    """Covariance of the motion's error, in the same frame."""
+    touched: bool = False
+    """A bumper says that the body met something on the way; a robot without one never says so."""
+
+    def __post_init__(self) -> None:
+        """Raise RobotError for numbers that are none."""
+        if not (np.all(np.isfinite(self.motion)) and np.all(np.isfinite(self.cov))):
+            raise RobotError("expected odometry of finite numbers, found others: correct what the wheels report")
+
+    @property
+    def states_its_error(self) -> bool:
+        """Whether anything of a motion is said to be uncertain; a rest may be certain."""
+        return bool(np.any(self.cov.diagonal() > 0.0)) or not np.any(self.motion)
+
+
+@dataclass(frozen=True)
+class MotionCommand:
+    """One step of driving: an arc of constant curvature."""
+
+    forward_m: float
+    turn_rad: float
+
+
+@runtime_checkable
+class Robot(Protocol):
+    """Anything that senses and drives: the simulated robot, a recorded one, or real hardware."""
+
+    def sense(self) -> Scan:
+        """Return the scan at the present place."""
+        ...
+
+    def drive(self, command: MotionCommand) -> Odometry:
+        """Carry out one command and return the odometry."""
+        ...
