@@ -71,7 +71,11 @@ heading: setup
 adaptive: setup
 	$(BIN)/python -m studies.exploration.adaptive --out results/adaptive.jsonl
 
-.PHONY: scanners
+.PHONY: scanners bodies
+
+# Other bodies, and scanners off the axle; begun again, it goes on where it was.
+bodies: setup
+	$(BIN)/python -m studies.exploration.bodies --plans $(PLANS)
 
 # Other scanners and their faults, in one world; begun again, it goes on where it was.
 scanners: setup
