@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from sim.chance import Channel, standard_normals
 from slam.estimation.backend import Backend, Joint, Observations
+from slam.estimation.mounting import odometry_of_scanner, scanner_poses
 from slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
@@ -96,9 +97,14 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
 
     Raises UsageError for a world that cannot be loaded.
     """
-    trial, recording = run.trial, run.recording
+    trial, recording, scanner = run.trial, run.recording, run.trial.robot.scanner
+    poses_world = scanner_poses(run.true_poses_world, trial.robot.true_scanner)
+    reported = [
+        odometry_of_scanner(Odometry(*each), scanner)
+        for each in zip(recording.odometry, recording.odometry_cov, strict=True)
+    ]
     world = load_world(trial.world, trial.start, trial.scale)
-    witness = Witness(truth_of(world, trial.robot), run.true_poses_world, run.true_face_of_beam)
+    witness = Witness(truth_of(world, trial.robot), poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
     rules, extraction = trial.mission.mapper.walls, trial.mission.mapper.extraction
     reliability = Reliability(rules.reliability)
@@ -118,14 +124,13 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         begun = begun[~segments.is_tentative[begun]]
         owned = known & ~segments.is_tentative
         owned[begun] = True
-        reliability.see(segments, np.where(owned, walls, -1), run.true_poses_world[k])
+        reliability.see(segments, np.where(owned, walls, -1), poses_world[k])
         looks = _looks(segments, walls).take(seen)
         again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.reliability)))
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
-    return DriveObservations(
-        recording.odometry, recording.odometry_cov, tuple(again), tuple(first), run.true_poses_world, true_lines
-    )
+    motions, covs = np.array([each.motion for each in reported]), np.array([each.cov for each in reported])
+    return DriveObservations(motions, covs, tuple(again), tuple(first), poses_world, true_lines)
 
 
 def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> ScanObservations:

@@ -62,7 +62,7 @@ def read_real_run(
 ) -> RealRun:
     """Read a log of a real robot; raises UsageError, in one line, where not one scan of it can be used.
 
-    `robot` holds settings of what the robot states.
+    `robot` holds settings of what the robot states. Where its scanner sits the log itself has told.
     """
     if options.every < 1:
         raise UsageError(f"expected each keyframe or one of so many, found --every {options.every}: give 1 or more")
@@ -72,7 +72,8 @@ def read_real_run(
         raise UsageError(str(error)) from error
     plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
-    return RealRun(path.name, log, trial_of(record_of(plain), robot, asked(config, sets, settled)), options)
+    at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
+    return RealRun(path.name, log, trial_of(record_of(plain), robot, at_axle, asked(config, sets, settled)), options)
 
 
 class RealRobot(RecordedRobot):
@@ -121,5 +122,5 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, log.estimated_world[:, :2])
     summary = summarise_unwitnessed(scenario, log, votes, last, ending)
     summary |= {"certificate": certificate_record(certificate)}
-    smoothed = smooth(made, last.map, log.unstated_motion)
+    smoothed = smooth(made, last.map, log.unstated_motion, config.robot.scanner)
     return TrialResult(scenario, ending, log, votes, last, recorder.joint, certificate, summary, smoothed, run.log)

@@ -12,7 +12,7 @@ SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
 NEAR_BEYOND_M = 0.4
 """Returns farther off the body than this matter to no step from here."""
-SAME_RAD, SAME_M = float(np.deg2rad(1.2)), 0.04
+SAME_STEPS, SAME_SIGMAS = 0.6, 4.0
 """Returns of two scans so near in bearing and distance are of one place: half a beam's step, and four sigmas."""
 
 
@@ -40,18 +40,20 @@ class AccumulatedReturns:
 
 
 def steadied(
-    points_robot: Float[np.ndarray, "m 2"], recent_robot: Float[np.ndarray, "r 2"], robot: RobotSpec = RobotSpec()
+    scan: Scan, recent_robot: Float[np.ndarray, "r 2"], robot: RobotSpec = RobotSpec()
 ) -> Float[np.ndarray, "m 2"]:
-    """Return points of a scan, those nearby at the mean of the distances that the last scans had there, m.
+    """Return the points that a scan hit, those nearby at the mean of the distances that the last scans had there, m.
 
     Between two walls the nearest of a dozen noisy returns on each side are 2.5 cm nearer than the walls.
     """
+    points_robot = returns(scan, robot.scanner)
     (rho, bearing), (before, at) = (
         (np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])) for points in (points_robot, recent_robot)
     )
     near = rho < robot.beyond(NEAR_BEYOND_M)
     turn = np.abs(wrap(bearing[near, None] - at))
-    same = (turn < SAME_RAD) & (np.abs(rho[near, None] - before) < SAME_M)
+    same_m = SAME_SIGMAS * scan.sigmas_m[np.isfinite(scan.ranges_m)][near, None]
+    same = (turn < SAME_STEPS * scan.step_rad) & (np.abs(rho[near, None] - before) < same_m)
     mean = rho.copy()
     mean[near] = (rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))
     return points_robot * (mean / np.maximum(rho, 1e-9))[:, None]

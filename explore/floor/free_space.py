@@ -62,6 +62,8 @@ class FreeSpace:
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: _Box | None = None
         self._too_tight = np.zeros((0, 2))
+        self.range_m = np.inf
+        """Maximum range of the last scan."""
 
     def note_too_tight(self, place_world: Float[np.ndarray, "2"]) -> None:
         """Remember that the body did not get through a narrow place, once for each."""
@@ -175,6 +177,7 @@ class FreeSpace:
         body_world = pose_world[:2]
         if not scanner.is_at_axle:
             pose_world = compose(pose_world, scanner.pose_robot)
+        self.range_m = scan.range_max_m
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
         reach = scan.shown_m

@@ -137,7 +137,7 @@ class Pilot:
         points, ahead = returns(scan, self._config.robot.scanner), self._aim(pose_world, self._config.lookahead_m)
         aim, gap_m, narrow = _centred(ahead, points, self._config)
         if gap_m < self._config.narrow_m:
-            steady = steadied(points, recent_robot, self._config.robot)
+            steady = steadied(scan, recent_robot, self._config.robot)
             aim, gap_m, narrow = _centred(ahead, steady, self._config)
         points = np.concatenate([steady if narrow else points, _NOTHING if narrow else recent_robot, touched_robot])
         if gap_m < self._config.narrow_m:

@@ -271,7 +271,7 @@ class EndErrand(Errand):
 
     def _plan_anywhere(self, around: Surroundings, planner: Planner) -> bool:
         """No ideal place can be reached: any place that sees the end will do."""
-        for reach in (self._config.viewpoints.near_m, self._config.viewpoints.far_m):
+        for reach in (self._config.viewpoints.near_m, self._config.viewpoints.farthest_m(around.scan.range_max_m)):
             places = places_that_see(self.end, around.free_space, planner, reach, self._config.viewpoints)
             if self._drive(around, planner, self._fresh(places)):
                 self.doing = f"to where the open end of wall {self.end.wall} can be seen"

@@ -63,8 +63,8 @@ class Sweep:
 
     def _beside_walls(self, situation: Situation, *, only_near: bool) -> dict[Place, Place]:
         """Return where to go with walls in sight, each with the unseen floor that is seen from there."""
-        floor, coast_m = situation.around.free_space, situation.following.paths.coast_m
-        reach_m = self._config.reach * situation.around.scan.range_max_m
+        floor, range_m = situation.around.free_space, situation.around.scan.range_max_m
+        coast_m, reach_m = situation.following.paths.coast_of(range_m), self._config.reach * range_m
         walls, found = TrustedWalls(situation.map), {}
         for place in situation.frontiers_near if only_near else situation.frontiers:
             if np.all(walls.near(place.points_world, coast_m)):

@@ -16,6 +16,8 @@ from .coarse_grid import block_cells, blocks_with_any, cells_of
 
 BESIDE_M = 1.0
 """Paths are sought so far to each side of the shortest way by blocks."""
+COAST_SHARE = 0.75
+"""Of the scanner's range: farther from walls than this it sees too few beams of them."""
 ESCAPE_COST = 30.0
 """What a metre costs where the robot gets away from a wall that it is too near to."""
 
@@ -40,11 +42,16 @@ class PathConfig:
     narrow_cost: float = 4.0
     """A metre at the least clearance costs this much more than one at the stand-off."""
     coast_m: float = 3.0
-    """Farther than this from any wall the scanner shows too little to tell where the robot is, ..."""
+    """Farther than this from any wall, or than three quarters of its range, the scanner shows too little to tell where
+    the robot is, ..."""
     blind_cost: float = 4.0
     """... and a metre costs so much more: a way along the walls is worth a detour."""
     escape_beyond_m: float = 0.1
     """So far around the body free cells count as passable however near a wall is: it may have to get away."""
+
+    def coast_of(self, range_m: float) -> float:
+        """Return how far from walls a scanner of this range shows enough of them."""
+        return min(self.coast_m, COAST_SHARE * range_m)
 
     @property
     def squeeze_m(self) -> float:
@@ -297,7 +304,8 @@ def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathCo
     """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
     block = block_cells(config.robot.radius_m, free_space.config.cell_m)
     side_m = block * free_space.config.cell_m
-    beside = int(np.ceil(config.coast_m / side_m))
+    coast_m = config.coast_of(free_space.range_m)
+    beside = int(np.ceil(coast_m / side_m))
     (r0, r1, _), (c0, c1, _) = (part.indices(size) for part, size in zip(box, free_space.shape, strict=True))
     above, left = min(beside, r0 // block), min(beside, c0 // block)
     rows = slice(r0 - block * above, r1 + block * beside)
@@ -307,7 +315,7 @@ def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathCo
     if not hit.any():
         return np.ones(shape, dtype=bool)
     distance = distance_transform_edt(~hit, sampling=side_m)
-    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > config.coast_m)
+    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > coast_m)
 
 
 def roomy(

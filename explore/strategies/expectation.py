@@ -13,13 +13,14 @@ from jaxtyping import Float, Int
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import J
 from slam.map.stochastic_map import StochasticMap
+from slam.robot import WheelSpec
 
 POSE = 3
 """Rows of the pose in the joint state."""
 OBSERVATION_SIGMAS = np.array([0.005, 0.004])
 """What one look at a wall leaves open: its direction rad, its distance m."""
-DRIFT_SIGMAS = np.array([0.02, 0.02, 0.07])
-"""What each root metre of the way adds to the pose (m, m, rad): odometry that slips while walls hold the heading."""
+SIGHT_SHARE = 0.875
+"""Walls within this share of the scanner's range are expected to be seen: 3.5 m of 4 m."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def walls_seen_from(
     graph: nx.DiGraph[int],
     wall: int,
     place_world: Float[np.ndarray, 2],
-    reach_m: float = 3.5,
+    reach_m: float,
     most: int = 8,
 ) -> Int[np.ndarray, " m"]:
     """Return the ids of the nearest walls that can be seen from a place beside `wall`, by the visibility graph."""
@@ -62,11 +63,15 @@ def walls_seen_from(
 
 
 def expect(
-    walls: StochasticMap, seen: Int[np.ndarray, " m"], place_world: Float[np.ndarray, 2], metres: float
+    walls: StochasticMap,
+    seen: Int[np.ndarray, " m"],
+    place_world: Float[np.ndarray, 2],
+    metres: float,
+    wheels: WheelSpec = WheelSpec(),
 ) -> Expectation:
     """Return what is expected of driving `metres` to a place and looking at some walls from there."""
     joint = walls.belief.joint(seen)
-    cov = _on_arrival(joint.cov, place_world - walls.belief.pose_world[:2], metres)
+    cov = _on_arrival(joint.cov, place_world - walls.belief.pose_world[:2], metres, drift_sigmas(wheels))
     H = _looks(walls, seen, place_world)
     R = np.diag(np.tile(OBSERVATION_SIGMAS**2, len(seen)))
     PHt = cov @ H.T
@@ -75,12 +80,23 @@ def expect(
     return Expectation(after[:POSE, :POSE], float(max(gain, 0.0)) if np.isfinite(gain) else 0.0)
 
 
-def _on_arrival(cov: Float[np.ndarray, "s s"], way: Float[np.ndarray, 2], metres: float) -> Float[np.ndarray, "s s"]:
+def drift_sigmas(wheels: WheelSpec) -> Float[np.ndarray, 3]:
+    """Return what each root metre of the way adds to the pose (m, m, rad), to one digit of the turn.
+
+    The wheels slip while walls hold the heading.
+    """
+    turn = float(f"{np.hypot(wheels.slip, wheels.slip) / wheels.base_m:.0e}")
+    return np.array([wheels.slip, wheels.slip, turn])
+
+
+def _on_arrival(
+    cov: Float[np.ndarray, "s s"], way: Float[np.ndarray, 2], metres: float, drift: Float[np.ndarray, 3]
+) -> Float[np.ndarray, "s s"]:
     """Move the pose of a joint covariance: an error of heading turns the way, and the way adds drift."""
     F = np.eye(len(cov))
     F[:2, 2] = J @ way
     moved = F @ cov @ F.T
-    moved[np.arange(POSE), np.arange(POSE)] += DRIFT_SIGMAS**2 * metres
+    moved[np.arange(POSE), np.arange(POSE)] += drift**2 * metres
     return moved
 
 

@@ -1,16 +1,15 @@
 """The open end with the best expected gain for its way, by the joint covariance (D-optimality; docs/exploration.md)."""
 
 import numpy as np
+from jaxtyping import Float
 
 from slam.geometry.lines import directions
 from slam.map.chains import HEAD, OpenEnd
 
 from ..survey.viewpoints import ideal_places
-from .expectation import OBSERVATION_SIGMAS, Expectation, expect, walls_seen_from
+from .expectation import OBSERVATION_SIGMAS, SIGHT_SHARE, Expectation, expect, walls_seen_from
 from .strategy import Choice, Situation
 
-UNKNOWN_WALL = np.diag([np.pi**2, 4.0**2]) / 12.0
-"""Covariance of a wall of which only the range finder's range is known: any direction, any distance up to 4 m."""
 LOOKING_M = 2.0
 """What looking at an end costs wherever it is: the way in front of it, past and round it."""
 WEIGHED = 16
@@ -40,9 +39,15 @@ class Uncertainty:
 def _gain(situation: Situation, end: OpenEnd, metres: float) -> tuple[float, float]:
     """Return the nats expected of the wall that goes on at an end, and of the walls known there."""
     place = ideal_places(end, situation.map, situation.following.viewpoints)[0]
-    seen = walls_seen_from(situation.map, situation.graph, end.wall, place)
-    expected = expect(situation.map, seen, place, metres)
+    reach_m = SIGHT_SHARE * situation.around.scan.range_max_m
+    seen = walls_seen_from(situation.map, situation.graph, end.wall, place, reach_m)
+    expected = expect(situation.map, seen, place, metres, situation.following.robot.wheels)
     return new_wall_nats(situation, end, expected), expected.map_gain_nats
+
+
+def unknown_wall(range_m: float) -> Float[np.ndarray, "2 2"]:
+    """Return the covariance of a wall of which only the scanner's range is known: any direction, any distance to it."""
+    return np.diag([np.pi**2, range_m**2]) / 12.0
 
 
 def new_wall_nats(situation: Situation, end: OpenEnd, expected: Expectation) -> float:
@@ -51,4 +56,6 @@ def new_wall_nats(situation: Situation, end: OpenEnd, expected: Expectation) -> 
     ahead = directions(situation.map.belief.means[row, 0])[0] * (1.0 if end.side == HEAD else -1.0)
     G = np.array([[0.0, 0.0, 1.0], [ahead[0], ahead[1], 0.0]])
     entered = G @ expected.pose_cov @ G.T + np.diag(OBSERVATION_SIGMAS**2)
-    return float(0.5 * (np.linalg.slogdet(UNKNOWN_WALL)[1] - np.linalg.slogdet(entered)[1]))
+    return float(
+        0.5 * (np.linalg.slogdet(unknown_wall(situation.around.scan.range_max_m))[1] - np.linalg.slogdet(entered)[1])
+    )

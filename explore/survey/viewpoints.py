@@ -14,6 +14,9 @@ from ..floor.free_space import FreeSpace
 from ..planning.paths import Planner
 from ..planning.sight import cells_within, sees
 
+FAR_SHARE = 0.875
+"""Nothing is looked at from beyond this share of the scanner's range: 3.5 m of 4 m."""
+
 
 @dataclass(frozen=True)
 class ViewpointsConfig:
@@ -29,7 +32,7 @@ class ViewpointsConfig:
     near_m: float = 1.2
     """Where none of the ideal places can be reached, any place within this that sees the end."""
     far_m: float = 3.5
-    """And where there is none, any place within this."""
+    """And where there is none, any place within this, and not too far for the scanner."""
     short_m: float = 0.12
     """A line of sight need not come nearer than this to the end itself."""
 
@@ -37,6 +40,10 @@ class ViewpointsConfig:
     def standoff_m(self) -> float:
         """Distance of the middle of the body at which a wall is followed."""
         return self.robot.beyond(self.standoff_beyond_m)
+
+    def farthest_m(self, range_m: float) -> float:
+        """Return the farthest place from which an end is looked at by a scanner of this range."""
+        return min(self.far_m, FAR_SHARE * range_m)
 
     @property
     def close_m(self) -> float:

@@ -59,7 +59,7 @@ def _without_leaps(segments: Segments, scan: Scan, config: ExtractionConfig) -> 
 
 def beam_step(scan: Scan) -> float:
     """Return the angle between neighbouring beams, rad."""
-    return float((scan.bearings_rad[-1] - scan.bearings_rad[0]) / max(len(scan.bearings_rad) - 1, 1))
+    return scan.step_rad
 
 
 def beam_spacing(scan: Scan, segments: Segments) -> Float[np.ndarray, "n 2"]:

@@ -9,7 +9,7 @@ DRIVING = (
     Switch("driving.obstructed", "explore.following.driving",
            "return bool(gap.size) and «float(np.hypot(gap[..., 0], gap[..., 1]).min()) < self._config.obstructed_m»",
            "False", "a return on the path ahead ends it"),
-    Switch("driving.steadied", "explore.following.driving", "steady = «steadied(points, recent_robot)»",
+    Switch("driving.steadied", "explore.following.driving", "«steadied(scan, recent_robot, self._config.robot)»",
            "points", "a narrow gap is measured by five scans"),
     Switch("driving.recent", "explore.following.driving", "«_NOTHING if narrow else recent_robot», touched_robot",
            "_NOTHING", "returns of the last scans count, too"),

@@ -200,10 +200,11 @@ def test_between_two_walls_the_mean_of_five_scans_is_nearer_to_the_truth_than_on
         recent = AccumulatedReturns()
         for _ in range(SCANS):
             recent.see(between(0.45, rng))
-        points = returns(between(0.45, rng), AT_AXLE)
+        scan = between(0.45, rng)
+        points = returns(scan, AT_AXLE)
         widths.append(
             [seen[seen[:, 1] > 0, 1].min() - seen[seen[:, 1] < 0, 1].max()]
-            for seen in (points, steadied(points, recent.points_robot))
+            for seen in (points, steadied(scan, recent.points_robot))
         )
     raw, steady = (np.array(width) for width in zip(*widths, strict=True))
     assert raw.mean() < 0.425, "so that a door of 0.45 m seems too narrow"
@@ -212,11 +213,27 @@ def test_between_two_walls_the_mean_of_five_scans_is_nearer_to_the_truth_than_on
 
 
 def test_what_is_steadied_keeps_its_bearing_and_what_no_scan_before_saw_there_its_distance():
-    points = np.array([[0.3, 0.0], [0.0, 0.4], [1.5, 0.0]])
-    recent = np.array([[0.32, 0.001], [0.28, 0.0], [0.0, 0.5], [1.6, 0.0]])
-    np.testing.assert_allclose(steadied(points, recent), points, atol=1e-5)
-    np.testing.assert_allclose(steadied(points, recent[:1])[0], [0.31, 0.0], atol=1e-5)
-    np.testing.assert_array_equal(steadied(points, np.zeros((0, 2))), points)
+    ranges = np.full(180, np.nan)
+    ranges[[90, 135, 45]] = 0.3, 0.4, 1.5
+    scan = Scan(np.linspace(-np.pi, np.pi, 180, endpoint=False), ranges, 0.01, 4.0, 0.0)
+    points = returns(scan, AT_AXLE)
+    np.testing.assert_allclose(points, [[0.0, -1.5], [0.3, 0.0], [0.0, 0.4]], atol=1e-9)
+    recent = np.array([[0.32, 0.001], [0.28, 0.0], [0.0, 0.5], [0.0, -1.6]])
+    np.testing.assert_allclose(steadied(scan, recent), points, atol=1e-5)
+    np.testing.assert_allclose(steadied(scan, recent[:1])[1], [0.31, 0.0], atol=1e-5)
+    np.testing.assert_array_equal(steadied(scan, np.zeros((0, 2))), points)
+
+
+def test_what_is_one_place_to_two_scans_follows_from_the_beams_and_their_noise():
+    fine, rough = (
+        Scan(np.linspace(-0.5, 0.5, k), np.where(np.arange(k) == k // 2, 0.3, np.nan), sigma, 4.0, 0.0)
+        for k, sigma in ((1001, 0.002), (11, 0.03))
+    )
+    beside, beyond = np.array([[0.3, 0.003]]), np.array([[0.35, 0.0]])
+    for recent in (beside, beyond):
+        assert np.array_equal(steadied(fine, recent), returns(fine, AT_AXLE))
+        assert not np.array_equal(steadied(rough, recent), returns(rough, AT_AXLE)) or recent is beside
+    np.testing.assert_allclose(steadied(rough, beyond), [[0.325, 0.0]], atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))

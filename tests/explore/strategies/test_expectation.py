@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.strategies.expectation import DRIFT_SIGMAS, OBSERVATION_SIGMAS, expect, position_sigma, walls_seen_from
-from explore.strategies.uncertainty import UNKNOWN_WALL, Uncertainty, new_wall_nats
+from explore.strategies.expectation import OBSERVATION_SIGMAS, drift_sigmas, expect, position_sigma, walls_seen_from
+from explore.strategies.uncertainty import Uncertainty, new_wall_nats, unknown_wall
 from slam.geometry.lines import directions, normals
+from slam.robot import WheelSpec
 
 few = settings(max_examples=25, deadline=None, derandomize=True)
 
@@ -37,7 +38,7 @@ def test_the_expected_pose_and_gain_are_those_of_a_kalman_update_in_information_
     F = np.eye(3 + 2 * m)
     way = place - walls.belief.pose_world[:2]
     F[0, 2], F[1, 2] = -way[1], way[0]
-    prior = F @ joint.cov @ F.T + np.diag(np.append(DRIFT_SIGMAS**2 * metres, np.zeros(2 * m)))
+    prior = F @ joint.cov @ F.T + np.diag(np.append(drift_sigmas(WheelSpec()) ** 2 * metres, np.zeros(2 * m)))
     ends = walls.ends_world[seen]
     along = ends[:, 1] - ends[:, 0]
     share = np.clip(np.sum((place - ends[:, 0]) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
@@ -121,4 +122,9 @@ def test_a_new_wall_is_worth_less_the_worse_the_pose_is_known(scene_of):
         known = expect(scene.walls(pose, scale * cov), np.array([0]), scene.places[0], 0.0)
         nats.append(new_wall_nats(situation, end, known))
     assert nats[0] > nats[1] > nats[2] > 0
-    assert np.linalg.det(UNKNOWN_WALL) > 0
+    assert np.linalg.det(unknown_wall(8.0)) == pytest.approx(4.0 * np.linalg.det(unknown_wall(4.0)))
+
+
+def test_what_a_way_adds_follows_from_the_wheels():
+    np.testing.assert_array_equal(drift_sigmas(WheelSpec()), [0.02, 0.02, 0.07])
+    np.testing.assert_allclose(drift_sigmas(WheelSpec(base_m=0.16, slip=0.001)), [0.001, 0.001, 0.009])
