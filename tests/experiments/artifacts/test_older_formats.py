@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.artifacts.formats import CONFIG, FORMATS
-from experiments.artifacts.older import RENAMED
+from experiments.artifacts.older import MOVED, RENAMED
 from experiments.artifacts.saved import read_config
 from experiments.artifacts.settings import defaults, leaves
 from experiments.commands.cli import main
@@ -36,7 +36,8 @@ def test_settings_that_still_hold_are_kept(name):
     config, known = read_config(STORED / name / CONFIG), dict(leaves(defaults()))
     assert (said["format"], config.format) == (1, 1)
     assert config.unknown == ()
-    assert [group for group in RENAMED.values() if group and not _is_in(group, known)] == []
+    current = [MOVED[group][0] if group in MOVED else group for group in RENAMED.values() if group]
+    assert [group for group in current if not _is_in(group, known)] == []
     assert [group for group in RENAMED if not _is_in(group, dict(leaves(said["trial"])))] == []
     assert config.trial.p0 == said["trial"]["p0"] == ("large" if name == "other" else "small")
     assert config.trial.mission.explorer.sweep is (name == "run")

@@ -7,6 +7,7 @@ from experiments.scenario import TrialConfig
 from experiments.scoring.smoothing import smooth
 from experiments.trial import run_trial
 from slam.backends.graph.isam import Isam
+from slam.robot import ScannerSpec
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -46,4 +47,4 @@ class Broken:
 
 
 def test_a_smoother_that_broke_down_costs_no_results():
-    assert smooth(Broken(), None, np.zeros(3, dtype=bool)) is None
+    assert smooth(Broken(), None, np.zeros(3, dtype=bool), ScannerSpec()) is None
