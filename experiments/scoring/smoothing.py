@@ -32,7 +32,10 @@ def smooth(
     try:
         if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
             return None
-        poses, rows = body_poses(backend.finish(), scanner), np.arange(len(unstated_motion)) + np.cumsum(unstated_motion)
+        poses, rows = (
+            body_poses(backend.finish(), scanner),
+            np.arange(len(unstated_motion)) + np.cumsum(unstated_motion),
+        )
         belief = belief_of_body(backend.belief, scanner)
         if len(poses) <= rows[-1] or not np.array_equal(belief.ids, last.ids):
             return None
