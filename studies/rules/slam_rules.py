@@ -59,7 +59,7 @@ MATCHING = (
     Switch("mapper.lost", "slam.mapper", "scan.range_max_m + «max(self.config.matching.offset_m, lost_m)»",
            "self.config.matching.offset_m", "a robot that is lost looks at walls farther off"),
     Switch("mapper.ambiguity", "slam.mapper",
-           "or «self._ambiguous(view, matches)»)",
+           "or «self._ambiguous(found.view, matches)»)",
            "self._reliable(matches, segments)", "an ambiguous segment is an observation of either"),
     Switch("ambiguity.alike", "slam.association.ambiguity",
            "alike = «(np.abs(turn) <= config.turn_rad) & np.all(np.abs(across) <= config.across_m, axis=1)»",
