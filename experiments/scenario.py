@@ -17,6 +17,7 @@ from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
 from slam.estimation.mounting import start_of_scanner
+from slam.odometry.config import ScanMatchingConfig
 from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
@@ -39,6 +40,8 @@ class MappingMissionConfig(MissionConfig):
     """What rules a mission, and the mapper that is handed to it."""
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
+    scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
+    """Of replays whose odometry is told by the scans."""
 
 
 @dataclass(frozen=True)

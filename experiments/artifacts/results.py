@@ -257,11 +257,18 @@ def steps_csv(log: Log) -> bytes:
 
 def trajectory(result: TrialResult, log: Log, poses_world: Float[np.ndarray, "s 3"]) -> bytes:
     """Return the poses of a run's steps in the TUM format; of a recorded drive those of all its scans, on its clock."""
+    return tum(*path_of(result, log, poses_world))
+
+
+def path_of(
+    result: TrialResult, log: Log, poses_world: Float[np.ndarray, "s 3"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
+    """Return times and poses of a run's path: of its steps, or of all scans of a recorded drive, on its own clock."""
     recorded = result.recorded
     if recorded is None:
-        return tum(log.time_s, poses_world)
+        return log.time_s, poses_world
     scans = recorded.poses_of_scans(poses_world)
-    return tum(recorded.scan_time_s[: len(scans)], scans)
+    return recorded.scan_time_s[: len(scans)], scans
 
 
 def wheels_alone(log: Log, recorded: RecordedLog) -> Float[np.ndarray, "s 3"]:

@@ -15,13 +15,15 @@ from slam.backends import BACKENDS
 from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
+from ..replays.measured import held_against
 from ..replays.real_log import RealOptions, read_real_run
-from ..replays.replay import Association, ReplayOptions, read_run, retuned
+from ..replays.replay import Association, OdometrySource, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
 from ..scenario import load_world
+from ..scoring.references import read_references
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
-from ..terminal.progress import print_comparison, print_recorded, progress
+from ..terminal.progress import print_comparison, print_recorded, print_references, progress
 from ..trial import TrialResult
 from ..usage import UsageError, choose
 from ..views.timelines import TimelineOutput
@@ -44,8 +46,16 @@ class Replay:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
+    odometry: OdometrySource | None = None
+    """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
+    matching*). By default the wheels of a simulated run and the scans of a real robot's log."""
     every: int = 1
     """Of a real robot's log, map one of so many keyframes (the scans that are 0.1 m or 5 degrees apart)."""
+    relations: Path | None = None
+    """Relations between poses that others measured, `t1 t2 x y z roll pitch yaw` on each line: how far is the path
+    from them?"""
+    reference: Path | None = None
+    """A path that others measured, in the TUM format or `t x y theta` on each line: how far is the path from it?"""
     robot: str | None = None
     """What the robot states of itself, in place of what the run's says: a bundled robot (paper, turtlebot,
     front-scanner) or a YAML file (docs/robots.md), of which the devices are left aside: the log has settled them."""
@@ -66,6 +76,7 @@ class Replay:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         for name in self.backend:
             choose("back end", name, BACKENDS)
+        references = read_references(self.relations, self.reference)
         source = self._source()
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
@@ -83,7 +94,7 @@ class Replay:
             recording = self._timeline(source)
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
-                result = self._one(source, name, recording)
+                result = held_against(self._one(source, name, recording), references)
                 settle(folder, configs[name])
                 problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)
@@ -92,6 +103,7 @@ class Replay:
                     break
             problems += recording.close()
         self._print(source, summaries)
+        print_references(summaries)
         print(f"results in {out}")
         for problem in problems:
             print(f"chainslam: not written: {problem}", file=sys.stderr)
@@ -103,14 +115,18 @@ class Replay:
             if self.every != 1:
                 raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
             run = retuned(read_run(self.log), self.config, self.set, robot)
-            options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry)
+            options = ReplayOptions(
+                self.association, self.perfect_extraction, self.perfect_odometry, self.odometry or "wheels"
+            )
             return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.scale))
         if self.association != "own" or self.perfect_extraction or self.perfect_odometry:
             raise UsageError(
                 "expected a log that knows the truth for --association true, --perfect-extraction and"
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
-        real = RealLog(read_real_run(self.log, RealOptions(self.every), self.config, self.set, robot))
+        real = RealLog(
+            read_real_run(self.log, RealOptions(self.every, self.odometry or "scans"), self.config, self.set, robot)
+        )
         if real.run.log.trouble:
             say(
                 f"chainslam: {self.log.name}, {real.run.log.trouble}: {len(real.run.log.scan_time_s)} scans before it"

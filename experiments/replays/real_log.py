@@ -28,7 +28,7 @@ from ..scoring.summary import odometry_poses
 from ..scoring.unwitnessed import NoVotes, UnwitnessedRecord, no_truth, summarise_unwitnessed, unseen_world
 from ..trial import TrialResult, bare_summary, ride
 from ..usage import UsageError
-from .replay import OPEN_TO_REPLAYS
+from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
 
 START_SIGMAS = (1e-4, 1e-4, 1e-5)
 """The first scan is the map's frame: the pose there is known, m m rad."""
@@ -40,6 +40,8 @@ class RealOptions:
 
     every: int = 1
     """One of so many keyframes is mapped."""
+    odometry: OdometrySource = "scans"
+    """Who tells the motion between two keyframes."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,8 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     scenario = Scenario(config, world, robot, made, None, start, cov)
 
     def mission(scenario: Scenario) -> Iterator[Step]:
-        return ride_mission(robot, Mapper(made, config.mission.mapper), len(run.log.recording))
+        heard = heard_by(run.options.odometry, robot, config)
+        return ride_mission(heard, Mapper(made, config.mission.mapper), len(run.log.recording))
 
     votes = NoVotes(no_truth(world))
     recorder = Recorder(robot, votes)

@@ -28,7 +28,9 @@ from slam.config import MapperConfig
 from slam.estimation.mounting import scanner_poses
 from slam.extraction.extract import extract
 from slam.mapper import Extractor, Mapper
-from slam.robot import MotionCommand, Odometry, Scan
+from slam.odometry.matched_robot import MatchedRobot
+from slam.odometry.scan_matching import ScanMatcher
+from slam.robot import MotionCommand, Odometry, Robot, Scan
 
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import read_config, read_trial
@@ -40,6 +42,7 @@ from ..usage import UsageError
 from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
 
 Association = Literal["own", "true"]
+OdometrySource = Literal["wheels", "scans"]
 _NEVER, _NEVER_M = 10**9, 1e9
 OPEN_TO_REPLAYS = ("mission", "backend_options")
 """The settings that a replay may have of its own; the log has settled all others."""
@@ -55,6 +58,8 @@ class ReplayOptions:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
+    odometry: OdometrySource = "wheels"
+    """Who tells the motion between two scans."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,8 @@ def read_options(config: Path) -> ReplayOptions:
     said = read_config(config).replay
     if said is None:
         return ReplayOptions()
+    if isinstance(said, dict):
+        said = {"odometry": "wheels", **said}  # replays that were made before there was a choice
     with told(config, "keep a run's files together, or make it anew"):
         options: ReplayOptions = fit(ReplayOptions, said, "replay")
     return options
@@ -195,9 +202,14 @@ def replay(
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(METHODS[rules.matching.method].matcher if oracle is None else oracle),
         )
-        return ride_mission(scenario.robot, mapper, len(recording))
+        return ride_mission(heard_by(options.odometry, robot, config), mapper, len(recording))
 
     return run_scenario(scenario, learn, mission)
+
+
+def heard_by(odometry: OdometrySource, robot: Robot, config: TrialConfig) -> Robot:
+    """Return a robot whose motions are told by its wheels, or by its scans."""
+    return robot if odometry == "wheels" else MatchedRobot(robot, ScanMatcher(config.mission.scan_matching))
 
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:

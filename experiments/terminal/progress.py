@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
+from itertools import product
 from typing import Any
 
 from rich.progress import (
@@ -204,6 +205,47 @@ def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
     for name, key in columns.items():
         table.add_row(name, *(_short(summary.get(key)) for summary in summaries))
     plain_console().print(table)
+
+
+def print_references(summaries: Sequence[dict[str, Any]]) -> None:
+    """Print how far each back end is from what others measured, where they did."""
+    for tail in ("", "_smoothed"):
+        smoothed = ", smoothed" if tail else ""
+        told = [s for s in summaries if "relations" + tail in s]
+        for kind, (words, scale) in _KINDS.items() if told else ():
+            title = f"errors of relations{smoothed}: {words}"
+            plain_console().print(_relations(title, kind, scale, [(s["backend"], s["relations" + tail]) for s in told]))
+        told = [s for s in summaries if "reference" + tail in s]
+        if told:
+            title = f"distance from the reference path{smoothed}, m rms"
+            plain_console().print(_reference(title, [(s["backend"], s["reference" + tail]) for s in told]))
+
+
+_KINDS = {"translation_m": ("translation, m", 1.0), "rotation_rad": ("rotation, degrees", 57.29578)}
+_TIMES = {"at_scans": "at scans", "interpolated": "interpolated"}
+
+
+def _relations(title: str, kind: str, scale: float, told: Sequence[tuple[str, dict[str, Any]]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column("", no_wrap=True)
+    for name in ("count", "mean", "median", "sd", "max"):
+        table.add_column(name, justify="right")
+    for name, scores in told:
+        for (times, words), (part, far) in product(_TIMES.items(), (("all", ""), ("far", ", 60 s apart"))):
+            found = scores[times][part]
+            spread = found[kind] or {}
+            cells = [_number(scale * spread[key] if spread else None) for key in ("mean", "median", "sd", "max")]
+            table.add_row(f"{name}, {words}{far}", str(found["count"]), *cells)
+    return table
+
+
+def _reference(title: str, told: Sequence[tuple[str, dict[str, Any]]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for name in ("", "poses", "as it is", "aligned"):
+        table.add_column(name, justify="left" if not name else "right")
+    for name, scores in told:
+        table.add_row(name, str(scores["poses"]), _number(scores["ate_m"]), _number(scores["ate_aligned_m"]))
+    return table
 
 
 def _short(value: Any) -> str:

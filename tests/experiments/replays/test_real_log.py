@@ -95,7 +95,7 @@ def test_a_report_is_made_of_it(replayed, capsys):
     assert main(["report", str(replayed / "out")]) == 0
     page = (replayed / "out" / "report.html").read_text()
     assert "The drive of a real robot (room.log)" in page
-    assert "chainslam replay room.log --backend block-ekf full-ekf --every 1 --out DIR" in page
+    assert "chainslam replay room.log --backend block-ekf full-ekf --every 1 --odometry scans --out DIR" in page
 
 
 def test_the_same_command_leaves_the_same_bytes_and_another_is_refused_in_its_folder(replayed, tmp_path, capsys):
@@ -114,7 +114,7 @@ def test_settings_reach_the_mapper_and_every_second_keyframe_is_mapped(replayed,
     assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
     config, summary = (json.loads((tmp_path / name).read_text()) for name in ("config.json", "summary.json"))
     assert config["trial"]["mission"]["mapper"]["matching"]["gate"] == 0.95
-    assert config["replay"] == {"recorded": {"every": 2}}
+    assert config["replay"] == {"recorded": {"every": 2, "odometry": "scans"}}
     whole = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
     assert summary["steps"] == -(-whole // 2)
     assert len(np.loadtxt(tmp_path / "trajectory_estimated.tum")) == 24

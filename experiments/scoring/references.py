@@ -1,0 +1,131 @@
+"""What others measured of a recorded drive: relations between its poses, or a reference path, and scores by them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from sim.logs.archive import regular
+from sim.logs.recorded_robot import MOST_M
+from slam.evaluation.relations import (
+    Relations,
+    errors_at_scans,
+    errors_between_scans,
+    paired_poses,
+)
+from slam.evaluation.trajectories import ate
+from slam.geometry.poses import wrap
+
+from ..usage import UsageError
+
+MOST_BYTES = 2**28
+RELATION, TUM, PLANAR = 8, 8, 4
+"""Numbers on a line of a relations file, of a path in the TUM format, and of a path as `t x y theta`."""
+LEAST = 3
+"""Poses that an alignment needs."""
+
+
+@dataclass(frozen=True)
+class References:
+    """What a path is scored by; None where nobody measured it."""
+
+    relations: Relations | None = None
+    path: tuple[Float[np.ndarray, " r"], Float[np.ndarray, "r 3"]] | None = None
+    """Times and poses."""
+
+
+def read_references(relations: Path | None, path: Path | None) -> References:
+    """Read the files of either kind; raises UsageError, in one line, for anything else."""
+    return References(
+        None if relations is None else read_relations(relations), None if path is None else read_path(path)
+    )
+
+
+def read_relations(path: Path) -> Relations:
+    """Read lines `t1 t2 x y z roll pitch yaw` as the Freiburg benchmark has them; raises UsageError."""
+    rows = _table(path, (RELATION,), "relations (t1 t2 x y z roll pitch yaw)")
+    motions = np.column_stack([rows[:, 2:4], wrap(rows[:, 7])])
+    return Relations(rows[:, 0], rows[:, 1], motions)
+
+
+def read_path(path: Path) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, "r 3"]]:
+    """Read a path in the TUM format or as `t x y theta`, in the order of its times; raises UsageError."""
+    rows = _table(path, (TUM, PLANAR), "a path (t x y z qx qy qz qw, or t x y theta)")
+    headings = rows[:, 3] if rows.shape[1] == PLANAR else 2.0 * np.arctan2(rows[:, 6], rows[:, 7])
+    order = np.argsort(rows[:, 0], kind="stable")
+    return rows[order, 0], np.column_stack([rows[:, 1:3], wrap(headings)])[order]
+
+
+def _table(path: Path, widths: tuple[int, ...], what: str) -> Float[np.ndarray, "n w"]:
+    """Return the numbers of a text file, the same count on each line; lines that begin with # are comments."""
+    rows: list[list[float]] = []
+    try:
+        if regular(path).stat().st_size > MOST_BYTES:
+            raise UsageError(f"expected {what}, found {path.name} of more than {MOST_BYTES >> 20} MiB: name another")
+        lines = path.read_text(encoding="latin-1").splitlines()
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise UsageError(f"expected {what}, found {path.name} ({reason}): name a file that exists") from error
+    for number, line in enumerate(lines, 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        rows.append(_numbers(words, f"expected {what}, found in line {number} of {path.name}"))
+        if len(words) not in widths or len(words) != len(rows[0]):
+            raise UsageError(f"expected {what}, found {len(words)} numbers in line {number} of {path.name}: correct it")
+    if not rows:
+        raise UsageError(f"expected {what}, found none in {path.name}: name another file")
+    return np.array(rows)
+
+
+def _numbers(words: list[str], expected: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError as error:
+        raise UsageError(f"{expected} other words: correct it") from error
+    if not np.all(np.isfinite(numbers)) or np.abs(numbers[1:]).max(initial=0.0) > MOST_M * MOST_M:
+        raise UsageError(f"{expected} numbers that are none: correct it")
+    return numbers
+
+
+def scored_by(
+    references: References, time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"]
+) -> dict[str, Any]:
+    """Return what a path scores by what others measured; no key for what nobody did."""
+    scores: dict[str, Any] = {}
+    if references.relations is not None and len(time_s):
+        scores["relations"] = {
+            "at_scans": _of_errors(*errors_at_scans(time_s, poses_world, references.relations)),
+            "interpolated": _of_errors(*errors_between_scans(time_s, poses_world, references.relations)),
+        }
+    if references.path is not None and len(time_s):
+        estimated, reference = paired_poses(time_s, poses_world, *references.path)
+        enough = len(estimated) >= LEAST
+        scores["reference"] = {
+            "poses": len(estimated),
+            "ate_m": ate(estimated, reference) if enough else None,
+            "ate_aligned_m": ate(estimated, reference, align=True) if enough else None,
+        }
+    return scores
+
+
+def _of_errors(relations: Relations, errors: Float[np.ndarray, "k 2"]) -> dict[str, Any]:
+    return {"all": _spread(errors), "far": _spread(errors[relations.far])}
+
+
+def _spread(errors: Float[np.ndarray, "k 2"]) -> dict[str, Any]:
+    """Return mean, median, standard deviation and maximum of the errors; null where there are none."""
+    if not len(errors):
+        return {"count": 0, "translation_m": None, "rotation_rad": None}
+    parts = {
+        name: {
+            "mean": float(column.mean()),
+            "median": float(np.median(column)),
+            "sd": float(column.std()),
+            "max": float(column.max()),
+        }
+        for name, column in zip(("translation_m", "rotation_rad"), errors.T, strict=True)
+    }
+    return {"count": len(errors), **parts}

@@ -1,0 +1,108 @@
+"""How far a path is from relations between its poses that others measured: no common frame, nothing to align.
+
+The measure of Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms", Autonomous Robots 27 (2009).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..geometry.poses import wrap
+
+SAME_TIME_S = 0.01
+FAR_S = 60.0
+"""Relations over so long a time say how well a map comes together; shorter ones tell of the odometry."""
+
+
+@dataclass(frozen=True)
+class Relations:
+    """Where the robot was at one time, as seen from where it was at another; m relations."""
+
+    first_s: Float[np.ndarray, " m"]
+    second_s: Float[np.ndarray, " m"]
+    motions: Float[np.ndarray, "m 3"]
+    """The second pose in the frame of the first, m m rad."""
+
+    def take(self, rows: Bool[np.ndarray, " m"] | Int[np.ndarray, " k"]) -> "Relations":
+        """Return the chosen ones."""
+        return Relations(self.first_s[rows], self.second_s[rows], self.motions[rows])
+
+    @property
+    def far(self) -> Bool[np.ndarray, " m"]:
+        """Whether the two times are a minute and more apart."""
+        return np.abs(self.second_s - self.first_s) >= FAR_S
+
+    def within(self, low_s: float, high_s: float) -> "Relations":
+        """Return those whose times both lie in a span."""
+        times = np.stack([self.first_s, self.second_s])
+        return self.take(np.all((times >= low_s) & (times <= high_s), axis=0))
+
+
+def between(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:
+    """Return each second pose in the frame of the first one beside it."""
+    c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
+    dx, dy = (second - first)[:, :2].T
+    return np.column_stack([c * dx + s * dy, c * dy - s * dx, wrap(second[:, 2] - first[:, 2])])
+
+
+def nearest_rows(
+    time_s: Float[np.ndarray, " s"], asked_s: Float[np.ndarray, " m"]
+) -> tuple[Int[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+    """Return the row of the time nearest to each one asked for, and whether it is within 10 ms; times ascend."""
+    after = np.clip(np.searchsorted(time_s, asked_s), 0, len(time_s) - 1)
+    before = np.maximum(after - 1, 0)
+    rows = np.where(np.abs(time_s[before] - asked_s) <= np.abs(time_s[after] - asked_s), before, after)
+    return rows, np.abs(time_s[rows] - asked_s) <= SAME_TIME_S
+
+
+def interpolated(
+    time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], asked_s: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, "m 3"]:
+    """Return poses between those of a path, at even speed and turn; at its ends where the time lies beyond."""
+    turns = np.unwrap(poses_world[:, 2])
+    columns = (np.interp(asked_s, time_s, values) for values in (*poses_world[:, :2].T, turns))
+    x, y, heading = columns
+    return np.column_stack([x, y, wrap(heading)])
+
+
+def relation_errors(
+    first_world: Float[np.ndarray, "m 3"], second_world: Float[np.ndarray, "m 3"], motions: Float[np.ndarray, "m 3"]
+) -> Float[np.ndarray, "m 2"]:
+    """Return the size m and the turn rad of the motion that is left between a measured relation and the path's own."""
+    left = between(motions, between(first_world, second_world))
+    return np.column_stack([np.hypot(*left[:, :2].T), np.abs(left[:, 2])])
+
+
+def errors_at_scans(
+    time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
+) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
+    """Return the relations both of whose times are those of scans, to 10 ms, and their errors (m, rad)."""
+    first, has_first = nearest_rows(time_s, relations.first_s)
+    second, has_second = nearest_rows(time_s, relations.second_s)
+    both = has_first & has_second
+    chosen = relations.take(both)
+    return chosen, relation_errors(poses_world[first[both]], poses_world[second[both]], chosen.motions)
+
+
+def errors_between_scans(
+    time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
+) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
+    """Return the relations whose times the path covers, and their errors (m, rad), its poses being interpolated."""
+    chosen = relations.within(float(time_s[0]), float(time_s[-1]))
+    first, second = (interpolated(time_s, poses_world, asked) for asked in (chosen.first_s, chosen.second_s))
+    return chosen, relation_errors(first, second, chosen.motions)
+
+
+def paired_poses(
+    time_s: Float[np.ndarray, " s"],
+    poses_world: Float[np.ndarray, "s 3"],
+    reference_s: Float[np.ndarray, " r"],
+    reference_world: Float[np.ndarray, "r 3"],
+) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"]]:
+    """Return the poses of a path and of a reference at the same times, to 10 ms; each of the shorter one once."""
+    if len(reference_s) <= len(time_s):
+        rows, near = nearest_rows(time_s, reference_s)
+        return poses_world[rows[near]], reference_world[near]
+    rows, near = nearest_rows(reference_s, time_s)
+    return poses_world[near], reference_world[rows[near]]

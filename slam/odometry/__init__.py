@@ -1,0 +1,1 @@
+"""The robot's motion told by its scans."""

@@ -1,0 +1,50 @@
+"""The settings of scan matching."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ScanMatchingConfig:
+    """How a scan is laid onto the scans before it; the same for all robots and logs."""
+
+    keyframes: int = 20
+    """A scan is matched to the points of so many scans before it."""
+    reach_m: float = 15.0
+    """Returns from farther away are left out: there the beams are too far apart to tell walls."""
+    cell_m: float = 0.05
+    """Size of a cell of the likelihood field; a scan's points are thinned to one for each."""
+    gap_m: float = 0.3
+    """Neighbouring returns that are nearer to each other are of one surface, which is likely between them too; else a
+    scan would match the gaps between the beams of the one before."""
+    kernel_m: float = 0.06
+    """How fast the likelihood falls with the distance from a point, as a standard deviation."""
+    least_m: float = 0.15
+    """The search goes at least so far to each side of where the wheels say, or by `share` of the motion."""
+    least_rad: float = float(np.deg2rad(6.0))
+    """The same for the turn."""
+    share: float = 0.5
+    step_rad: float = float(np.deg2rad(1.0))
+    """Between two turns that are tried; places are tried cell by cell."""
+    penalty: float = 0.02
+    """Score that a place at the rim of the search must be better by than one where the wheels say."""
+    slip_score: float = 0.5
+    """A match whose points score less on the mean is no match: the wheels have slipped, and the search goes wide."""
+    slip_rad: float = float(np.deg2rad(54.0))
+    """How far to each side the wide search turns."""
+    finest_m: float = 0.005
+    """The search ends with steps of this size; the last of the way is drawn onto the surfaces."""
+    sigma_m: float = 0.03
+    """Error of a point about the walls that the points before it tell."""
+    surface_m: float = 2.0
+    """A point tells where its surface is if its neighbours are nearer to each other than this."""
+    independent: float = 0.1
+    """Share of a scan's points that count as independent: neighbours share the errors of walls that are not straight,
+    and the same scans tell the map its lines."""
+    floor_m: float = 0.005
+    """Standard deviation that no match is better than ..."""
+    floor_rad: float = float(np.deg2rad(0.15))
+    """... and of the turn."""
+    least_points: int = 20
+    """With fewer points nothing is matched, and the wheels have the last word."""

@@ -1,0 +1,102 @@
+"""Odometry from scans: each is laid onto the last ones, about where the wheels say that it was taken."""
+
+from collections import deque
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from ..geometry.poses import compose, inverse, rotation, to_world
+from ..robot import Odometry, Scan
+from .config import ScanMatchingConfig
+from .likelihood_field import LikelihoodField, field_of, joined, surface_normals, thinned
+from .point_to_line import Prior, Surfaces, settle
+from .search import Window, correlate, refine
+
+DEFAULTS = ScanMatchingConfig()
+
+
+class ScanMatcher:
+    """Keeps the points of the last scans in a frame of its own, and the pose of the last one there."""
+
+    def __init__(self, config: ScanMatchingConfig = DEFAULTS) -> None:
+        self._config = config
+        self._pose = np.zeros(3)
+        self._points: deque[np.ndarray] = deque(maxlen=config.keyframes)
+        self.slips = 0
+        """How often the search went wide and found the scan again."""
+
+    def begin(self, scan: Scan) -> None:
+        """Take in the first scan, to which no motion led."""
+        self._keep(self._returns(scan))
+
+    def match(self, scan: Scan, wheels: Odometry) -> Odometry:
+        """Return the motion that led to a scan, with its covariance.
+
+        Wheels and scan are fused by their covariances, so that along a bare corridor, where scans tell nothing, the
+        wheels have their say. What is stated is less sure than that: only a share of the points counts, since their
+        errors are common to neighbours, and since the same scan goes on to tell the map its lines.
+        """
+        c = self._config
+        returns = self._returns(scan)
+        points = thinned(returns, self._config.cell_m)
+        guess = compose(self._pose, wheels.motion)
+        odometry = wheels
+        if self._points and len(points) >= c.least_points:
+            odometry = self._matched(points, guess, wheels)
+        self._pose = compose(self._pose, odometry.motion)
+        self._keep(returns)
+        return odometry
+
+    def _keep(self, returns: Float[np.ndarray, "n 2"]) -> None:
+        c = self._config
+        surface = thinned(joined(returns, c.cell_m, c.gap_m), 0.5 * c.cell_m)
+        self._points.append(to_world(surface, self._pose))
+
+    def _returns(self, scan: Scan) -> Float[np.ndarray, "n 2"]:
+        near = np.flatnonzero(scan.ranges_m < self._config.reach_m)
+        ranges, bearings = scan.ranges_m[near], scan.bearings_rad[near]
+        return ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+
+    def _matched(self, points: Float[np.ndarray, "n 2"], guess: Float[np.ndarray, "3"], wheels: Odometry) -> Odometry:
+        c = self._config
+        before = thinned(np.concatenate(self._points), 0.5 * c.cell_m)
+        half_m = max(c.least_m, c.share * float(np.hypot(*wheels.motion[:2])))
+        half_rad = max(c.least_rad, c.share * abs(float(wheels.motion[2])))
+        field = self._field(before, points, guess, half_m)
+        pose, score = self._best(field, points, Window(guess, half_m, half_rad, c.step_rad, c.penalty))
+        wheels_cov = wheels.cov + np.diag([1e-8, 1e-8, 1e-10])
+        if score < c.slip_score:
+            found, better = self._best(field, points, Window(guess, half_m, c.slip_rad, c.step_rad, c.penalty))
+            if better >= c.slip_score:
+                pose = found
+                wheels_cov = wheels_cov + np.diag([half_m**2, half_m**2, c.slip_rad**2])
+                self.slips += 1
+        R = np.eye(3)
+        R[:2, :2] = rotation(self._pose[2])
+        prior = np.linalg.inv(wheels_cov)
+        pose, information = settle(
+            cKDTree(before), Surfaces(points, *surface_normals(points, c.surface_m)), pose,
+            Prior(guess, R @ prior @ R.T), c.sigma_m, c.kernel_m,
+        )  # fmt: skip
+        cov = np.linalg.inv(prior + c.independent * R.T @ information @ R)
+        floor = np.diag([c.floor_m**2, c.floor_m**2, c.floor_rad**2])
+        return Odometry(compose(inverse(self._pose), pose), 0.5 * (cov + cov.T) + floor, wheels.touched)
+
+    def _field(
+        self,
+        before: Float[np.ndarray, "m 2"],
+        points: Float[np.ndarray, "n 2"],
+        guess: Float[np.ndarray, "3"],
+        half_m: float,
+    ) -> LikelihoodField:
+        c = self._config
+        farthest = float(np.hypot(*points.T).max())
+        margin = int(np.ceil(half_m / c.cell_m)) + 2
+        return field_of(before, guess[:2], farthest + half_m, c.cell_m, c.kernel_m, margin)
+
+    def _best(
+        self, field: LikelihoodField, points: Float[np.ndarray, "n 2"], window: Window
+    ) -> tuple[Float[np.ndarray, "3"], float]:
+        coarse, _ = correlate(field, points, window)
+        return refine(field, points, coarse, self._config.step_rad, self._config.finest_m)
