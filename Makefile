@@ -71,11 +71,15 @@ heading: setup
 adaptive: setup
 	$(BIN)/python -m studies.exploration.adaptive --out results/adaptive.jsonl
 
-.PHONY: scanners bodies
+.PHONY: scanners bodies logs
 
 # Other bodies, and scanners off the axle; begun again, it goes on where it was.
 bodies: setup
 	$(BIN)/python -m studies.exploration.bodies --plans $(PLANS)
+
+# Logs of real robots, each through several back ends; begun again, it goes on where it was.
+logs: setup
+	$(BIN)/python -m studies.logs.study --logs $(or $(LOGS),../shared/data/logs)
 
 # Other scanners and their faults, in one world; begun again, it goes on where it was.
 scanners: setup

@@ -37,7 +37,8 @@ class Replay:
     """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """The log.npz that a run left, with its config.json beside it; or a CARMEN or dp-slam log, also packed by gzip."""
+    """The log.npz that a run left, with its config.json beside it; or a CARMEN or dp-slam log, also packed by gzip;
+    or a ROS bag (a file, or the folder of a ROS 2 bag)."""
     backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
     """The estimators (see `chainslam backends`)."""
     association: Association = "own"

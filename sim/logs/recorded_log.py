@@ -6,6 +6,7 @@ from .carmen import read_carmen
 from .keyframes import KeyframesConfig, RecordedLog, gather
 from .raw_scan import LogError
 from .recorded_robot import RecordingError
+from .rosbag import is_bag, read_bag
 from .text_lines import first_bytes
 
 ARCHIVE = b"PK"
@@ -24,9 +25,9 @@ KEYFRAMES = KeyframesConfig()
 
 
 def read_recorded_log(path: Path, config: KeyframesConfig = KEYFRAMES) -> RecordedLog:
-    """Return a CARMEN log; raises RecordingError, in one line, where not one scan can be used."""
+    """Return a CARMEN log or a ROS bag; raises RecordingError, in one line, where not one scan can be used."""
     try:
-        return gather(read_carmen(path), config)
+        return gather(read_bag(path) if is_bag(path) else read_carmen(path), config)
     except LogError as error:
         raise RecordingError(f"expected a recorded log, found {path.name}: {error}") from error
     except OSError as error:

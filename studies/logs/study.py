@@ -1,0 +1,123 @@
+"""Logs of real robots through several back ends: how far is each from what others measured.
+
+.venv/bin/python -m studies.logs.study --logs DIR     # goes on where it was interrupted
+
+DIR holds `NAME.log.gz`, and where others measured something `NAME.relations` and `NAME.ref_gmapping.txt`.
+"""
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from rich.table import Table
+
+from experiments.replays.measured import held_against
+from experiments.replays.real_log import RealOptions, read_real_run, replay_real
+from experiments.replays.replay import OdometrySource
+from experiments.scoring.references import read_references
+from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
+from slam.backends import BACKENDS
+
+from ..runner.rows import Row, rows_of
+
+NAMES = ("log", "backend", "odometry", "every")
+HEAD = (
+    "log", "back end", "odometry", "scans", "at scans, m", "degrees", "60 s apart, m", "interpolated, m",
+    "reference, m", "walls", "twice", "ms a scan", "status",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LogsStudy:
+    """Map each log with each back end, and print a row for each."""
+
+    logs: Path
+    """Folder with the logs."""
+    backends: tuple[str, ...] = ("full-ekf", "invariant-ekf", "block-ekf", "graph")
+    """The estimators."""
+    names: tuple[str, ...] = ("intel", "aces", "seattle", "dpslam_loop5")
+    """The logs."""
+    odometry: OdometrySource = "scans"
+    """Who tells the motion between two keyframes."""
+    every: int = 1
+    """One of so many keyframes is mapped."""
+    out: Path = Path("studies/logs/rows.jsonl")
+    """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
+
+    def run(self) -> None:
+        """Run what is to be run and print the table; raises UsageError."""
+        for backend in self.backends:
+            if backend not in BACKENDS:
+                raise UsageError(f"expected back ends out of {', '.join(BACKENDS)}, found {backend}: choose of these")
+        keys = [(name, backend, self.odometry, self.every) for backend in self.backends for name in self.names]
+        tasks = [(key[:2], [key]) for key in keys]
+        rows = list(rows_of(self.out, NAMES, tasks, partial(_one, self), 1))
+        plain_console(width=170).print(table(rows))
+
+
+def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
+    name, backend = task
+    relations, path = study.logs / f"{name}.relations", study.logs / f"{name}.ref_gmapping.txt"
+    references = read_references(*(file if file.is_file() else None for file in (relations, path)))
+    options = RealOptions(study.every, study.odometry)
+    run = read_real_run(study.logs / f"{name}.log.gz", options, None, (), {})
+    began = time.process_time()
+    result = held_against(replay_real(run, backend), references)
+    ms = 1e3 * (time.process_time() - began) / max(len(run.log.recording), 1)
+    kept = ("status", "reason", "steps", "lines", "lines_crooked", "duplicate_lines", "chains_closed", "path_length_m")
+    told: dict[str, Any] = {key: result.summary[key] for key in kept}
+    for key in ("relations", "reference", "relations_smoothed", "reference_smoothed"):
+        if key in result.summary:
+            told[key] = result.summary[key]
+    of = {"log": name, "backend": backend, "odometry": study.odometry, "every": study.every}
+    return [of | told | {"cpu_ms_a_scan": ms, "log_s": float(run.log.scan_time_s[-1] - run.log.scan_time_s[0])}]
+
+
+def table(rows: Sequence[Row]) -> Table:
+    """Return a row for each run; what nobody measured is left out."""
+    shown = Table(title="Logs of real robots", title_justify="left")
+    for column in HEAD:
+        shown.add_column(column, justify="left" if column in HEAD[:3] else "right")
+    for row in rows:
+        for tail in ("", "_smoothed"):
+            if not tail or f"relations{tail}" in row or f"reference{tail}" in row:
+                shown.add_row(*_cells(row, tail))
+    return shown
+
+
+def _cells(row: Row, tail: str) -> list[str]:
+    relations, reference = row.get(f"relations{tail}"), row.get(f"reference{tail}")
+    at = relations["at_scans"] if relations else None
+    numbers = [
+        at and at["all"]["translation_m"]["mean"],
+        at and float(np.rad2deg(at["all"]["rotation_rad"]["mean"])),
+        at and at["far"]["translation_m"]["mean"],
+        relations and relations["interpolated"]["all"]["translation_m"]["mean"],
+        reference and reference["ate_aligned_m"],
+    ]
+    return [
+        row["log"], row["backend"] + tail.replace("_", ", "), row["odometry"], str(row["steps"]),
+        *("-" if number is None else f"{number:.3f}" for number in numbers),
+        str(row["lines"]), str(row["duplicate_lines"]), f"{row['cpu_ms_a_scan']:.0f}", row["status"],
+    ]  # fmt: skip
+
+
+def main() -> int:
+    """Run the command and return its exit status."""
+    try:
+        tyro.cli(LogsStudy).run()
+    except UsageError as error:
+        print(f"logs: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

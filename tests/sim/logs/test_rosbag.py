@@ -1,0 +1,234 @@
+"""ROS bags of all kinds become the same recording; each bag is written here."""
+
+import builtins
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from sim.logs.recorded_log import read_recorded_log
+from sim.logs.recorded_robot import RecordingError
+from slam.geometry.poses import compose, inverse
+
+KINDS = ("ros1", "sqlite", "mcap")
+BEAMS = 5
+OFFSET = (0.2, 0.1, 0.5)
+STORES = {"ros1": get_typestore(Stores.ROS1_NOETIC), "ros2": get_typestore(Stores.ROS2_HUMBLE)}
+TF_FIELDS = "geometry_msgs/TransformStamped[] transforms"
+STORES["ros1"].register(get_types_from_msg(TF_FIELDS, "tf2_msgs/msg/TFMessage"))
+LASER, ODOMETRY, TF = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
+
+
+class Bag:
+    """Writes messages of one kind of bag."""
+
+    def __init__(self, path, kind):
+        self.is1 = kind == "ros1"
+        self.store = STORES["ros1" if self.is1 else "ros2"]
+        if self.is1:
+            self.writer = Writer1(path)
+        else:
+            plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+            self.writer = Writer2(path, version=9, storage_plugin=plugin)
+        self.connections = {}
+
+    def __enter__(self):
+        self.writer.open()
+        return self
+
+    def __exit__(self, *error):
+        self.writer.close()
+
+    def type(self, name, **fields):
+        return self.store.types[name](**fields)
+
+    def header(self, time_s, frame):
+        stamp = self.type("builtin_interfaces/msg/Time", sec=int(time_s), nanosec=round((time_s % 1) * 1e9))
+        more = {"seq": 0} if self.is1 else {}
+        return self.type("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **more)
+
+    def write(self, topic, kind, message, time_s):
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
+        serialize = self.store.serialize_ros1 if self.is1 else self.store.serialize_cdr
+        self.writer.write(self.connections[topic], round(time_s * 1e9), serialize(message, kind))
+
+    def scan(self, time_s, ranges=(1.0,) * BEAMS, low=-0.4, step=0.2, topic="/scan", most=8.0):
+        message = self.type(
+            LASER, header=self.header(time_s, "laser"), angle_min=low, angle_max=low + step * (len(ranges) - 1),
+            angle_increment=step, time_increment=0.0, scan_time=0.1, range_min=0.1, range_max=most,
+            ranges=np.array(ranges, dtype=np.float32), intensities=np.zeros(0, dtype=np.float32),
+        )  # fmt: skip
+        self.write(topic, LASER, message, time_s)
+
+    def quaternion(self, heading, over=False):
+        if over:  # half a turn about the ahead axis, then the heading
+            return self.type("geometry_msgs/msg/Quaternion", x=np.cos(heading / 2), y=np.sin(heading / 2), z=0.0, w=0.0)
+        return self.type("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=np.sin(heading / 2), w=np.cos(heading / 2))
+
+    def odometry(self, time_s, pose, topic="/odom"):
+        at = self.type("geometry_msgs/msg/Point", x=pose[0], y=pose[1], z=0.0)
+        pose = self.type("geometry_msgs/msg/Pose", position=at, orientation=self.quaternion(pose[2]))
+        none = self.type("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+        message = self.type(
+            ODOMETRY, header=self.header(time_s, "odom"), child_frame_id="base",
+            pose=self.type("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=np.zeros(36)),
+            twist=self.type(
+                "geometry_msgs/msg/TwistWithCovariance",
+                twist=self.type("geometry_msgs/msg/Twist", linear=none, angular=none), covariance=np.zeros(36),
+            ),
+        )  # fmt: skip
+        self.write(topic, ODOMETRY, message, time_s)
+
+    def transform(self, time_s, parent, child, pose, over=False, topic="/tf"):
+        at = self.type("geometry_msgs/msg/Vector3", x=pose[0], y=pose[1], z=0.3)
+        turn = self.type("geometry_msgs/msg/Transform", translation=at, rotation=self.quaternion(pose[2], over))
+        stamped = self.type(
+            "geometry_msgs/msg/TransformStamped",
+            header=self.header(time_s, parent), child_frame_id=child, transform=turn,
+        )  # fmt: skip
+        self.write(topic, TF, self.type(TF, transforms=[stamped]), time_s)
+
+
+def pose_at(time_s):
+    return np.array([0.4 * (time_s - 10.0), 0.0, 0.3 * (time_s - 10.0)])
+
+
+def recorded(path, kind, by="topic", over=False, mounted=True, **scans):
+    """Six scans half a second apart, the odometry between them."""
+    with Bag(path, kind) as bag:
+        if mounted:
+            bag.transform(9.0, "base", "plate", (0.2, 0.0, 0.0), topic="/tf_static")
+            bag.transform(9.0, "plate", "laser", (0.0, 0.1, 0.5), over, topic="/tf_static")
+        for k in range(6):
+            time_s = 10.0 + 0.5 * k
+            bag.scan(time_s, **scans)
+            for when in (time_s - 0.2, time_s + 0.1):
+                if by == "topic":
+                    bag.odometry(when, pose_at(when))
+                else:
+                    bag.transform(when, "odom", "base", pose_at(when))
+    return path
+
+
+def named(folder, kind, name="a"):
+    """The path of a bag: a file for ROS 1, a folder for ROS 2."""
+    return folder / (f"{name}.bag" if kind == "ros1" else name)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("by", ["topic", "tf"])
+def test_every_kind_of_bag_tells_scans_odometry_and_where_the_scanner_sits(tmp_path, kind, by):
+    log = read_recorded_log(recorded(named(tmp_path, kind), kind, by))
+    assert not log.trouble
+    np.testing.assert_allclose(log.scan_time_s, 10.0 + 0.5 * np.arange(6))
+    np.testing.assert_allclose(log.recording.bearings_rad, [-0.4, -0.2, 0.0, 0.2, 0.4], atol=1e-6)
+    assert log.recording.range_max_m == 8.0
+    np.testing.assert_allclose(log.scanner_on_robot, OFFSET, atol=1e-9)
+    scanner = [compose(pose_at(time_s), np.array(OFFSET)) for time_s in log.scan_time_s]
+    expected = [compose(inverse(a), b) for a, b in pairwise(scanner)]
+    np.testing.assert_allclose(log.recording.odometry[1:], expected, atol=2e-3)
+
+
+def test_the_file_within_a_ros_2_bag_may_be_named(tmp_path):
+    folder = recorded(tmp_path / "a", "mcap")
+    log = read_recorded_log(next(folder.glob("*.mcap")))
+    np.testing.assert_array_equal(log.recording.odometry, read_recorded_log(folder).recording.odometry)
+
+
+def test_a_scanner_upside_down_sees_its_beams_from_the_other_side(tmp_path):
+    ranges = (1.0, 2.0, 3.0, 4.0, 5.0)
+    log = read_recorded_log(recorded(tmp_path / "a.bag", "ros1", over=True, ranges=ranges, low=-0.3))
+    np.testing.assert_allclose(log.recording.bearings_rad, [-0.5, -0.3, -0.1, 0.1, 0.3], atol=1e-6)
+    np.testing.assert_allclose(log.recording.ranges_m[0], ranges[::-1])
+    np.testing.assert_allclose(log.scanner_on_robot, OFFSET, atol=1e-9)
+
+
+def test_ranges_are_as_rep_117_has_them(tmp_path):
+    ranges = (0.05, np.inf, 8.5, np.nan, 2.0, -np.inf)
+    found = read_recorded_log(recorded(tmp_path / "a.bag", "ros1", ranges=ranges)).recording.ranges_m[0]
+    np.testing.assert_array_equal(found, [np.nan, np.inf, np.inf, np.nan, 2.0, np.nan])
+
+
+def test_beams_that_run_the_other_way_are_turned_round_and_no_beam_of_a_turn_comes_twice(tmp_path):
+    log = read_recorded_log(recorded(tmp_path / "a.bag", "ros1", ranges=(1.0, 2.0, 3.0), low=0.2, step=-0.2))
+    np.testing.assert_allclose(log.recording.bearings_rad, [-0.2, 0.0, 0.2], atol=1e-6)
+    np.testing.assert_allclose(log.recording.ranges_m[0], [3.0, 2.0, 1.0])
+    turn = read_recorded_log(recorded(tmp_path / "b.bag", "ros1", ranges=(1.0,) * 361, low=0.0, step=np.deg2rad(1.0)))
+    assert len(turn.recording.bearings_rad) == 360
+
+
+def test_without_a_mounting_the_scanner_sits_in_the_middle(tmp_path):
+    assert not read_recorded_log(recorded(tmp_path / "a", "sqlite", mounted=False)).scanner_on_robot.any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bag_without_such_topics_lists_those_that_there_are(tmp_path, kind):
+    with Bag(named(tmp_path, kind), kind) as bag:
+        bag.scan(1.0, topic="/front")
+    with pytest.raises(RecordingError, match=r"the bag has /front \(sensor_msgs/msg/LaserScan\)"):
+        read_recorded_log(named(tmp_path, kind))
+    with Bag(named(tmp_path, kind, "b"), kind) as bag:
+        bag.odometry(1.0, (0, 0, 0), topic="/wheels")
+    with pytest.raises(RecordingError, match=r"expected a topic of LaserScan.*/wheels"):
+        read_recorded_log(named(tmp_path, kind, "b"))
+
+
+def test_tf_that_tells_no_odometry_is_told(tmp_path):
+    with Bag(tmp_path / "a.bag", "ros1") as bag:
+        bag.scan(1.0)
+        bag.transform(1.0, "base", "laser", (0, 0, 0))
+    with pytest.raises(RecordingError, match="expected odometry, or a tf from an odom frame"):
+        read_recorded_log(tmp_path / "a.bag")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_bag_is_told_in_one_line(tmp_path, kind, share):
+    path = recorded(named(tmp_path, kind), kind)
+    file = path if path.is_file() else next(each for each in path.iterdir() if each.suffix != ".yaml")
+    content = file.read_bytes()
+    file.write_bytes(content[: int(len(content) * share)])
+    told = said_of(path)
+    assert "\n" not in told
+    assert "found a" in told or told == "6 scans"
+
+
+def said_of(path):
+    try:
+        return f"{len(read_recorded_log(path).scan_time_s)} scans"
+    except RecordingError as error:
+        return str(error)
+
+
+def test_scans_that_tell_no_beams_end_the_log_and_those_before_are_kept(tmp_path):
+    with Bag(tmp_path / "a.bag", "ros1") as bag:
+        for k in range(4):
+            bag.scan(10.0 + k, ranges=(1.0,) * (5 if k < 2 else 1))
+            bag.odometry(10.0 + k, pose_at(10.0 + k))
+    log = read_recorded_log(tmp_path / "a.bag")
+    assert len(log.scan_time_s) == 2
+    assert log.trouble.startswith("scan at 12.000000 s: expected beams, found 1")
+
+
+def test_without_rosbags_one_line_tells_what_to_install(tmp_path, monkeypatch):
+    path = recorded(tmp_path / "a.bag", "ros1")
+    real = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name.startswith("rosbags"):
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(RecordingError, match=r"pip install 'chainslam\[ros\]'"):
+        read_recorded_log(path)
+
+
+def test_a_folder_that_is_no_bag_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="a folder"):
+        read_recorded_log(tmp_path)
