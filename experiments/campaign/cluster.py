@@ -1,7 +1,7 @@
 """Trials on the workers of a Dask scheduler; whatever becomes of the cluster is told in one line."""
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from importlib.metadata import version
 from itertools import islice
@@ -9,6 +9,7 @@ from time import monotonic
 from typing import Any
 
 from ..usage import UsageError
+from .own import with_own
 from .runner import Executor, lost
 from .work import Done, Job, perform
 
@@ -40,7 +41,8 @@ def on_dask(address: str) -> Executor:
         client = distributed.Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise UsageError(f"expected a Dask scheduler at {address}, found none: start `dask scheduler` first") from error
-    return lambda jobs: _guarded(client, address, _perform_all(client, address, jobs))
+    performs = with_own(perform)
+    return lambda jobs: _guarded(client, address, _perform_all(client, address, performs, jobs))
 
 
 def program() -> str:
@@ -60,14 +62,14 @@ def _guarded(client: Any, address: str, performed: Iterator[Done]) -> Iterator[D
         ) from error
 
 
-def _perform_all(client: Any, address: str, jobs: Iterable[Job]) -> Iterator[Done]:
+def _perform_all(client: Any, address: str, performs: Callable[[Job], Done], jobs: Iterable[Job]) -> Iterator[Done]:
     from distributed import KilledWorker
 
     _check(client, address)
     waiting, sent = iter(jobs), dict[Any, Job]()
 
     def send(count: int) -> None:
-        sent.update({client.submit(perform, job, pure=False): job for job in islice(waiting, count)})
+        sent.update({client.submit(performs, job, pure=False): job for job in islice(waiting, count)})
 
     send(AT_ONCE * max(sum(client.nthreads().values()), 1))
     while sent:

@@ -8,6 +8,7 @@ from rich.progress import MofNCompleteColumn
 
 from ..artifacts.presets import METHODS
 from ..terminal.progress import bar_of, duration
+from .own import with_own
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform
@@ -78,7 +79,7 @@ def _job(store: Store, trial: Trial) -> Job:
 
 def on_cores(count: int | None) -> Executor:
     """Return an executor over processes of this machine: `count` of them, or one for each core."""
-    return on_workers(perform, lost, count)
+    return on_workers(with_own(perform), lost, count)
 
 
 def lost(job: Job, reason: str) -> Done:

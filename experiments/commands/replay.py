@@ -78,7 +78,7 @@ class Replay:
         for name in self.backend:
             choose("back end", name, BACKENDS)
         references = read_references(self.relations, self.reference)
-        source = self._source()
+        source = self.source()
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
         with ExitStack() as stack:
@@ -110,7 +110,8 @@ class Replay:
             print(f"chainslam: not written: {problem}", file=sys.stderr)
         return status or (1 if problems else 0)
 
-    def _source(self) -> OwnLog | RealLog:
+    def source(self) -> OwnLog | RealLog:
+        """Return the log, read; raises UsageError where it is none."""
         robot = stated(robot_of(self.robot))
         if is_own_log(self.log):
             if self.every != 1:

@@ -31,8 +31,7 @@ class Report:
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
-        page = _page(self.folder)
-        write(self.folder / REPORT, html(page))
+        page = self.write()
         print(f"report in {self.folder / REPORT}")
         if self.latex:
             tables = [table for section in page.sections for table in section.tables]
@@ -42,6 +41,12 @@ class Report:
             write(self.folder / GIF, gif_of(self.folder))
             print(f"animation in {self.folder / GIF}")
         return 0
+
+    def write(self) -> Page:
+        """Write the page and return what stands on it; raises UsageError for a folder without results."""
+        page = _page(self.folder)
+        write(self.folder / REPORT, html(page))
+        return page
 
 
 def _page(folder: Path) -> Page:

@@ -15,9 +15,10 @@ import numpy as np
 import tyro
 from jaxtyping import Float
 from matplotlib.figure import Figure
+from PIL import Image
 
 from sim.logs.archive import regular
-from sim.logs.recorded_robot import MOST_M, within
+from sim.logs.recorded_robot import MOST_M, read_log, within
 from viz import palette
 from viz.figures.maps import draw_map, saved
 from viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
@@ -32,7 +33,7 @@ from ..artifacts.saved import REMEDY
 from ..replays.replay import read_run
 from ..scenario import TrialConfig, load_world
 from ..scoring.summary import odometry_poses
-from ..usage import UsageError
+from ..usage import UsageError, choose
 from .saved_map import saved_map
 from .timelines import true_rings
 
@@ -123,6 +124,29 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
         "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
         "traversals": lambda: draw_traversal(true, rings, f"{title}: how often each stretch was driven"),
     }
+
+
+def figure_of(folder: Path, name: str) -> Figure:
+    """Return one picture of a run; raises UsageError for a name that is none, or where the files do not tell it."""
+    with told(folder / LOG, REMEDY):
+        is_witnessed = "true_poses" in read_log(folder / LOG)
+    if not is_witnessed:
+        return _as_written(folder / "map.png", name)
+    run = read_pictured(folder)
+    shown = saved_map(folder, run.trial, run.log, run.walls, run.estimated_world)
+    pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown), **draw_all([run])}
+    return pictures[choose("picture", name, pictures)]()
+
+
+def _as_written(path: Path, name: str) -> Figure:
+    """Return the map of a drive without truth as it was written; raises UsageError for another picture."""
+    choose("picture of a drive whose truth nobody knows", name, ("map",))
+    with told(path, REMEDY), Image.open(regular(path)) as image:
+        figure = Figure(figsize=(image.width / 150, image.height / 150), dpi=150)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.imshow(np.asarray(image))
+        axes.set_axis_off()
+    return figure
 
 
 def main() -> int:

@@ -31,6 +31,8 @@ STRATEGIES: dict[str, StrategyEntry] = {
         Adaptive, "nearest-robot, with returns to well-known walls where the filter must be inconsistent"
     ),
 }
+BUILT_IN = frozenset(STRATEGIES)
+"""What comes along; other names are a user's own, of which the processes of a campaign are told."""
 
 
 def make_strategy(words: str) -> Strategy:
@@ -52,4 +54,14 @@ def make_strategy(words: str) -> Strategy:
     return parts[0][1] if len(parts) == 1 else Schedule(parts)
 
 
-__all__ = ["STRATEGIES", "Choice", "Place", "Situation", "Strategy", "StrategyEntry", "Watchful", "make_strategy"]
+__all__ = [
+    "BUILT_IN",
+    "STRATEGIES",
+    "Choice",
+    "Place",
+    "Situation",
+    "Strategy",
+    "StrategyEntry",
+    "Watchful",
+    "make_strategy",
+]

@@ -69,6 +69,8 @@ READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
     **dict.fromkeys((".yaml", ".yml"), _lazily("readers.ros_map", "read_ros_map")),
 }
 """Reader by file name extension; each takes the path and the scale that the caller states, or None."""
+BUILT_IN = frozenset(READERS)
+"""What comes along; other readers are a user's own, of which the processes of a campaign are told."""
 
 
 def listing() -> dict[str, str]:

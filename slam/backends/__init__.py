@@ -82,3 +82,5 @@ BACKENDS: dict[str, BackendEntry] = {
         _lazily("graph.batch", "GraphBatch"), "as graph, and everything optimised at the end", GraphConfig
     ),
 }
+BUILT_IN = frozenset(BACKENDS)
+"""What comes along; other names are a user's own, of which the processes of a campaign are told."""

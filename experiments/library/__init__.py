@@ -1,0 +1,1 @@
+"""What `import chainslam` offers: the commands as functions, and what they leave as objects."""

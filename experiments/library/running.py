@@ -1,0 +1,168 @@
+"""`explore` and `replay` as functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, overload
+
+from explore.planning.navigators import Navigation
+from explore.step import Step
+from slam.backends import BACKENDS
+from slam.robot import Robot, RobotSpec
+
+from ..artifacts.results import REPLAY, config_record, write_results
+from ..artifacts.run_folder import held, prepare, refuse_others, settle
+from ..artifacts.settings import options_of
+from ..commands.explore import Explore
+from ..commands.replay import Replay
+from ..replays.real_log import RealOptions
+from ..replays.replay import Association
+from ..replays.sources import RECORDED
+from ..replays.unwitnessed import run_unwitnessed, unwitnessed
+from ..scenario import P0, TrialConfig, build, check, load_world
+from ..trial import TrialResult, default_mission, run_scenario
+from ..usage import UsageError, choose
+from .runs import Home, Run
+
+Watch = Callable[[Step], None]
+
+
+def explore(
+    world: str | Path | Robot,
+    *,
+    backend: str = "full-ekf",
+    strategy: str = "nearest-robot",
+    seed: int = 1,
+    p0: P0 = "small",
+    errorless: bool = False,
+    navigation: Navigation = "floor",
+    sweep: bool = True,
+    max_steps: int | None = None,
+    max_path: float | None = None,
+    time_limit: float | None = None,
+    return_to_start: bool = False,
+    start: tuple[float, ...] | None = None,
+    scale: float | None = None,
+    robot: str | Path | RobotSpec | None = None,
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    watch: Watch = lambda step: None,
+) -> Run:
+    """Explore a world, or with a robot of one's own, and return the run; `chainslam explore` as a function.
+
+    `world` is a bundled name, a file, or a `Robot`. Of a robot of one's own nobody knows the truth: its scores are
+    None, and the map's frame is its first pose. `robot` is what it states of itself: a bundled name, a YAML file or a
+    `RobotSpec`. `settings` are those of --set: keys of config.json and their values. `watch` sees every step. Without
+    `out` the files go with the returned object. Raises UsageError, in one line, for bad input.
+    """
+    own = None if isinstance(world, str | Path) else world
+    name = str(world) if own is None else type(own).__name__
+    spec = robot if isinstance(robot, RobotSpec) else None
+    options = Explore(
+        world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
+        sweep=sweep, max_steps=max_steps, max_path=max_path, time_limit=time_limit, return_to_start=return_to_start,
+        start=start, scale=scale, robot=None if robot is None or spec is not None else str(robot),
+        set=tuple(_words(settings or {})),
+    )  # fmt: skip
+    trial = options.trial
+    if spec is not None:
+        stated = {each.name: getattr(spec, each.name) for each in fields(RobotSpec)}
+        trial = replace(trial, robot=replace(trial.robot, **stated))
+    check(trial)
+    if own is None:
+        drawn = load_world(trial.world, trial.start, trial.scale)
+        return _kept(*_folder(out), trial, force, lambda: run_scenario(build(trial, drawn), watch, default_mission))
+    scenario = unwitnessed(replace(trial, p0="zero"), own)
+    said = config_record(scenario.config) | {REPLAY: {RECORDED: asdict(RealOptions())}}
+    return _kept(*_folder(out), said, force, lambda: run_unwitnessed(scenario, watch, default_mission))
+
+
+@overload
+def replay(
+    log: str | Path | Run,
+    *,
+    backend: str = "full-ekf",
+    association: Association = "own",
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    watch: Watch = ...,
+) -> Run: ...
+
+
+@overload
+def replay(
+    log: str | Path | Run,
+    *,
+    backend: list[str] | tuple[str, ...],
+    association: Association = "own",
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    watch: Watch = ...,
+) -> dict[str, Run]: ...
+
+
+def replay(
+    log: str | Path | Run,
+    *,
+    backend: str | list[str] | tuple[str, ...] = "full-ekf",
+    association: Association = "own",
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    watch: Watch = lambda step: None,
+) -> Run | dict[str, Run]:
+    """Send a log, or the log of a run, through one back end or several; `chainslam replay` as a function.
+
+    Returns the run, or with several names the runs by name. Raises UsageError, in one line, for bad input.
+    """
+    names = (backend,) if isinstance(backend, str) else tuple(backend)
+    path = log.folder / "log.npz" if isinstance(log, Run) else Path(log)
+    command = Replay(path, backend=names, association=association, set=tuple(_words(settings or {})))
+    for name in names:
+        choose("back end", name, BACKENDS)
+    source = command.source()
+    runs: dict[str, Run] = {}
+    folder, home = _folder(out)
+    for name in names:
+        own = folder / name if len(names) > 1 else folder
+        config = source.config(name)
+        runs[name] = _kept(own, home, config, force, partial(source.go, name, watch))
+    return runs[backend] if isinstance(backend, str) else runs
+
+
+def _words(settings: Mapping[str, Any]) -> list[str]:
+    """Return settings as --set takes them."""
+    return options_of(settings.items())[1::2]
+
+
+def _folder(out: str | Path | None) -> tuple[Path, Home | None]:
+    """Return the folder for the results, and what keeps one that nobody named."""
+    if out is not None:
+        return Path(out), None
+    home = Home()
+    return home.folder / "run", home
+
+
+def _kept(
+    folder: Path,
+    home: Home | None,
+    config: TrialConfig | dict[str, Any],
+    force: bool,
+    go: Callable[[], TrialResult],
+) -> Run:
+    """Run in a folder, write all that came of it, and return it; raises UsageError where something was not written."""
+    said = config_record(config) if isinstance(config, TrialConfig) else config
+    prepare(folder)
+    with held(folder):
+        refuse_others(folder, said, force)
+        settle(folder, said)
+        problems = write_results(go(), folder, said)
+    if problems:
+        raise UsageError(f"expected to write a run's files, found {problems[0]}: see {folder}")
+    return Run(folder, home)

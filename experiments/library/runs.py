@@ -1,0 +1,156 @@
+"""A run as an object over the files in its folder, wherever they came from: one way to read what a run left."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING, Any, Literal
+from weakref import finalize
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from sim.logs.archive import regular
+from slam.geometry.lines import directions, normals
+
+from ..artifacts.reading import UnfitError, read_arrays, read_json, told
+from ..artifacts.results import MAP, SUMMARY
+from ..usage import UsageError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REMEDY = "name a folder that explore or replay left"
+STEPS = "steps.csv"
+MAP_ARRAYS = {
+    "pose": "float 3",
+    "ids": "int n",
+    "lines": "float n 2",
+    "lines_world": "float n 2",
+    "anchors": "float n 2",
+    "extents": "float n 2",
+    "tentative": "bool n",
+    "cov": "float c c",
+}
+Picture = Literal["map", "paths", "nees", "model", "traversals"]
+
+
+class Home:
+    """A folder for results that nobody named a place for; it goes when nothing refers to it any more."""
+
+    def __init__(self) -> None:
+        self.folder = Path(mkdtemp(prefix="chainslam-"))
+        finalize(self, rmtree, self.folder, True)
+
+
+@dataclass(frozen=True)
+class Map:
+    """The walls that a run ended with, n of them, world frame."""
+
+    ids: Int[np.ndarray, " n"]
+    lines_world: Float[np.ndarray, "n 2"]
+    """(alpha rad, r m) in the paper's Hessian form; alpha points from the seen side into the wall."""
+    ends_world: Float[np.ndarray, "n 2 2"]
+    """First and last point, m; walking on, the free side is on the left."""
+    tentative: Bool[np.ndarray, " n"]
+    """Walls that were not seen well enough yet."""
+    pose_world: Float[np.ndarray, 3]
+    """The robot at the end, m m rad."""
+    cov: Float[np.ndarray, "s s"]
+    """Joint covariance of the pose and the lines (alpha, d) about their anchors, s = 3 + 2 n."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What `explore` or `replay` left in a folder."""
+
+    folder: Path
+    """Where its files are (docs/reference/files.md); of a run without a folder of its own they go with this object."""
+    _home: Home | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Return the keys of `summary.json`; raises UsageError where a file is missing or another, as all here do."""
+        return read_json(self.folder / SUMMARY, {"status": str}, REMEDY)
+
+    @cached_property
+    def steps(self) -> Any:
+        """Return `steps.csv`, a row for each step: a pandas DataFrame, or arrays by name where pandas is missing."""
+        return table_at(self.folder / STEPS)
+
+    @cached_property
+    def map(self) -> Map:
+        """Return the walls at the end."""
+        arrays = read_arrays(self.folder / MAP, MAP_ARRAYS, REMEDY)
+        alpha = arrays["lines"][:, 0]
+        feet = arrays["anchors"] + arrays["lines"][:, 1:] * normals(alpha)
+        ends = feet[:, None] + arrays["extents"][..., None] * directions(alpha)[:, None]
+        return Map(arrays["ids"], arrays["lines_world"], ends, arrays["tentative"], arrays["pose"], arrays["cov"])
+
+    def plot(self, picture: Picture = "map") -> Figure:
+        """Return a picture as a matplotlib figure: the map, the paths, the NEES, the model space or the traversals.
+
+        All but the map need the truth, which a real robot does not know.
+        """
+        from ..views.pictures import figure_of
+
+        return figure_of(self.folder, picture)
+
+    def report(self) -> Path:
+        """Write the page that `chainslam report` writes, and return its place."""
+        from ..commands.report import REPORT, Report
+
+        Report(self.folder).write()
+        return self.folder / REPORT
+
+    def __repr__(self) -> str:
+        said = self.summary
+        return (
+            f"Run({said['world']}, {said['backend']}, {said['strategy']}, seed {said['seed']}: {said['status']} after"
+            f" {said['steps']} steps)"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the floor plan, which a notebook shows."""
+        plan = self.folder / "map.svg"
+        return plan.read_text() if plan.is_file() else f"<pre>{self!r}</pre>"
+
+
+def table_at(path: Path) -> Any:
+    """Return a CSV table as a pandas DataFrame, as arrays by name where pandas is missing; raises UsageError."""
+    with told(path, REMEDY):
+        file = regular(path)
+        try:
+            import pandas
+        except ImportError:
+            with file.open(newline="") as stream:
+                rows = list(csv.DictReader(stream))
+            return {name: _array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        try:
+            return pandas.read_csv(file)
+        except (ValueError, pandas.errors.ParserError) as error:
+            raise UnfitError("another table, or one that was cut short") from error
+
+
+def _array(cells: list[str]) -> np.ndarray:
+    """Return a column as numbers, NaN for an empty cell; as text where it holds any."""
+    try:
+        return np.array([float(cell or "nan") for cell in cells])
+    except ValueError:
+        return np.array(cells)
+
+
+def run_at(folder: Path) -> Run:
+    """Return the run in a folder; raises UsageError where there is none."""
+    if not (folder / SUMMARY).is_file():
+        raise UsageError(f"expected a run's {SUMMARY}, found none in {folder}: {REMEDY}")
+    run = Run(folder)
+    _ = run.summary
+    return run

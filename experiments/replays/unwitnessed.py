@@ -1,0 +1,92 @@
+"""A robot of which nobody knows the truth: it explores or is ridden, and is scored by what its map itself tells."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from explore.certificate import certify
+from explore.step import Step
+from sim.logs.keyframes import RecordedLog
+from sim.logs.recorded_robot import Recording
+from slam.robot import MotionCommand, Odometry, Robot, Scan
+
+from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, make_backend, strategy_of
+from ..scoring.certificate import certificate_record
+from ..scoring.records import Log, Recorder
+from ..scoring.smoothing import smooth
+from ..scoring.unwitnessed import NoVotes, UnwitnessedRecord, no_truth, summarise_unwitnessed, unseen_world
+from ..trial import Mission, TrialResult, bare_summary, ride
+
+START_SIGMAS = (1e-4, 1e-4, 1e-5)
+"""The first scan is the map's frame: the pose there is known, m m rad."""
+
+
+class UnwitnessedRobot:
+    """Any robot, and a record of its drive that knows nothing of the truth."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._record = robot, UnwitnessedRecord()
+
+    @property
+    def record(self) -> UnwitnessedRecord:
+        """What is known of what really happened: nothing."""
+        return self._record
+
+    def sense(self) -> Scan:
+        """Return the scan at the present place."""
+        scan = self._robot.sense()
+        self._record.sensed(len(scan.ranges_m))
+        return scan
+
+    def drive(self, command: MotionCommand) -> Odometry:
+        """Carry out one command and return the odometry."""
+        return self._robot.drive(command)
+
+
+def unwitnessed(config: TrialConfig, robot: Robot) -> Scenario:
+    """Return the scenario of a robot in a building that nobody drew; raises UsageError for names in no registry."""
+    check(config)
+    start, cov = np.zeros(3), np.diag(np.square(START_SIGMAS))
+    strategy = None if config.strategy == STRATEGY_OF_REPLAYS else strategy_of(config.strategy)
+    return Scenario(
+        config,
+        unseen_world(config.world),
+        UnwitnessedRobot(robot),
+        make_backend(config, start, cov),
+        strategy,
+        start,
+        cov,
+    )
+
+
+def run_unwitnessed(
+    scenario: Scenario, watch: Callable[[Step], None], mission: Mission, recorded: RecordedLog | None = None
+) -> TrialResult:
+    """Run a scenario without truth to its end, whatever that is, and return all that was computed.
+
+    `recorded` is the log that the robot plays back; of a robot that drives itself its own steps are taken.
+    """
+    votes = NoVotes(no_truth(scenario.world))
+    recorder = Recorder(scenario.robot, votes)
+    ending = ride(scenario, recorder, watch, mission)
+    recorder.close()
+    if recorder.last is None:
+        return TrialResult(scenario, ending, None, votes, None, None, None, bare_summary(scenario, ending))
+    log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
+    certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, log.estimated_world[:, :2])
+    summary: dict[str, Any] = summarise_unwitnessed(scenario, log, votes, last, ending)
+    summary |= {"certificate": certificate_record(certificate)}
+    smoothed = smooth(scenario.backend, last.map, log.unstated_motion, scenario.config.robot.scanner)
+    log_of_robot = recorded or _own_log(log)
+    return TrialResult(scenario, ending, log, votes, last, recorder.joint, certificate, summary, smoothed, log_of_robot)
+
+
+def _own_log(log: Log) -> RecordedLog:
+    """Return what a robot reported on its own drive, every scan of it a keyframe."""
+    recording = Recording(
+        log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
+        log.touched, log.sigma_share,
+    )  # fmt: skip
+    steps = len(log)
+    return RecordedLog(recording, log.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(3))

@@ -1,0 +1,154 @@
+"""`import chainslam`: light to import, complete, and the same results as the command line."""
+
+import builtins
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import chainslam
+from experiments.commands.cli import main
+from slam.backends.full_ekf import FullEkf
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+HEAVY = ("gtsam", "rerun", "matplotlib", "pandas", "numpy")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return chainslam.explore("paper-fig4", seed=2, max_steps=30, out=tmp_path_factory.mktemp("run") / "out")
+
+
+def test_nothing_heavy_is_loaded_before_it_is_used(tmp_path):
+    words = f"import sys, chainslam; print([name for name in {HEAVY} if name in sys.modules], chainslam.__version__)"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert done.stdout.startswith("[] 0.")
+
+
+def test_every_name_is_there_and_no_other():
+    assert all(getattr(chainslam, name) is not None for name in chainslam.__all__)
+    assert dir(chainslam) == sorted(chainslam.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'explor'"):
+        _ = chainslam.explor
+
+
+def test_a_run_is_what_the_command_leaves(run, tmp_path):
+    assert main(["explore", "paper-fig4", "--seed", "2", "--max-steps", "30", "--out", str(tmp_path)]) == 0
+    for name in ("config.json", "map.npz", "log.npz", "trajectory_estimated.tum"):
+        assert (tmp_path / name).read_bytes() == (run.folder / name).read_bytes()
+    assert chainslam.load(tmp_path).summary["pose_anees"] == run.summary["pose_anees"]
+
+
+def test_settings_are_those_of_the_command(tmp_path):
+    key = "mission.mapper.matching.gate"
+    run = chainslam.explore("paper-fig4", max_steps=3, settings={key: 0.95}, robot="turtlebot")
+    words = ["--set", f"{key}=0.95", "--robot", "turtlebot", "--max-steps", "3"]
+    assert main(["explore", "paper-fig4", *words, "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "config.json").read_bytes() == (run.folder / "config.json").read_bytes()
+
+
+def test_the_map_has_ends_lines_and_covariance_of_its_walls(run):
+    walls = run.map
+    assert len(walls) == len(walls.ids) > 3
+    n = np.stack([np.cos(walls.lines_world[:, 0]), np.sin(walls.lines_world[:, 0])], axis=-1)
+    off = np.einsum("nd,ned->ne", n, walls.ends_world) - walls.lines_world[:, 1:]
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)
+    assert walls.cov.shape == (3 + 2 * len(walls),) * 2
+
+
+def test_steps_are_a_table_with_pandas_and_arrays_without(run, monkeypatch):
+    frame = run.steps
+    assert len(frame) == run.summary["steps"]
+    imported = builtins.__import__
+
+    def without(name, *more):
+        if name == "pandas":
+            raise ImportError(name)
+        return imported(name, *more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    plain = chainslam.load(run.folder).steps
+    assert list(plain) == list(frame.columns)
+    np.testing.assert_allclose(plain["pose_nees"], frame["pose_nees"].to_numpy())
+    assert plain["reason"][0] == frame["reason"][0]
+
+
+@pytest.mark.parametrize("picture", ["map", "paths", "nees", "model", "traversals"])
+def test_pictures_are_figures(run, picture):
+    assert run.plot(picture).axes
+
+
+def test_a_run_without_a_folder_keeps_its_files_as_long_as_it_lives():
+    made = chainslam.explore("paper-fig4", max_steps=2)
+    folder = made.folder
+    assert made.summary["steps"] == 2
+    assert (folder / "map.npz").is_file()
+    del made
+    assert not folder.exists()
+
+
+def test_a_log_goes_through_one_back_end_or_several(run):
+    assert chainslam.replay(run, backend="full-ekf").summary["backend"] == "full-ekf"
+    runs = chainslam.replay(run.folder / "log.npz", backend=["block-ekf", "fej-ekf"])
+    assert {name: made.summary["backend"] for name, made in runs.items()} == {name: name for name in runs}
+
+
+class Doubting(FullEkf):
+    """A back end of one's own."""
+
+
+def test_processes_of_a_campaign_know_a_back_end_of_ones_own(monkeypatch):
+    monkeypatch.setitem(chainslam.BACKENDS, "doubting", chainslam.BackendEntry(Doubting, "for a test"))
+    backends = ["doubting", "full-ekf"]
+    made = chainslam.compare(worlds=["paper-fig4"], backends=backends, trials=1, max_steps=4, modes=["closed"], jobs=2)
+    assert sorted(made.trials["backend"]) == backends
+    assert made.trials["status"].tolist() == ["stopped", "stopped"]
+    assert made.verdict
+    assert "<html" in made.report().read_text()
+    assert isinstance(chainslam.load(made.folder), chainslam.Comparison)
+
+
+class Wrapped:
+    """A robot of one's own: it hands on what another one does, and knows no truth."""
+
+    def __init__(self, robot):
+        self._robot = robot
+
+    def sense(self):
+        return self._robot.sense()
+
+    def drive(self, command):
+        return self._robot.drive(command)
+
+
+def test_a_robot_of_ones_own_explores_and_has_no_scores_of_the_truth():
+    from experiments.scenario import TrialConfig, build
+
+    robot = Wrapped(build(TrialConfig("paper-fig4", seed=3)).robot)
+    run = chainslam.explore(robot, robot=chainslam.RobotSpec(radius_m=0.2), max_steps=25)
+    assert run.summary["world"] == "Wrapped"
+    assert (run.summary["pose_anees"], run.summary["coverage"]) == (None, None)
+    assert len(run.map) > 3
+    assert run.plot().axes
+    with pytest.raises(chainslam.UsageError, match="whose truth nobody knows"):
+        run.plot("nees")
+    assert "Wrapped" in run.report().read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "call"),
+    [
+        ("did you mean paper-fig4", lambda: chainslam.explore("paper-fig44")),
+        ("did you mean full-ekf", lambda: chainslam.explore("paper-fig4", backend="ful-ekf")),
+        ("the unknown key 'gate'", lambda: chainslam.explore("paper-fig4", settings={"gate": 1})),
+        ("expected a run's summary.json", lambda: chainslam.load("nowhere")),
+        ("expected a back end", lambda: chainslam.replay("nowhere/log.npz", backend=["none"])),
+    ],
+)
+def test_bad_input_is_one_line(words, call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(chainslam.UsageError, match=words) as told:
+        call()
+    assert "\n" not in str(told.value)
+    assert list(tmp_path.iterdir()) == []
