@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sim.worlds.registry import READERS, WORLDS
     from slam.backends import BACKENDS, BackendEntry
     from slam.estimation.backend import Backend, Belief, Joint, Observations
-    from slam.robot import MotionCommand, Odometry, Robot, RobotSpec, Scan
+    from slam.robot import MotionCommand, Odometry, Robot, RobotError, RobotSpec, Scan, ScannerSpec, WheelSpec
 
 _PLACES = {
     "experiments.library.running": ("explore", "replay"),
@@ -36,7 +36,16 @@ _PLACES = {
     "sim.worlds.registry": ("READERS", "WORLDS"),
     "slam.backends": ("BACKENDS", "BackendEntry"),
     "slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations"),
-    "slam.robot": ("MotionCommand", "Odometry", "Robot", "RobotSpec", "Scan"),
+    "slam.robot": (
+        "MotionCommand",
+        "Odometry",
+        "Robot",
+        "RobotError",
+        "RobotSpec",
+        "Scan",
+        "ScannerSpec",
+        "WheelSpec",
+    ),
 }
 """Where each name comes from."""
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -44,8 +53,10 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 __version__ = version("chainslam")
 __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
-    "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotSpec", "Run", "Scan", "Situation",
-    "Step", "Strategy", "StrategyEntry", "UsageError", "World", "__version__", "compare", "explore", "load", "replay",
+    "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError", "RobotSpec", "Run", "Scan",
+    "ScannerSpec", "Situation",
+    "Step", "Strategy", "StrategyEntry", "UsageError",
+    "WheelSpec", "World", "__version__", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 
 
