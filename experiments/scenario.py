@@ -19,6 +19,7 @@ from slam.estimation.backend import Backend
 from slam.estimation.mounting import start_of_scanner
 from slam.odometry.config import ScanMatchingConfig
 from slam.robot import Robot, fitted
+from slam.smoothing.config import SecondLooksConfig
 
 from .usage import UsageError, choose, did_you_mean
 
@@ -42,6 +43,8 @@ class MappingMissionConfig(MissionConfig):
     mapper: MapperConfig = field(default_factory=MapperConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
     """Of replays whose odometry is told by the scans."""
+    second_looks: SecondLooksConfig = field(default_factory=SecondLooksConfig)
+    """Of real robots' logs, once the drive has ended."""
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,9 @@ class Replay:
     odometry: OdometrySource | None = None
     """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
     matching*). By default the wheels of a simulated run and the scans of a real robot's log."""
+    second_looks: bool = False
+    """Once the drive of a real robot's log has ended, associate all segments anew and smooth the path by all of them
+    (trajectory_smoothed.tum). Back ends that smooth do so anyway."""
     every: int = 1
     """Of a real robot's log, map one of so many keyframes (the scans that are 0.1 m or 5 degrees apart)."""
     relations: Path | None = None
@@ -127,7 +130,13 @@ class Replay:
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
         real = RealLog(
-            read_real_run(self.log, RealOptions(self.every, self.odometry or "scans"), self.config, self.set, robot)
+            read_real_run(
+                self.log,
+                RealOptions(self.every, self.odometry or "scans", self.second_looks),
+                self.config,
+                self.set,
+                robot,
+            )
         )
         if real.run.log.trouble:
             say(

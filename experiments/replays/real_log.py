@@ -14,10 +14,13 @@ from explore.step import Step
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordedRobot, RecordingError
+from slam.extraction.segments import Segments
 from slam.mapper import Mapper
+from slam.smoothing.second_looks import second_looks
 
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
+from ..scoring.smoothing import Smoothed
 from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
@@ -33,6 +36,8 @@ class RealOptions:
     """One of so many keyframes is mapped."""
     odometry: OdometrySource = "scans"
     """Who tells the motion between two keyframes."""
+    second_looks: bool = False
+    """Whether all segments are associated anew once the drive has ended; a back end that smooths has it anyway."""
 
 
 @dataclass(frozen=True)
@@ -83,4 +88,22 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
         mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
         return ride_mission(heard, mapper, len(run.log.recording))
 
-    return run_unwitnessed(scenario, watch, mission, run.log)
+    seen: list[Segments] = []
+
+    def keep(step: Step) -> None:
+        seen.append(step.segments)
+        watch(step)
+
+    result = run_unwitnessed(scenario, keep, mission, run.log)
+    return looked_again(result, seen) if run.options.second_looks or result.smoothed is not None else result
+
+
+def looked_again(result: TrialResult, seen: Sequence[Segments]) -> TrialResult:
+    """Return a result whose smoothed path is that of second looks at all segments; walls stay those of the back end."""
+    log, last, joint = result.log, result.last, result.joint
+    if log is None or last is None or joint is None:
+        return result
+    smoothed = result.smoothed or Smoothed(log.estimated_world, last.map, joint)
+    config = result.scenario.config.mission.second_looks
+    poses = second_looks(smoothed.poses_world, log.odometry[1:], seen[: len(log)], config)
+    return replace(result, smoothed=replace(smoothed, poses_world=poses))

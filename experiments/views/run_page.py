@@ -208,7 +208,8 @@ def _command_real(trial: TrialConfig, names: list[str], said: Any) -> str:
     tuned = [(key, value) for key, value in differing(trial) if key.split(".")[0] in OPEN_TO_REPLAYS]
     words = ["chainslam", "replay", trial.world, "--backend", *names, *options_of(tuned)]
     for key, value in sorted(said[RECORDED].items()):
-        words += [f"--{key}", str(value)]
+        option = f"--{key.replace('_', '-')}"
+        words += [option] * value if isinstance(value, bool) else [option, str(value)]
     return shlex.join([*words, "--out", "DIR"])
 
 

@@ -77,19 +77,22 @@ def relation_errors(
 def errors_at_scans(
     time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
 ) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
-    """Return the relations both of whose times are those of scans, to 10 ms, and their errors (m, rad)."""
-    first, has_first = nearest_rows(time_s, relations.first_s)
-    second, has_second = nearest_rows(time_s, relations.second_s)
-    both = has_first & has_second
-    chosen = relations.take(both)
-    return chosen, relation_errors(poses_world[first[both]], poses_world[second[both]], chosen.motions)
+    """Return the relations both of whose times are those of scans, to 10 ms, and their errors (m, rad).
+
+    Poses are those at the relation's own times: scans may be 3 ms apart where they are written in bursts.
+    """
+    both = nearest_rows(time_s, relations.first_s)[1] & nearest_rows(time_s, relations.second_s)[1]
+    return errors_between_scans(time_s, poses_world, relations.take(both), SAME_TIME_S)
 
 
 def errors_between_scans(
-    time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
+    time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations, beyond_s: float = 0.0
 ) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
-    """Return the relations whose times the path covers, and their errors (m, rad), its poses being interpolated."""
-    chosen = relations.within(float(time_s[0]), float(time_s[-1]))
+    """Return the relations whose times the path covers, and their errors (m, rad), its poses being interpolated.
+
+    It covers a time that is `beyond_s` before its first pose or after its last one.
+    """
+    chosen = relations.within(float(time_s[0]) - beyond_s, float(time_s[-1]) + beyond_s)
     first, second = (interpolated(time_s, poses_world, asked) for asked in (chosen.first_s, chosen.second_s))
     return chosen, relation_errors(first, second, chosen.motions)
 

@@ -66,7 +66,7 @@ def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
     name, backend = task
     relations, path = study.logs / f"{name}.relations", study.logs / f"{name}.ref_gmapping.txt"
     references = read_references(*(file if file.is_file() else None for file in (relations, path)))
-    options = RealOptions(study.every, study.odometry)
+    options = RealOptions(study.every, study.odometry, second_looks=True)
     run = read_real_run(study.logs / f"{name}.log.gz", options, None, (), {})
     began = time.process_time()
     result = held_against(replay_real(run, backend), references)

@@ -60,6 +60,13 @@ def test_a_smoothed_path_is_scored_beside_the_one_of_each_step(scored):
     assert (scored / "out" / "graph-batch" / "trajectory_smoothed.tum").is_file()
 
 
+def test_second_looks_smooth_the_path_of_any_back_end(scored, tmp_path):
+    words = ["replay", str(scored / "a.log"), "--relations", str(scored / "a.relations"), "--out", str(tmp_path)]
+    assert main([*words, "--second-looks"]) == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["relations_smoothed"]["at_scans"]["all"]["count"] == 2
+    assert len(np.loadtxt(tmp_path / "trajectory_smoothed.tum")) == 12
+
+
 def test_scores_are_printed(scored, capsys):
     words = ["replay", str(scored / "a.log"), "--relations", str(scored / "a.relations"), "--out"]
     assert main([*words, str(scored / "again"), "--reference", str(scored / "a.txt")]) == 0

@@ -114,7 +114,7 @@ def test_settings_reach_the_mapper_and_every_second_keyframe_is_mapped(replayed,
     assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
     config, summary = (json.loads((tmp_path / name).read_text()) for name in ("config.json", "summary.json"))
     assert config["trial"]["mission"]["mapper"]["matching"]["gate"] == 0.95
-    assert config["replay"] == {"recorded": {"every": 2, "odometry": "scans"}}
+    assert config["replay"] == {"recorded": {"every": 2, "odometry": "scans", "second_looks": False}}
     whole = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
     assert summary["steps"] == -(-whole // 2)
     assert len(np.loadtxt(tmp_path / "trajectory_estimated.tum")) == 24

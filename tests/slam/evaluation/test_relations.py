@@ -58,7 +58,7 @@ def test_only_times_of_scans_count_at_scans_and_all_that_the_path_covers_between
     path = np.column_stack([times, np.zeros((4, 2))])
     at, errors = errors_at_scans(times, path, relations)
     np.testing.assert_allclose(at.second_s, [1.0, 99.991])
-    np.testing.assert_allclose(errors[:, 0], [1.0, 100.0])
+    np.testing.assert_allclose(errors[:, 0], [0.991, 99.991])
     np.testing.assert_array_equal(at.far, [False, True])
     between, errors = errors_between_scans(times, path, relations)
     np.testing.assert_allclose(errors[:, 0], between.second_s - between.first_s)

@@ -1,0 +1,1 @@
+"""What all scans of a drive say together, once it has ended."""

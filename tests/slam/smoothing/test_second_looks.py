@@ -1,0 +1,145 @@
+"""Second looks: segments of a whole drive are associated anew, and poses and lines solved for together."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from slam.extraction.segments import Segments
+from slam.geometry.lines import lines_to_world, through
+from slam.geometry.poses import compose, inverse, to_robot, wrap
+from slam.smoothing.config import SecondLooksConfig
+from slam.smoothing.landmarks import associated, firm, joined
+from slam.smoothing.second_looks import second_looks
+from slam.smoothing.solve import _of_motions, _of_sightings, begun, solved
+
+WALLS = np.array([[[6, 0], [0, 0]], [[0, 0], [0, 4]], [[0, 4], [6, 4]], [[6, 4], [6, 0]], [[2, 1.5], [4, 1.5]]], float)
+CONFIG = SecondLooksConfig()
+
+
+def segments_at(pose, rng, walls=WALLS):
+    """All walls as they are seen from a pose, a little off."""
+    ends = np.array([to_robot(wall, pose) for wall in walls]) + rng.normal(0.0, 0.003, (len(walls), 2, 2))
+    lines = through(ends)
+    n = len(walls)
+    middles = ends.mean(axis=1)
+    t0 = np.sum(middles * np.column_stack([-np.sin(lines[:, 0]), np.cos(lines[:, 0])]), axis=1)
+    a = 0.002**2
+    cov = np.array([[[a, t * a], [t * a, 0.003**2 + t**2 * a]] for t in t0])
+    return Segments(
+        lines, cov, ends, np.zeros((n, 2), dtype=np.int64), np.full(n, 20), np.zeros((n, 2), dtype=np.int64),
+        np.zeros(n), np.zeros(n, dtype=bool),
+    )  # fmt: skip
+
+
+def drive(count=60, seed=1, walls=WALLS):
+    """True poses round a room, and what odometry makes of them: a drift of half a metre."""
+    rng = np.random.default_rng(seed)
+    turn = np.linspace(0.0, 4.0 * np.pi, count)
+    true = np.column_stack([3 + 2 * np.cos(turn), 2.6 + np.sin(turn), wrap(turn)])
+    motions = np.array([compose(inverse(a), b) for a, b in pairwise(true)])
+    motions += rng.normal(0.0, [0.01, 0.01, 0.004], (count - 1, 3))
+    poses = [true[0]]
+    for motion in motions:
+        poses.append(compose(poses[-1], motion))
+    return true, np.array(poses), motions, [segments_at(pose, rng, walls) for pose in true]
+
+
+def test_a_drift_goes_that_no_filter_had_a_say_in():
+    true, drifted, motions, segments = drive()
+    before = np.hypot(*(drifted - true)[:, :2].T)
+    found = second_looks(drifted, motions, segments)
+    after = np.hypot(*(found - true)[:, :2].T)
+    assert before.max() > 0.08
+    assert after.max() < 0.02
+    assert np.abs(wrap(found[:, 2] - true[:, 2])).max() < 0.005
+    np.testing.assert_allclose(found[0], drifted[0], atol=1e-5)
+
+
+def test_one_scan_after_a_slip_that_nobody_told_does_not_bend_the_others():
+    true, drifted, motions, segments = drive()
+    motions[30] += [0.1, 0.05, 0.05]
+    for k in range(31, len(drifted)):
+        drifted[k] = compose(drifted[k - 1], motions[k - 1])
+    found = second_looks(drifted, motions, segments)
+    assert np.hypot(*(found - true)[:, :2].T).max() < 0.02
+
+
+def test_the_sides_of_a_thin_wall_are_two_lines_and_pieces_far_apart_too():
+    true, _, _, _ = drive(4)
+    walls = np.array([[[2, 1], [4, 1]], [[4, 1.1], [2, 1.1]], [[6, 1], [8, 1]]], float)
+    rng = np.random.default_rng(0)
+    sightings = joined([firm(k, segments_at(pose, rng, walls), CONFIG) for k, pose in enumerate(true)])
+    owner = associated(sightings, true, 0.25, CONFIG)
+    np.testing.assert_array_equal(owner.reshape(4, 3), np.tile([0, 1, 2], (4, 1)))
+
+
+def test_lines_that_were_seen_rarely_say_nothing_and_short_segments_are_left_out():
+    true, _, _, _ = drive(2)
+    rng = np.random.default_rng(0)
+    short = np.array([[[2, 1], [2.3, 1]], [[2, 3], [4, 3]]], float)
+    parts = [firm(k, segments_at(pose, rng, short), CONFIG) for k, pose in enumerate(true)]
+    assert [len(part) for part in parts] == [1, 1]
+    np.testing.assert_array_equal(associated(joined(parts), true, 0.25, CONFIG), [-1, -1])
+
+
+def problem():
+    true, drifted, motions, segments = drive(8)
+    sightings = joined([firm(k, each, CONFIG) for k, each in enumerate(segments)])
+    owner = associated(sightings, true, 0.25, CONFIG)
+    assert owner.min() == 0
+    return true, drifted, motions, sightings, owner
+
+
+def test_lines_begin_where_their_sightings_have_them():
+    true, _, _, sightings, owner = problem()
+    start = begun(true, sightings, owner)
+    for k in range(len(sightings)):
+        world = lines_to_world(through(sightings.ends[k : k + 1]), true[sightings.scan[k]])[0]
+        line, anchor = start.lines[owner[k]], start.anchors[owner[k]]
+        assert abs(wrap(world[0] - line[0])) < 0.01
+        assert abs(np.array([np.cos(world[0]), np.sin(world[0])]) @ anchor - world[1]) < 0.03
+
+
+@pytest.mark.parametrize("of", ["motions", "sightings"])
+def test_derivatives_are_those_of_differences(of):
+    _, drifted, motions, sightings, owner = problem()
+    start = begun(drifted, sightings, owner)
+
+    def terms(unknowns):
+        if of == "motions":
+            return _of_motions(unknowns.poses, motions, CONFIG)
+        return _of_sightings(unknowns, sightings, owner, CONFIG)
+
+    at = terms(start)
+    size, step = start.poses.size + start.lines.size, 1e-6
+    for u in range(size):
+        change = np.zeros(size)
+        change[u] = step
+        slope = (terms(start.plus(change)).errors - terms(start.plus(-change)).errors) / (2 * step)
+        told = np.zeros_like(slope)
+        for g, v in np.argwhere(at.columns == u):
+            told[g] = at.jacobians[g, :, v]
+        np.testing.assert_allclose(slope, told, atol=1e-4)
+
+
+def test_the_solution_is_a_least_of_the_weighted_errors():
+    _, drifted, motions, sightings, owner = problem()
+    found = solved(begun(drifted, sightings, owner), motions, sightings, owner, SecondLooksConfig(iterations=30))
+
+    def cost(unknowns):
+        parts = (_of_motions(unknowns.poses, motions, CONFIG), _of_sightings(unknowns, sightings, owner, CONFIG))
+        return sum(np.sum(np.log1p(np.sum(part.errors**2, axis=1) / CONFIG.doubt**2)) for part in parts)
+
+    least = cost(found)
+    rng = np.random.default_rng(5)
+    for _ in range(30):
+        change = 1e-3 * rng.standard_normal(found.poses.size + found.lines.size)
+        change[:3] = 0.0
+        assert cost(found.plus(change)) > least
+
+
+def test_a_drive_without_a_wall_follows_its_motions():
+    _, drifted, motions, segments = drive(5)
+    nothing = [each.take(np.zeros(0, dtype=np.int64)) for each in segments]
+    np.testing.assert_allclose(second_looks(drifted, motions, nothing), drifted, atol=1e-9)
