@@ -1,10 +1,11 @@
 """From the names in a command to a world, a robot, a back end and a strategy."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
+import shapely
 from jaxtyping import Float
 
 from explore.limits import Limits
@@ -153,6 +154,7 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
     sigmas = np.array([position_m, position_m, heading_rad])
     draw = np.zeros(3) if config.errorless else standard_normals(config.seed, Channel.START, 0, 3)
     start = np.asarray(world.start, dtype=np.float64) + sigmas * draw
+    world = fenced(world, config)
     cov = np.diag(sigmas**2)
     return Scenario(
         config,
@@ -163,6 +165,22 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
         start,
         cov,
     )
+
+
+def fenced(world: World, config: TrialConfig) -> World:
+    """Return the world with the mission's fence in it, for the scores; raises UsageError where it begins outside."""
+    corners = config.mission.free_space.fence
+    if corners is None:
+        return world
+    fence = shapely.Polygon(corners)
+    room = fence.buffer(-config.robot.radius_m)
+    if not fence.is_valid or not shapely.contains_xy(room, *world.start[:2]):
+        x, y = world.start[:2]
+        raise UsageError(
+            f"expected a fence around the start at ({x:.2f}, {y:.2f}) m with room for the body, found one without it:"
+            " widen it, or move the start by --start"
+        )
+    return replace(world, fence=fence)
 
 
 def make_backend(config: TrialConfig, start_world: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> Backend:

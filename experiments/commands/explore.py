@@ -10,6 +10,7 @@ from explore.planning.navigators import Navigation
 from explore.step import Step
 from sim.worlds import World
 
+from ..artifacts.fences import fence_of
 from ..artifacts.presets import PresetName, preset_of, robot_of
 from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
@@ -47,6 +48,7 @@ SETTLED = (
     "navigation",
     "start",
     "scale",
+    "fence",
     "preset",
     "robot",
     "config",
@@ -86,6 +88,9 @@ class Explore:
     """Once there is nothing left to explore, drive back to the start, to within 0.2 m."""
     start: tuple[float, ...] | None = None
     """Start pose instead of the drawing's own: x and y in metres, and perhaps the heading in rad."""
+    fence: Annotated[str | None, tyro.conf.arg(metavar="BOX|FILE")] = None
+    """Stay within a box, X0,Y0,X1,Y1 in metres of the world, or within the polygon of a GeoJSON file. What lies beyond
+    is not explored: an outdoor or unbounded world ends there."""
     scale: float | None = None
     """Metres per pixel or drawing unit, for files that do not say."""
     out: Path | None = None
@@ -123,6 +128,8 @@ class Explore:
         defaults.
         """
         given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
+        if self.fence is not None:
+            given["mission.free_space.fence"] = fence_of(self.fence)
         options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
         base = {} if self.config is None else read_settings(self.config)
         trial = trial_of(preset_of(self.preset), robot_of(self.robot), base, *map(parse_setting, self.set), options)

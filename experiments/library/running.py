@@ -46,6 +46,7 @@ def explore(
     return_to_start: bool = False,
     start: tuple[float, ...] | None = None,
     scale: float | None = None,
+    fence: str | None = None,
     robot: str | Path | RobotSpec | None = None,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
@@ -65,7 +66,7 @@ def explore(
     options = Explore(
         world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
         sweep=sweep, max_steps=max_steps, max_path=max_path, time_limit=time_limit, return_to_start=return_to_start,
-        start=start, scale=scale, robot=None if robot is None or spec is not None else str(robot),
+        start=start, scale=scale, fence=fence, robot=None if robot is None or spec is not None else str(robot),
         set=tuple(_words(settings or {})),
     )  # fmt: skip
     trial = options.trial

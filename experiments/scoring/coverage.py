@@ -36,18 +36,20 @@ class Samples:
 
 
 def sample(truth: Truth) -> Samples:
-    """Return the reachable contour as points every 0.02 m or less."""
+    """Return the reachable contour as points every 0.02 m or less; within the fence, where there is one."""
     pieces = truth.contour.segments
     along = pieces[:, 1] - pieces[:, 0]
     lengths = np.hypot(along[:, 0], along[:, 1])
     counts = np.maximum(np.ceil(lengths / PITCH_M).astype(int), 1)
     piece = np.repeat(np.arange(len(pieces)), counts)
     share = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece] + 0.5) / counts[piece]
+    points, fence = pieces[piece, 0] + share[:, None] * along[piece], truth.world.fence
+    within = np.ones(len(points), dtype=bool) if fence is None else shapely.contains_xy(fence, *points.T)
     return Samples(
-        pieces[piece, 0] + share[:, None] * along[piece],
-        normals(truth.lines[truth.contour.face[piece], 0]),
-        (lengths / counts)[piece],
-        truth.rings[truth.contour.face[piece]],
+        points[within],
+        normals(truth.lines[truth.contour.face[piece], 0])[within],
+        (lengths / counts)[piece][within],
+        truth.rings[truth.contour.face[piece]][within],
     )
 
 

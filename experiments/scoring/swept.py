@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
+from shapely.geometry.base import BaseGeometry
 
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
@@ -21,7 +22,7 @@ LOOKOUT_BEAMS = 720
 class Floor:
     """The cells of a building's free floor, and which of them were seen."""
 
-    def __init__(self, free: shapely.Polygon) -> None:
+    def __init__(self, free: BaseGeometry) -> None:
         self._x, self._y, self.free = _free_cells(free)
         self.seen: Bool[np.ndarray, "h w"] = np.zeros_like(self.free)
 
@@ -68,7 +69,7 @@ class Floor:
 
 @lru_cache(maxsize=4)
 def _free_cells(
-    free: shapely.Polygon,
+    free: BaseGeometry,
 ) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"], Bool[np.ndarray, "h w"]]:
     """Return the middles of columns and rows, and which cells are free; not to be written to."""
     low = np.array(free.bounds[:2])
@@ -86,7 +87,7 @@ def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
 
     What the reachable region sees beyond itself, its boundary sees, so looking out from the boundary is enough.
     """
-    floor = Floor(world.free)
+    floor = Floor(world.floor)
     region = world.reachable(config.radius_m)
     if region.is_empty:
         return floor.seen
@@ -115,7 +116,7 @@ def swept(
 ) -> float:
     """Return the share of the visible floor that scans at these true poses of the body have seen."""
     target = visible_floor(world, config)
-    floor = Floor(world.free)
+    floor = Floor(world.floor)
     for pose, ranges in zip(scanner_poses(poses_world, config.true_scanner), ranges_m, strict=True):
         floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
     return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)

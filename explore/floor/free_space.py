@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
@@ -26,6 +27,9 @@ class FreeSpaceConfig:
     """What one hit adds to a cell; a beam that passes takes one away."""
     limit: int = 6
     """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
+    fence: tuple[tuple[float, float], ...] | None = None
+    """Corners of a polygon that the robot keeps within, m, world frame; None where nothing bounds it. What lies beyond
+    is no floor: nothing there is driven to or looked for."""
     cells_max: int = 100_000_000
     """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
     clearance_beyond_m: float = 0.8
@@ -59,6 +63,8 @@ class FreeSpace:
         self._clearance = np.zeros((0, 0), dtype=np.float32)
         self._driven = np.zeros((0, 0), dtype=bool)
         self._touched = np.zeros((0, 0), dtype=bool)
+        self._beyond = np.zeros((0, 0), dtype=bool)
+        self._fence = None if config.fence is None else shapely.Polygon(config.fence)
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: _Box | None = None
         self._too_tight = np.zeros((0, 2))
@@ -124,6 +130,17 @@ class FreeSpace:
         return self._evidence[box] < 0
 
     @property
+    def beyond(self) -> Bool[np.ndarray, "h w"]:
+        """Which cells lie beyond the fence, to be read only; none without one."""
+        return self._beyond
+
+    def is_within(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return which points lie within the fence; all without one."""
+        if self._fence is None:
+            return np.ones(len(points_world), dtype=bool)
+        return np.asarray(shapely.contains_xy(self._fence, *points_world.T))
+
+    @property
     def origin_world(self) -> Float[np.ndarray, "2"]:
         """The lower left corner of the grid, m."""
         return self._first * self.config.cell_m
@@ -168,6 +185,7 @@ class FreeSpace:
         self._evidence[:] = 0
         self._driven[:] = False
         self._touched[:] = False
+        self._evidence[self._beyond] = self.config.limit
         self._too_tight = np.zeros((0, 2))
         self._mark(0, self.shape[0], 0, self.shape[1])
 
@@ -193,6 +211,7 @@ class FreeSpace:
         before = window > 0
         np.clip(window + change, -self.config.limit, self.config.limit, out=window)
         window[body] = np.minimum(window[body], -1)
+        window[self._beyond[_slices(box)]] = self.config.limit
         changed = np.nonzero((window > 0) != before)
         if len(changed[0]):
             (r0, r1), (c0, c1) = ((int(axis.min()), int(axis.max()) + 1) for axis in changed)
@@ -272,6 +291,12 @@ class FreeSpace:
                 self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
         self._evidence, self._clearance, self._first = evidence, clearance, first
         self._driven, self._touched = driven, touched
+        self._beyond = np.zeros(shape, dtype=bool)
+        if self._fence is not None:
+            columns, rows = ((first[k] + np.arange(n) + 0.5) * self.config.cell_m for k, n in enumerate(shape[::-1]))
+            self._beyond = ~np.asarray(shapely.contains_xy(self._fence, *np.meshgrid(columns, rows)))
+            self._evidence[self._beyond] = self.config.limit
+            self._mark(0, shape[0], 0, shape[1])
 
     def _too_large(self, centre_world: Float[np.ndarray, "2"]) -> FloorTooLargeError:
         side_m = np.sqrt(self.config.cells_max) * self.config.cell_m

@@ -108,6 +108,7 @@ class Explorer:
             self._strategy.watch(around)
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
+        self._keep_within(around, ends)
         self._abandon(around, ends)
         command = self._command(around, chains, ends, graph)
         given_up, task = self._ledger.given_up, self._task
@@ -206,6 +207,16 @@ class Explorer:
         if choice is None:
             choice = self._sweep.choose(situation) if is_sweep else _straight_to_nearest(situation)
         return None if choice is None else self._set_out(choice, situation, is_sweep)
+
+    def _keep_within(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
+        """Set aside what lies beyond the fence."""
+        candidates = self._candidates(ends)
+        if around.free_space.config.fence is None or not candidates:
+            return
+        within = around.free_space.is_within(np.array([end.position_world for end in candidates]))
+        for end, is_within in zip(candidates, within, strict=True):
+            if not is_within:
+                self._ledger.put_aside(end, "beyond the fence")
 
     def _tire(self, ends: dict[Key, OpenEnd]) -> None:
         """Set aside what opens and closes without end, as a chain can that looks closed from one side only."""

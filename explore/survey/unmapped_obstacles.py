@@ -23,7 +23,7 @@ LOOK_BEYOND_M = (0.4, 0.7)
 
 def unmapped_obstacles(free_space: FreeSpace, walls: StochasticMap) -> list[Float[np.ndarray, "n 2"]]:
     """Return what was hit and belongs to no wall of the map that is trusted, each as the cells' centres, m."""
-    cells = np.argwhere(free_space.evidence > 0)
+    cells = np.argwhere((free_space.evidence > 0) & ~free_space.beyond)
     things = connected(cells[~TrustedWalls(walls).near(free_space.points(cells), APART_M)], TOGETHER_CELLS)
     return [free_space.points(thing) for thing in things if len(thing) >= LEAST_CELLS]
 

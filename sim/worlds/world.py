@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 from jaxtyping import Float, Int
+from shapely.geometry.base import BaseGeometry
 
 from slam.robot import RobotSpec
 
@@ -37,6 +38,8 @@ class World:
     """Named points, m, world frame."""
     reading: Reading | None = None
     """None for a world that was not drawn."""
+    fence: shapely.Polygon | None = None
+    """Where the robot is to stay; None where it may go anywhere."""
 
     @cached_property
     def faces(self) -> Float[np.ndarray, "n 2 2"]:
@@ -54,9 +57,17 @@ class World:
     def _rings(self) -> list[shapely.LinearRing]:
         return [self.free.exterior, *self.free.interiors]
 
+    @cached_property
+    def floor(self) -> BaseGeometry:
+        """The free region, what of it lies within the fence."""
+        return self.free if self.fence is None else shapely.intersection(self.free, self.fence)
+
     def reachable(self, radius_m: float = ROBOT_RADIUS_M) -> shapely.Polygon:
         """Return where the centre of a disc of this radius can be driven from the start."""
-        inner = shapely.get_parts(self.free.buffer(-radius_m, quad_segs=16))
+        room = self.free.buffer(-radius_m, quad_segs=16)
+        floor = room if self.fence is None else shapely.intersection(room, self.fence.buffer(-radius_m))
+        inner = shapely.get_parts(floor)
+        inner = inner[shapely.get_type_id(inner) == shapely.GeometryType.POLYGON]
         at = shapely.Point(self.start[:2])
         return inner[int(np.argmin(shapely.distance(inner, at)))] if len(inner) else shapely.Polygon()
 

@@ -18,7 +18,7 @@ def occupancy_files(free_space: FreeSpace, start_world: Float[np.ndarray, "3"]) 
     The first row of the picture is the one farthest up; the origin is the outer corner of its lower left pixel,
     in the world frame of the map. `start_world` goes into a comment.
     """
-    evidence = free_space.evidence
+    evidence = np.where(free_space.beyond, 0, free_space.evidence)
     seen = np.argwhere(evidence != 0)
     if not len(seen):
         raise ValueError("expected floor that was seen, found none: this robot kept no free space")
