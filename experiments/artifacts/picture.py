@@ -60,6 +60,7 @@ def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> 
         title=f"{result.scenario.world.name}   {config.backend}",
         subtitle=";  ".join(words),
         odometry_path_world=odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)]),
+        radius_m=config.robot.radius_m,
     )
 
 
@@ -99,4 +100,5 @@ def over_truth(
         corners_world=np.array([place for place, _ in corners_with_covs]).reshape(-1, 2),
         corner_covs=np.array([cov for _, cov in corners_with_covs]).reshape(-1, 2, 2),
         true_floor=tuple(to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings),
+        radius_m=config.robot.radius_m,
     )

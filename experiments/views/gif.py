@@ -79,5 +79,6 @@ class _Film:
                 seen=floor.evidence < 0,
                 seen_origin_world=floor.origin_world.copy(),
                 cell_m=floor.config.cell_m,
+                radius_m=step.robot.radius_m,
             )
         )

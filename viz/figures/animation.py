@@ -20,6 +20,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from slam.map.chains import Chain
+from slam.robot import RobotSpec
 
 from .. import palette
 from ..text import literal
@@ -30,7 +31,6 @@ FRAME_MS, LAST_MS = 90, 2500
 LONGER_SIDE_PX, HEAD_PX, FOOT_PX = 480, 46, 34
 LEAST_WIDTH_PX = 420
 COLOURS = 48
-ROBOT_M = 0.2
 MARGIN_M = 0.4
 DPI = 100
 
@@ -55,6 +55,8 @@ class Frame:
     """Cells of the floor that were seen free so far; row is y."""
     seen_origin_world: Float[np.ndarray, "2"]
     cell_m: float
+    radius_m: float = RobotSpec.radius_m
+    """Of the body."""
 
 
 def shown_steps(count: int) -> list[int]:
@@ -155,10 +157,10 @@ def _drawn(axes: Axes, frame: Frame) -> list[Artist]:
     if open_ends:
         places = np.array(open_ends).T
         artists += axes.plot(*places, "o", markersize=8, color="none", markeredgecolor=palette.ALARM, mew=1.3, zorder=6)
-    x, y, heading = frame.path_world[-1]
-    body = Circle((x, y), ROBOT_M, facecolor=palette.PAGE, edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=7)
+    (x, y, heading), radius_m = frame.path_world[-1], frame.radius_m
+    body = Circle((x, y), radius_m, facecolor=palette.PAGE, edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=7)
     artists.append(axes.add_patch(body))
-    nose = np.array([[x, y], [x + ROBOT_M * np.cos(heading), y + ROBOT_M * np.sin(heading)]])
+    nose = np.array([[x, y], [x + radius_m * np.cos(heading), y + radius_m * np.sin(heading)]])
     artists += axes.plot(*nose.T, color=palette.PATH_ESTIMATED, linewidth=1.3, zorder=8)
     return artists
 

@@ -21,6 +21,7 @@ from matplotlib.ticker import MultipleLocator
 from explore.goal import SetAside
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
+from slam.robot import RobotSpec
 
 from .. import palette
 from ..shapes import ellipses
@@ -29,7 +30,6 @@ from ..text import literal
 WALL_M = 0.1
 """How thick true walls are drawn around the floor, m."""
 MARGIN_M = 0.6
-ROBOT_M = 0.2
 ENLARGED = 10.0
 """How much ellipses are enlarged that could not be seen else."""
 GRID_ORDER = 1.2
@@ -68,6 +68,8 @@ class Picture:
     """Rings of the true floor, the exterior first; empty where the truth is not known."""
     odometry_path_world: Float[np.ndarray, "s 3"] | None = None
     """Where the wheels alone say the robot was."""
+    radius_m: float = RobotSpec.radius_m
+    """Of the body."""
 
 
 def draw_map(picture: Picture) -> Figure:
@@ -257,11 +259,11 @@ def _times_words(times: float) -> str:
 
 def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     """Draw the body, and the ellipse of three standard deviations, ten times as large where it could not be seen."""
-    x, y, heading = picture.path_world[-1]
+    (x, y, heading), radius_m = picture.path_world[-1], picture.radius_m
     axes.add_patch(
-        Circle((x, y), ROBOT_M, facecolor="#FFFFFFCC", edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.5)
+        Circle((x, y), radius_m, facecolor="#FFFFFFCC", edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.5)
     )
-    nose = np.array([[x, y], [x + ROBOT_M * np.cos(heading), y + ROBOT_M * np.sin(heading)]])
+    nose = np.array([[x, y], [x + radius_m * np.cos(heading), y + radius_m * np.sin(heading)]])
     axes.plot(*nose.T, color=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.6)
     variances, vectors = np.linalg.eigh(picture.map.belief.pose_cov[:2, :2])
     radii = 3.0 * np.sqrt(np.maximum(variances, 0.0))

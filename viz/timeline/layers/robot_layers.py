@@ -14,7 +14,6 @@ from ..colours import packed
 from ..recording import RerunRecording, Timestamps
 from .map_layers import style, words_only
 
-ROBOT_M = 0.2
 POSE_TIMES = 10.0
 """How much the robot's ellipse is enlarged."""
 LABEL_M = 0.5
@@ -28,13 +27,16 @@ class RobotLayer:
         self._out, self._entity = out, f"/world/{backend}"
         self._colour = palette.of_backend(backend)
         self._before: Float[np.ndarray, "1 3"] | None = None
+        self._radius_m = 0.0
         out.fixed(f"{self._entity}/path", style(1.2, 20.0, colors=packed(self._colour)))
         out.fixed(f"{self._entity}/ellipse", style(1.0, 44.0, colors=packed(palette.ALARM)))
-        out.fixed(f"{self._entity}/robot/body", body(self._colour))
 
     def send(self, block: Block) -> None:
         """Send the pose, its ellipse, and the newest piece of the path."""
-        poses, moments = block.poses, block.moments
+        poses, moments, radius_m = block.poses, block.moments, block.rows[0].robot.radius_m
+        if radius_m != self._radius_m:
+            self._out.fixed(f"{self._entity}/robot/body", body(self._colour, radius_m))
+            self._radius_m = radius_m
         covs = np.array([row.pose_cov[:2, :2] for row in block.rows])
         once = np.ones(len(block), dtype=np.int64)
         self._out.poses(f"{self._entity}/robot", moments, poses)
@@ -42,12 +44,12 @@ class RobotLayer:
         self._before = send_path(self._out, f"{self._entity}/path", moments, poses, self._before)
 
 
-def body(colour: str, radius: float = 1.6, order: float = 46.0) -> rr.LineStrips2D:
-    """Return the robot's outline and nose in its own frame; half its lines' width in points of the screen."""
+def body(colour: str, radius_m: float, radius: float = 1.6, order: float = 46.0) -> rr.LineStrips2D:
+    """Return the robot's outline and nose in its own frame; `radius` is half its lines' width in screen points."""
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
-    outline = ROBOT_M * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    outline = radius_m * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     return rr.LineStrips2D(
-        [outline, [[0.0, 0.0], [1.6 * ROBOT_M, 0.0]]], radii=rr.Radius.ui_points(radius), colors=packed(colour),
+        [outline, [[0.0, 0.0], [1.6 * radius_m, 0.0]]], radii=rr.Radius.ui_points(radius), colors=packed(colour),
         draw_order=order,
     )  # fmt: skip
 

@@ -44,7 +44,7 @@ class TruthLayer:
             return
         if not self._next:
             self._out.fixed("/world/truth/path", style(4.0, 10.0, colors=packed(palette.PATH_TRUE_PALE)))
-            self._out.fixed("/world/truth/robot/body", body(palette.PATH_TRUE, 3.6, 45.0))
+            self._out.fixed("/world/truth/robot/body", body(palette.PATH_TRUE, block.rows[0].robot.radius_m, 3.6, 45.0))
         moments = block.moments.take(new)
         poses = np.array([block.rows[at].true_pose for at in new])
         self._out.poses("/world/truth/robot", moments, poses)
