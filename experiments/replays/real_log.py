@@ -105,5 +105,7 @@ def looked_again(result: TrialResult, seen: Sequence[Segments]) -> TrialResult:
         return result
     smoothed = result.smoothed or Smoothed(log.estimated_world, last.map, joint)
     config = result.scenario.config.mission.second_looks
-    poses = second_looks(smoothed.poses_world, log.odometry[1:], seen[: len(log)], config)
+    # The back end may have closed loops that the motions alone do not, or have lost its way where these do not.
+    starts = (smoothed.poses_world, odometry_poses(log.estimated_world[0], log.odometry))
+    poses = second_looks(starts, log.odometry[1:], seen[: len(log)], config)
     return replace(result, smoothed=replace(smoothed, poses_world=poses))

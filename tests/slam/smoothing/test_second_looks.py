@@ -48,7 +48,7 @@ def drive(count=60, seed=1, walls=WALLS):
 def test_a_drift_goes_that_no_filter_had_a_say_in():
     true, drifted, motions, segments = drive()
     before = np.hypot(*(drifted - true)[:, :2].T)
-    found = second_looks(drifted, motions, segments)
+    found = second_looks([drifted], motions, segments)
     after = np.hypot(*(found - true)[:, :2].T)
     assert before.max() > 0.08
     assert after.max() < 0.02
@@ -56,12 +56,24 @@ def test_a_drift_goes_that_no_filter_had_a_say_in():
     np.testing.assert_allclose(found[0], drifted[0], atol=1e-5)
 
 
+def test_a_start_that_lost_its_way_does_no_harm():
+    true, drifted, motions, segments = drive()
+    lost = drifted.copy()
+    for k in range(20, len(lost)):
+        lost[k] = compose(lost[k - 1], motions[k - 1] + [0.1, 0.0, 0.08])
+    alone = second_looks([lost], motions, segments)
+    assert np.hypot(*(alone - true)[:, :2].T).max() > 0.1
+    for starts in ([lost, drifted], [drifted, lost]):
+        found = second_looks(starts, motions, segments)
+        assert np.hypot(*(found - true)[:, :2].T).max() < 0.02
+
+
 def test_one_scan_after_a_slip_that_nobody_told_does_not_bend_the_others():
     true, drifted, motions, segments = drive()
     motions[30] += [0.1, 0.05, 0.05]
     for k in range(31, len(drifted)):
         drifted[k] = compose(drifted[k - 1], motions[k - 1])
-    found = second_looks(drifted, motions, segments)
+    found = second_looks([drifted], motions, segments)
     assert np.hypot(*(found - true)[:, :2].T).max() < 0.02
 
 
@@ -142,4 +154,4 @@ def test_the_solution_is_a_least_of_the_weighted_errors():
 def test_a_drive_without_a_wall_follows_its_motions():
     _, drifted, motions, segments = drive(5)
     nothing = [each.take(np.zeros(0, dtype=np.int64)) for each in segments]
-    np.testing.assert_allclose(second_looks(drifted, motions, nothing), drifted, atol=1e-9)
+    np.testing.assert_allclose(second_looks([drifted], motions, nothing), drifted, atol=1e-9)
