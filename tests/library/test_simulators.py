@@ -84,15 +84,24 @@ def test_scans_show_the_walls_and_odometry_the_way_as_well_as_both_say(loaded, n
 
 
 @pytest.mark.filterwarnings("default")
-def test_what_the_robot_states_is_read_from_irsims_world(loaded, tmp_path):
+def test_what_the_robot_states_is_read_from_irsims_world_and_a_scanner_off_the_axle_maps_as_well(loaded, tmp_path):
     module = loaded("irsim_robot")
     text = module.WORLD.read_text().replace("radius: 0.2", "radius: 0.25").replace(
-        "range_min: 0.05", "offset: [0.1, 0, 0], range_min: 0.05"
+        "range_min: 0.05", "offset: [0.12, 0, 0.5], range_min: 0.05"
     )  # fmt: skip
     path = tmp_path / "room.yaml"
     path.write_text(text)
     robot = module.IrSimRobot(path)
-    assert (robot.spec.radius_m, robot.spec.scanner) == (0.25, ScannerSpec(0.1))
+    assert (robot.spec.radius_m, robot.spec.scanner) == (0.25, ScannerSpec(0.12, 0.0, 0.5))
+    start, errors = robot.true_pose, []
+
+    def watch(step):
+        errors.append(np.hypot(*(compose(start, step.pose_world) - robot.true_pose)[:2]))
+
+    run = chainslam.explore(robot, robot=robot.spec, max_steps=400, watch=watch)
+    assert (run.summary["status"], len(run.map)) == ("complete", 12)
+    assert np.max(errors) < 0.02
+    assert not robot.collided
 
 
 def test_each_adaptor_has_fewer_than_a_hundred_lines():
