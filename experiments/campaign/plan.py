@@ -148,6 +148,11 @@ def config_of(campaign: Campaign, trial: Trial) -> TrialConfig:
     return trial_of(mapping_of(trial.backend), nested(campaign.settings), decided)
 
 
+def is_errorless(campaign: Campaign) -> bool:
+    """Return whether all trials of a campaign have exact ranges and wheels."""
+    return trial_of(nested(campaign.settings)).errorless
+
+
 def gate_of(campaign: Campaign) -> float:
     """Return the level of the gate that all trials of a campaign match with."""
     return trial_of(nested(campaign.settings)).mission.mapper.matching.gate

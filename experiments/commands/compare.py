@@ -66,6 +66,8 @@ class Compare:
     """The back end that drives the recordings."""
     p0: P0 = "small"
     """Covariance of the start."""
+    errorless: bool = False
+    """Exact ranges and wheels in every trial; then all trials of a cell are one, and no NEES is told."""
     max_steps: int | None = None
     """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500,
     in paper-method 1000."""
@@ -102,6 +104,8 @@ class Compare:
         settings = over(nested(preset.pop("settings", ())), robot_of(self.robot), asked(self.config, self.set, DECIDED))
         if "navigation" in self.given or self.navigation != Compare.navigation:
             settings = over(settings, nested([(NAVIGATION, self.navigation)]))
+        if self.errorless:
+            settings = over(settings, {"errorless": True})
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
         ruled |= {"p0": self.p0} if "p0" in self.given or self.p0 != Compare.p0 else {}
         named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
@@ -161,7 +165,7 @@ class Compare:
         print_pooled([row for row in said["pooled"] if row["arm"] == arm], f"means over the runs, {ARMS_SHORT[arm]}")
         for words in story_of(campaign, said).verdict:
             say(words)
-        for words in left_out(said):
+        for words in left_out(campaign, said):
             print(words)
         say(f"results in {self.out}")
         problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)

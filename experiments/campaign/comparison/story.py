@@ -6,7 +6,7 @@ from typing import Any
 
 from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import NONE, number
-from ..plan import CLOSED, Campaign
+from ..plan import CLOSED, Campaign, is_errorless
 from ..scores.score import END
 from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY
 from .words import ANSWERS, ARMS_SHORT, mean, within
@@ -35,6 +35,8 @@ def story_of(campaign: Campaign, said: dict[str, Any]) -> Story:
             " Here the same robot does the same with rigorous estimators.",
             answer(said["hypothesis"]),
         )
+    if is_errorless(campaign):
+        return _exact(campaign, said)
     where = _listed([world.rpartition("/")[2] for world in campaign.worlds])
     runs = f"{campaign.trials} runs each" if campaign.trials > 1 else "one run each"
     if len(campaign.backends) > 1:
@@ -55,6 +57,18 @@ def story_of(campaign: Campaign, said: dict[str, Any]) -> Story:
         f"{campaign.backends[0]} by {campaign.strategies[0]}",
         f"A robot maps {where}, {runs}. How wrong is the map, and does the estimator know it?",
         (*_states_of(campaign, said), *_few(campaign)),
+    )
+
+
+def _exact(campaign: Campaign, said: dict[str, Any]) -> Story:
+    """Return the story of trials without noise: whether they end is all that they tell."""
+    arm = decisive_arm(campaign)
+    rows = [row for row in said["pooled"] if row["arm"] == arm]
+    return Story(
+        f"Without noise: {_listed(campaign.backends)}",
+        "Ranges and wheels are exact: no error hides a fault in how a map is made or a building explored. There is no"
+        " NEES, and all seeds are one run.",
+        tuple(f"{row['backend']}: {row['complete']} of {row['trials']} runs complete." for row in rows),
     )
 
 

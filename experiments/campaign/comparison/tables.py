@@ -19,7 +19,7 @@ from ...artifacts.files import csv_bytes, json_bytes, write
 from ...artifacts.formats import stamp
 from ...artifacts.reading import UnfitError, told
 from ...scoring.measurements import Z_95
-from ..plan import Campaign, Trial, gate_of
+from ..plan import Campaign, Trial, gate_of, is_errorless
 from ..scores.score import END, TrialScores
 from .comparison import compare
 from .findings import findings
@@ -208,6 +208,7 @@ def write_tables(
     write_table(folder / "marks", marks)
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
-    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": findings(said["pooled"], gate)}
+    claims = [] if is_errorless(campaign) else findings(said["pooled"], gate)
+    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": claims}
     write(folder / "comparison.json", json_bytes(said))
     return said

@@ -5,7 +5,7 @@ from typing import Any
 
 from ...artifacts.settings import options_of
 from ...views.numbers import NONE, number, percent
-from ..plan import CLOSED, Campaign
+from ..plan import CLOSED, Campaign, is_errorless
 
 ANSWERS = {"matches": "Yes", "does not match": "No", "undecided": "Undecided"}
 ARMS_SHORT = {CLOSED: "closed loop", "replay-own": "replay, own gate", "replay-true": "replay, true matches"}
@@ -53,9 +53,11 @@ def share(found: dict[str, Any] | None) -> str:
     return NONE if found is None else within(percent(found["mean"]), found, 100.0)
 
 
-def left_out(said: dict[str, Any]) -> tuple[str, ...]:
+def left_out(campaign: Campaign, said: dict[str, Any]) -> tuple[str, ...]:
     """Return a line for each measure that complete runs lack, so that its means are those of the others."""
-    lines = []
+    lines: list[str] = []
+    if is_errorless(campaign):
+        return ()
     for name, what in (("pose_anees", "pose ANEES"), ("map_anees", "map ANEES"), ("wall_rmse_m", "error of the walls")):
         count = sum(row["without"][name] for row in said["pooled"])
         if count:

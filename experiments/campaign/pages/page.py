@@ -14,7 +14,7 @@ from ..comparison.shapes import COMPARISON
 from ..comparison.story import story_of
 from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, command_of, interval, mean, share, within
 from ..merge import union
-from ..plan import CLOSED, Campaign
+from ..plan import CLOSED, Campaign, is_errorless
 from ..scores.score import END
 from ..store import read_config
 from .finding_words import finding_table
@@ -42,10 +42,8 @@ def page_of(folder: Path) -> Page:
         (*config.versions.items(), ("commit", str(config.commit)[:10])),
         filled(
             Section("What it shows", _counts(said), (finding_table(campaign, said),)),
-            *_estimators(campaign, said),
-            Section("Consistency along the way", _BAND_WORDS, pictures=curve_pictures(folder, campaign)),
+            *(() if is_errorless(campaign) else _consistency(folder, campaign, said)),
             Section("Maps", _map_words(campaign), pictures=map_pictures(folder, campaigns)),
-            Section("Against the full EKF", _RATIO_WORDS, _differences(said["backends"]), ratio_pictures(said)),
             Section(
                 "Strategies",
                 _STRATEGY_WORDS,
@@ -54,6 +52,15 @@ def page_of(folder: Path) -> Page:
             ),
             Section("At equal metres driven", _MARK_WORDS, (marks_table(said),)),
         ),
+    )
+
+
+def _consistency(folder: Path, campaign: Campaign, said: dict[str, Any]) -> tuple[Section, ...]:
+    """Return whether each estimator knows how wrong it is, and how far it is from the full EKF."""
+    return (
+        *_estimators(campaign, said),
+        Section("Consistency along the way", _BAND_WORDS, pictures=curve_pictures(folder, campaign)),
+        Section("Against the full EKF", _RATIO_WORDS, _differences(said["backends"]), ratio_pictures(said)),
     )
 
 

@@ -1,11 +1,14 @@
 """Each arm of a campaign is what its name says: who drives, and whose matches a replay uses."""
 
+import csv
+import json
 from dataclasses import replace
 
 import pytest
 
 from experiments.campaign.plan import ARMS, Campaign, Trial, config_of
 from experiments.campaign.work import Job, perform, unpack
+from experiments.commands.cli import main
 from experiments.replays import replay as replays
 from slam.association.matching import match
 from slam.association.methods import METHODS
@@ -41,3 +44,18 @@ def test_each_arm_uses_the_matches_that_its_name_tells(monkeypatch):
     }  # fmt: skip
     # A closed loop matches by itself, not through a replay; what a replay plays is its driver's, not its own.
     assert config_of(CAMPAIGN, DRIVE).backend == "full-ekf"
+
+
+def test_a_campaign_without_noise_says_that_it_ends_and_claims_nothing_of_consistency(tmp_path, capsys):
+    words = ["--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"]
+    words += ["--trials", "1", "--max-steps", "5", "--modes", "closed", "--errorless", "--jobs", "1"]
+    assert main(["compare", *words, "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "full-ekf: 0 of 1 runs complete." in said
+    assert "not positive definite" not in said
+    comparison = json.loads((tmp_path / "comparison.json").read_text())
+    assert comparison["findings"] == []
+    (summary,) = {row["pose_anees"] for row in csv.DictReader((tmp_path / "trials.csv").read_text().splitlines())}
+    assert summary == ""
+    assert main(["report", str(tmp_path)]) == 0
+    assert "Without noise" in (tmp_path / "report.html").read_text()
