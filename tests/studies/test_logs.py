@@ -1,0 +1,45 @@
+"""The study of real robots' logs: it tells what its rows hold, and goes on where it was."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.logs.study import LogsStudy, main, table
+
+
+def cells(rows):
+    shown = table(rows)
+    return [[str(cell) for cell in column.cells] for column in shown.columns]
+
+
+def written(folder):
+    """A log of a robot between two walls, with a relation that is 0.1 m off."""
+    angles = np.deg2rad(np.arange(180) - 90.0)
+    with np.errstate(divide="ignore"):
+        ranges = np.minimum(np.where(np.abs(np.sin(angles)) > 0.1, 1.5 / np.abs(np.sin(angles)), 81.9), 81.9)
+    lines = [" ".join(map(str, ["FLASER", 180, *ranges, *[0.2 * k, 0, 0] * 2, 10.0 * k, "robot", 0])) for k in range(8)]
+    (folder / "hall.log.gz").write_text("\n".join(lines))
+    (folder / "hall.relations").write_text("0 70 1.5 0 0 0 0 0\n")
+
+
+def test_each_log_has_a_row_for_each_path_and_is_not_run_twice(tmp_path, monkeypatch, capsys):
+    written(tmp_path)
+    study = LogsStudy(tmp_path, ("full-ekf",), ("hall",), "wheels", out=tmp_path / "rows.jsonl")
+    study.run()
+    row = json.loads((tmp_path / "rows.jsonl").read_text())
+    assert row["relations"]["at_scans"]["far"]["translation_m"]["mean"] == pytest.approx(0.1, abs=0.03)
+    assert "reference" not in row
+    found = cells([row])
+    assert found[1] == ["full-ekf", "full-ekf, smoothed"]
+    assert found[4][0] == f"{row['relations']['at_scans']['all']['translation_m']['mean']:.3f}"
+    assert found[8] == ["-", "-"]
+    monkeypatch.setattr("studies.logs.study.replay_real", None)
+    study.run()
+    assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 1
+
+
+def test_an_unknown_back_end_is_told_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["study", "--logs", str(tmp_path), "--backends", "none"])
+    assert main() == 2
+    assert "found none" in capsys.readouterr().err
