@@ -1,11 +1,14 @@
 """The format number of every file that is read back: its keys and their order change only with its number.
 
-A file of another number is refused with the reason, but for those of `OLDEST`.
+A file of another number is refused with the reason, but for those of `OLDEST`; settings of older formats are read under
+today's names and values.
 """
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from sim.logs import recorded_robot
+from slam.robot import NANO, RobotError, RobotSpec
 
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
@@ -25,7 +28,7 @@ OLDEST = {CONFIG: 1, "summary.json": 1}
 """The first format that can still be looked at and replayed, where that is not the one of now. Format 1 of
 `config.json` had other names for some settings (`older.RENAMED`), and a campaign no `settings`: nothing goes on.
 Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, format 4 no `robot.faults`. Until
-format 5 the body and the step stood at several places (`older.MOVED`), until format 6 no robot was ever lost
+format 5 the body and the step stood at several places (`MOVED`), until format 6 no robot was ever lost
 (`mission.lost`, `mission.mapper.recovery`). Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -44,3 +47,136 @@ def fault(said: Any, name: str, older: bool = True) -> str:
         return ""
     shown = said if isinstance(said, int | float) else type(said).__name__
     return f"format {str(shown)[:20]}, where this version reads {FORMATS[name]}"
+
+
+RENAMED: dict[str, str | None] = {
+    "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.extraction.sure_gap_m",
+    "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
+    "mission.max_steps": None,
+    "mission.explorer.sweeping.near_m": "mission.explorer.near_m",
+    "mission.explorer.following.looks": "mission.explorer.following.viewpoints",
+    "mission.mapper.bends": "mission.mapper.vertices",
+    "mission.mapper.bends.young_sightings": "mission.mapper.vertices.young_observations",
+    "mission.mapper.chains.bend_sightings": "mission.mapper.chains.vertex_observations",
+    "mission.mapper.duplicates": "mission.mapper.merging",
+    "mission.mapper.duplicates.gate": None,
+    "mission.mapper.faint": "mission.mapper.candidates",
+    "mission.mapper.gaps": "mission.mapper.openings",
+    "mission.mapper.gaps.widest_m": None,
+    "mission.mapper.gaps.corner_m": None,
+    "mission.mapper.kinks": "mission.mapper.change_points",
+    "mission.mapper.torn": "mission.mapper.ambiguity",
+    "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
+    "mission.mapper.walls.trusted_sightings": "mission.mapper.walls.trusted_observations",
+    "mission.mapper.walls.established_sightings": "mission.mapper.walls.established_observations",
+    "robot.drive.step_max_m": "robot.step_m",
+    "robot.drive.turn_max_rad": "robot.turn_rad",
+    "robot.drive.wheel_base_m": "robot.wheels.base_m",
+    "robot.drive.wheel_slip": "robot.wheels.slip",
+    "robot.drive.lateral_slip": "robot.wheels.lateral_slip",
+    "robot.drive.floor": "robot.wheels.floor",
+    "robot.drive.wheel_speed_m_s": "robot.wheel_speed_m_s",
+}
+"""Settings of a trial, or groups of them, that had other names in older formats of `config.json`; the longest name
+counts. None stands where a setting said nothing of its own."""
+
+
+DROPPED = ("mission.mapper.change_points.most_rad",)
+"""Settings of format 2 whose rules are no more."""
+EXPLORER = "mission.explorer."
+FOLLOWING = f"{EXPLORER}following."
+RADIUS, STEP, TURN = "robot.radius_m", "robot.step_m", "robot.turn_rad"
+Moved = Callable[[float, RobotSpec], float] | None
+
+
+def _beyond(value: float, robot: RobotSpec) -> float:
+    return round(value - robot.radius_m, NANO)
+
+
+def _beside(value: float, robot: RobotSpec) -> float:
+    return round(value - 2.0 * robot.radius_m, NANO)
+
+
+def _within(value: float, robot: RobotSpec) -> float:
+    return round(robot.radius_m - value, NANO)
+
+
+def _way(steps: float, robot: RobotSpec) -> float:
+    return round(steps * robot.step_m, NANO)
+
+
+MOVED: dict[str, tuple[str, Moved]] = {
+    f"{FOLLOWING}paths.radius_m": (RADIUS, None),
+    f"{FOLLOWING}paths.squeeze_m": (f"{FOLLOWING}paths.squeeze_beyond_m", _beyond),
+    f"{FOLLOWING}paths.tight_m": (f"{FOLLOWING}paths.tight_beyond_m", _beyond),
+    f"{FOLLOWING}paths.standoff_m": (f"{FOLLOWING}paths.standoff_beyond_m", _beyond),
+    f"{FOLLOWING}paths.escape_m": (f"{FOLLOWING}paths.escape_beyond_m", _beyond),
+    f"{FOLLOWING}driving.radius_m": (RADIUS, None),
+    f"{FOLLOWING}driving.step_m": (STEP, None),
+    f"{FOLLOWING}driving.turn_rad": (TURN, None),
+    f"{FOLLOWING}driving.narrow_m": (f"{FOLLOWING}driving.narrow_beyond_m", _beside),
+    f"{FOLLOWING}driving.fits_m": (f"{FOLLOWING}driving.fits_beyond_m", _beside),
+    f"{FOLLOWING}driving.obstructed_m": (f"{FOLLOWING}driving.obstructed_within_m", _within),
+    f"{FOLLOWING}viewpoints.standoff_m": (f"{FOLLOWING}viewpoints.standoff_beyond_m", _beyond),
+    f"{FOLLOWING}viewpoints.close_m": (f"{FOLLOWING}viewpoints.close_beyond_m", _beyond),
+    f"{FOLLOWING}stall_steps": (f"{FOLLOWING}stall_m", _way),
+    f"{EXPLORER}near_m": (f"{EXPLORER}near_beyond_m", _beyond),
+    f"{EXPLORER}patience_steps": (f"{EXPLORER}patience_m", _way),
+    "mission.free_space.body_m": (RADIUS, None),
+    "mission.free_space.clearance_limit_m": ("mission.free_space.clearance_beyond_m", _beyond),
+    "mission.floor_memory.last_scans": ("mission.floor_memory.last_m", _way),
+    "mission.floor_memory.touched_m": (RADIUS, None),
+    "mission.floor_memory.step_m": (STEP, None),
+    "mission.homing.home_m": (RADIUS, None),
+    "mission.homing.aim_m": (RADIUS, None),
+    "mission.retreat.touched_back_m": (RADIUS, None),
+    "mission.mapper.walls.patience_steps": ("mission.mapper.walls.patience_m", _way),
+    "mission.mapper.candidates.patience_steps": ("mission.mapper.candidates.patience_m", _way),
+}
+"""Settings until format 5 that stood for the robot's body or step: today's key, and its value by the old one. None
+stands where what the robot states takes their place."""
+
+
+def told_of(key: str) -> str:
+    """Return today's key of a setting that older versions had; empty for any other."""
+    if key in MOVED:
+        return MOVED[key][0]
+    now = renamed(key)
+    return now if now is not None and now != key else ""
+
+
+def today(key: str, value: Any, robot: RobotSpec) -> tuple[str, Any] | None:
+    """Return the key and the value now of a setting of an older format; None where nothing stands for it.
+
+    `robot` is what the robot of that time stated.
+    """
+    now = renamed(key)
+    if now is None or now not in MOVED:
+        return None if now is None else (now, value)
+    name, move = MOVED[now]
+    return None if move is None or type(value) not in (int, float) else (name, move(float(value), robot))
+
+
+def stated_then(said: Mapping[str, Any]) -> RobotSpec:
+    """Return the body and the step that the settings of an older format name."""
+    found: list[float] = []
+    for group, name, default in (("robot", "radius_m", RobotSpec.radius_m), ("drive", "step_max_m", RobotSpec.step_m)):
+        within = said.get("robot", {})
+        within = within.get("drive", {}) if group == "drive" and isinstance(within, Mapping) else within
+        value = within.get(name, default) if isinstance(within, Mapping) else default
+        found.append(float(value) if type(value) in (int, float) else default)
+    try:
+        return RobotSpec(radius_m=found[0], step_m=found[1])
+    except RobotError:
+        return RobotSpec()
+
+
+def renamed(key: str) -> str | None:
+    """Return today's key of a setting of an older format; None where there is none."""
+    parts = key.split(".")
+    for count in range(len(parts), 0, -1):
+        group = ".".join(parts[:count])
+        if group in RENAMED:
+            now = RENAMED[group]
+            return None if now is None or now + key[len(group) :] in DROPPED else now + key[len(group) :]
+    return None if key in DROPPED else key

@@ -15,8 +15,7 @@ from slam.robot import STATED, RobotError
 from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import json_bytes
-from .formats import CONFIG
-from .older import stated_then, today, told_of
+from .formats import CONFIG, stated_then, today, told_of
 from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"

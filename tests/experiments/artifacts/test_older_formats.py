@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.artifacts.formats import CONFIG, FORMATS
-from experiments.artifacts.older import MOVED, RENAMED
+from experiments.artifacts.formats import CONFIG, FORMATS, MOVED, RENAMED
 from experiments.artifacts.saved import read_config
 from experiments.artifacts.settings import defaults, leaves
 from experiments.commands.cli import main

@@ -6,8 +6,7 @@ import os
 import pytest
 
 from experiments.artifacts.files import json_bytes
-from experiments.artifacts.formats import CONFIG, FORMATS
-from experiments.artifacts.older import RENAMED
+from experiments.artifacts.formats import CONFIG, FORMATS, RENAMED
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.artifacts.settings import (

@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from experiments.artifacts.older import MOVED
+from experiments.artifacts.formats import MOVED
 from experiments.artifacts.presets import robot_of, stated
 from experiments.artifacts.saved import read_trial
 from experiments.artifacts.settings import defaults, leaves, nested, over, parse_setting, trial_of
