@@ -32,7 +32,7 @@ mutants: setup
 
 # Do all the plans and pictures of a folder load? PLANS=...
 plans: setup
-	$(BIN)/python -m studies.plans $(dir $(PLANS))
+	$(BIN)/python -m studies.exploration.plans $(dir $(PLANS))
 
 .PHONY: kills
 

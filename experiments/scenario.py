@@ -14,13 +14,13 @@ from explore.strategies import STRATEGIES, Strategy, make_strategy
 from sim.chance import SEED_MAX, Channel, standard_normals
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
 from sim.worlds import World, WorldError, listing, load
+from slam.association.second_looks.config import SecondLooksConfig
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
 from slam.estimation.mounting import start_of_scanner
 from slam.odometry.config import ScanMatchingConfig
 from slam.robot import Robot, fitted
-from slam.smoothing.config import SecondLooksConfig
 
 from .usage import UsageError, choose, did_you_mean
 

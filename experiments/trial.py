@@ -17,11 +17,11 @@ from slam.mapper import Mapper
 
 from .scenario import Scenario, TrialConfig, build
 from .scoring.association import Votes
-from .scoring.certificate import certificate_record
 from .scoring.records import Log, Recorder
-from .scoring.smoothing import Smoothed, smooth
 from .scoring.summary import Ending, run_keys, summarise
 from .scoring.truth import truth_of
+from .scoring.without_truth.certificate import certificate_record
+from .scoring.without_truth.smoothing import Smoothed, smooth
 from .usage import UsageError
 
 

@@ -20,7 +20,7 @@ from ..replays.real_log import RealOptions, read_real_run
 from ..replays.replay import Association, OdometrySource, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
 from ..scenario import load_world
-from ..scoring.references import read_references
+from ..scoring.without_truth.references import read_references
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.progress import print_comparison, print_recorded, print_references, progress

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from ..artifacts.results import path_of
-from ..scoring.references import References, scored_by
+from ..scoring.without_truth.references import References, scored_by
 from ..trial import TrialResult
 
 

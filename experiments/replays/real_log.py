@@ -14,14 +14,14 @@ from explore.step import Step
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordedRobot, RecordingError
+from slam.association.second_looks.second_looks import second_looks
 from slam.extraction.segments import Segments
 from slam.mapper import Mapper
-from slam.smoothing.second_looks import second_looks
 
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
-from ..scoring.smoothing import Smoothed
 from ..scoring.summary import odometry_poses
+from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
 from ..usage import UsageError
 from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by

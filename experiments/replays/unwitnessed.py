@@ -12,10 +12,16 @@ from sim.logs.recorded_robot import Recording
 from slam.robot import MotionCommand, Odometry, Robot, Scan
 
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, make_backend, strategy_of
-from ..scoring.certificate import certificate_record
 from ..scoring.records import Log, Recorder
-from ..scoring.smoothing import smooth
-from ..scoring.unwitnessed import NoVotes, UnwitnessedRecord, no_truth, summarise_unwitnessed, unseen_world
+from ..scoring.without_truth.certificate import certificate_record
+from ..scoring.without_truth.smoothing import smooth
+from ..scoring.without_truth.unwitnessed import (
+    NoVotes,
+    UnwitnessedRecord,
+    no_truth,
+    summarise_unwitnessed,
+    unseen_world,
+)
 from ..trial import Mission, TrialResult, bare_summary, ride
 
 START_SIGMAS = (1e-4, 1e-4, 1e-5)

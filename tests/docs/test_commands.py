@@ -43,13 +43,13 @@ def test_commands_are_found_in_blocks_and_in_running_text(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
         "    .venv/bin/chainslam worlds    # also: backends\n    .venv/bin/chainslam explore \\\n        rooms\n\n"
-        "`make\nbench`, and `python -m studies.plans`; `make` alone is none.\n"
+        "`make\nbench`, and `python -m studies.exploration.plans`; `make` alone is none.\n"
     )
     assert commands(page) == [
         ".venv/bin/chainslam worlds",
         ".venv/bin/chainslam explore         rooms",
         "make bench",
-        "python -m studies.plans",
+        "python -m studies.exploration.plans",
     ]
 
 

@@ -12,9 +12,9 @@ from slam.estimation.backend import Joint
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
-from ...scoring.certificate import contour_record, frontier_record, obstacle_record, open_end_record
 from ...scoring.corners import Corner, corners
 from ...scoring.records import Log
+from ...scoring.without_truth.certificate import contour_record, frontier_record, obstacle_record, open_end_record
 from ..formats import stamp
 
 FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.commands.cli import main
-from experiments.scoring.references import References, read_path, read_relations, scored_by
+from experiments.scoring.without_truth.references import References, read_path, read_relations, scored_by
 from experiments.usage import UsageError
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.scenario import TrialConfig
-from experiments.scoring.smoothing import smooth
+from experiments.scoring.without_truth.smoothing import smooth
 from experiments.trial import run_trial
 from slam.backends.graph.isam import Isam
 from slam.robot import ScannerSpec

@@ -13,12 +13,12 @@ from sim.worlds import Contour, World
 from slam.evaluation.doubles import doubles
 from slam.extraction.segments import Segments
 
-from ..scenario import Scenario
-from .association import Votes
-from .innovations import innovation_scores
-from .records import Log
-from .summary import Ending, run_keys, spread_ms
-from .truth import Truth
+from ...scenario import Scenario
+from ..association import Votes
+from ..innovations import innovation_scores
+from ..records import Log
+from ..summary import Ending, run_keys, spread_ms
+from ..truth import Truth
 
 WITNESSED = (
     "path_length_true_m coverage coverage_own_frame coverage_curve contours_closed contours_reachable swept"

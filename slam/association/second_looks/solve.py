@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from ..geometry.lines import directions, normals
-from ..geometry.poses import wrap
+from ...geometry.lines import directions, normals
+from ...geometry.poses import wrap
 from .config import SecondLooksConfig
 from .landmarks import Sightings
 

@@ -18,7 +18,7 @@ from slam.evaluation.relations import (
 from slam.evaluation.trajectories import ate
 from slam.geometry.poses import wrap
 
-from ..usage import UsageError
+from ...usage import UsageError
 
 MOST_BYTES = 2**28
 RELATION, TUM, PLANAR = 8, 8, 4

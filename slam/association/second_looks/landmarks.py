@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..extraction.segments import Segments
-from ..geometry.lines import directions, normals
-from ..geometry.poses import wrap
+from ...extraction.segments import Segments
+from ...geometry.lines import directions, normals
+from ...geometry.poses import wrap
 from .config import SecondLooksConfig
 
 ROOM = 256

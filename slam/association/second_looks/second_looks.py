@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ..extraction.segments import Segments
+from ...extraction.segments import Segments
 from .config import SecondLooksConfig
 from .landmarks import Sightings, associated, firm, joined
 from .solve import Unknowns, begun, solved

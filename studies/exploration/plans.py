@@ -1,6 +1,6 @@
 """Load all the floor plans and pictures of a folder, to find those that make no building to explore.
 
-    .venv/bin/python -m studies.plans ../shared/data
+    .venv/bin/python -m studies.exploration.plans ../shared/data
 
 The folder holds `plans/*.json` and `rasters/`. Prints a line for each that does not, and how many do; exit status 1 if
 any does not.

@@ -5,13 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from slam.association.second_looks.config import SecondLooksConfig
+from slam.association.second_looks.landmarks import associated, firm, joined
+from slam.association.second_looks.second_looks import second_looks
+from slam.association.second_looks.solve import _of_motions, _of_sightings, begun, solved
 from slam.extraction.segments import Segments
 from slam.geometry.lines import lines_to_world, through
 from slam.geometry.poses import compose, inverse, to_robot, wrap
-from slam.smoothing.config import SecondLooksConfig
-from slam.smoothing.landmarks import associated, firm, joined
-from slam.smoothing.second_looks import second_looks
-from slam.smoothing.solve import _of_motions, _of_sightings, begun, solved
 
 WALLS = np.array([[[6, 0], [0, 0]], [[0, 0], [0, 4]], [[0, 4], [6, 4]], [[6, 4], [6, 0]], [[2, 1.5], [4, 1.5]]], float)
 CONFIG = SecondLooksConfig()

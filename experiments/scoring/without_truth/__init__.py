@@ -1,0 +1,1 @@
+"""What a run tells without anybody knowing the truth."""
