@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+ROOMS = ("chainslam", "slam", "explore", "sim", "viz", "experiments")
 pytestmark = pytest.mark.long
 
 
@@ -84,5 +85,10 @@ def test_what_is_installed_runs_outside_the_checkout(wheel, tmp_path):
     assert (tmp_path / "run" / "map.png").is_file()
     run(python, "-c", code, "report", "run", cwd=tmp_path, **env)
     assert (tmp_path / "run" / "report.html").is_file()
-    assert all((packages / room / "py.typed").is_file() for room in ("slam", "explore", "sim", "viz", "experiments"))
+    assert all((packages / room / "py.typed").is_file() for room in ROOMS)
+    said = run(
+        python, "-c", "import chainslam; print(chainslam.__file__, len(chainslam.load('run').map))", cwd=tmp_path, **env
+    )
+    assert Path(said.split()[0]).is_relative_to(packages)
+    assert int(said.split()[1]) > 0
     assert (packages / "../../../bin/chainslam").resolve().is_file() or (packages / "bin" / "chainslam").is_file()

@@ -50,7 +50,7 @@ COMMANDS = {
     "replay": Entry(
         "replay",
         "Replay",
-        "Send a run's own log through one or several back ends: identical scans, the back end alone.",
+        "Send a log through one or several back ends: identical scans, the back end alone.",
     ),
     "compare": Entry(
         "compare",

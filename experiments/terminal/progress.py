@@ -148,12 +148,12 @@ def _way_back(share: float | None) -> list[tuple[str, str]]:
 def _faults(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Return rows for what the robot noticed of itself; none where nothing was wrong."""
     told = {
-        "motions that the odometry did not report": summary["unstated_motions"],
-        "steps without a place in the map": summary["lost_steps"],
+        "motions that the odometry did not report": summary.get("unstated_motions"),
+        "steps without a place in the map": summary.get("lost_steps"),
     }
     rows = [(words, str(count)) for words, count in told.items() if count]
-    if summary["wheel_noise_factor"] != 1.0:
-        rows.append(("noise of the wheels, times as stated", f"{summary['wheel_noise_factor']:g}"))
+    if (factor := summary.get("wheel_noise_factor", 1.0)) != 1.0:
+        rows.append(("noise of the wheels, times as stated", f"{factor:g}"))
     return rows
 
 
