@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sim.chance import Channel, standard_normals
-from slam.estimation.backend import Backend, Joint, Observations
+from slam.estimation.backend import POSE, Backend, Joint, Observations
 from slam.estimation.mounting import odometry_of_scanner, scanner_poses
-from slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
+from slam.evaluation.consistency import nees, pose_covariances, pose_errors
+from slam.evaluation.own_gauge import own_gauge
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.extraction.visible_extent import sure_pieces
@@ -87,9 +88,9 @@ class Ridden:
 
     @property
     def map_anees(self) -> float:
-        """Joint NEES of all lines after the last scan over its dimension; raises LinAlgError likewise."""
-        error, cov = joint_error(self.joint, self.true_poses_world[-1], self.true_lines_world)
-        return float(nees(error[None, 3:], cov[None, 3:, 3:])[0]) / (len(error) - 3)
+        """ANEES of all lines after the last scan, in the map's own gauge; raises LinAlgError likewise."""
+        means, cov = self.joint.mean[POSE:].reshape(-1, 2), self.joint.cov[POSE:, POSE:]
+        return own_gauge(means, cov, self.joint.anchors, self.true_lines_world).anees or 0.0
 
 
 def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservations:

@@ -9,8 +9,9 @@ from jaxtyping import Bool, Float, Int
 
 from explore.outcome import Outcome
 from explore.step import Step
-from slam.estimation.backend import POSE, Joint, columns_of
+from slam.estimation.backend import POSE, Joint
 from slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
+from slam.evaluation.own_gauge import OwnGauge, own_gauge
 from slam.geometry.poses import compose, to_world, wrap
 
 from ..scenario import Scenario
@@ -176,6 +177,8 @@ def _map_scores(
     aligned = to_world(walls.ends_world, to_true)
     labels = votes.walls_of(walls.ids)
     established = ~walls.tentative
+    labelled = established & (labels >= 0)
+    straight = map_error(votes, walls.ids, joint, labelled & ~walls.crooked)
     return {
         "lines": len(walls),
         "lines_tentative": int(np.count_nonzero(~established)),
@@ -190,12 +193,8 @@ def _map_scores(
         "coverage_curve": coverage_curve(samples, sketches, to_true, near),
         "map_began_step": began_at,
         "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
-        "map_anees": None
-        if errorless
-        else map_anees(votes, walls.ids, joint, log.true_world[-1], established & (labels >= 0)),
-        "map_anees_straight": None
-        if errorless
-        else map_anees(votes, walls.ids, joint, log.true_world[-1], established & ~walls.crooked & (labels >= 0)),
+        **map_scores(None if errorless else map_error(votes, walls.ids, joint, labelled)),
+        "map_anees_straight": None if errorless or straight is None else straight.anees,
         "duplicate_lines": duplicate_lines(walls, labels, established),
         "false_matches": votes.false_matches(),
         "merges": votes.merges,
@@ -204,28 +203,51 @@ def _map_scores(
     }
 
 
-def map_anees(
+def map_error(
+    votes: Votes, ids: Int[np.ndarray, " n"], joint: Joint | None, among: Bool[np.ndarray, " n"]
+) -> OwnGauge | None:
+    """Return the error of the chosen walls in their own gauge; None where there is none to tell.
+
+    Each wall is held against the true face from which most of its beams came; duplicates stay, and a covariance that
+    is not positive definite gives None instead of a pseudo-inverse.
+    """
+    rows = np.flatnonzero(among)
+    if joint is None or not len(rows):
+        return None
+    walls, lines = joint.take(rows), votes.truth.lines[np.maximum(votes.faces_of(ids[rows]), 0)]
+    try:
+        return own_gauge(walls.mean[POSE:].reshape(-1, 2), walls.cov[POSE:, POSE:], walls.anchors, lines)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def map_scores(error: OwnGauge | None) -> dict[str, float | None]:
+    """Return what `summary.json` says of a map's error: of its shape, and of where its frame lies."""
+    if error is None:
+        return dict.fromkeys(("map_anees", "map_frame_anees", "map_frame_m", "map_frame_rad"))
+    return {
+        "map_anees": error.anees,
+        "map_frame_anees": error.frame_squared / POSE,
+        "map_frame_m": error.shift_m,
+        "map_frame_rad": abs(float(error.frame_world[2])),
+    }
+
+
+def joint_anees(
     votes: Votes,
     ids: Int[np.ndarray, " n"],
     joint: Joint | None,
     true_pose_world: Float[np.ndarray, "3"],
     among: Bool[np.ndarray, " n"],
-    with_pose: bool = False,
 ) -> float | None:
-    """Return the joint NEES of the chosen walls over its dimension, in the invariant error; null where it has none.
-
-    `with_pose` takes pose and walls together, 3 + 2 m dimensions. Each wall is held against the true face from which
-    most of its beams came; duplicates stay, and a covariance that is not positive definite gives null instead of a
-    pseudo-inverse.
-    """
+    """Return the NEES of the pose and the chosen walls together over its dimension, in the invariant error; or None."""
     rows = np.flatnonzero(among)
     if joint is None or not len(rows):
         return None
-    lines = votes.truth.lines[np.maximum(votes.faces_of(ids), 0)]
-    error, cov = joint_error(joint, true_pose_world, lines)
-    index = columns_of(rows)[0 if with_pose else POSE :]
+    lines = votes.truth.lines[np.maximum(votes.faces_of(ids[rows]), 0)]
+    error, cov = joint_error(joint.take(rows), true_pose_world, lines)
     try:
-        return float(nees(error[None, index], cov[None][:, index[:, None], index])[0]) / len(index)
+        return float(nees(error[None], cov[None])[0]) / len(error)
     except np.linalg.LinAlgError:
         return None
 

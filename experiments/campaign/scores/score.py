@@ -20,7 +20,7 @@ from ...scoring.corners import corners
 from ...scoring.coverage import NEAR_NOISY_M, Samples, alignment, coverage, sample
 from ...scoring.measurements import corner_points, distances
 from ...scoring.records import Log
-from ...scoring.summary import map_anees, pose_nees
+from ...scoring.summary import joint_anees, map_error, pose_nees
 from ...trial import TrialResult
 from .innovation import InnovationEar
 from .observer import Moment, Observer, association_counts
@@ -110,6 +110,7 @@ class _Scorer:
         established, labels = ~walls.tentative, self.votes.walls_of(walls.ids)
         among, true_pose = established & (labels >= 0), log.true_world[k]
         off, shape = wall_errors(walls, self.votes, among, self.to_true)
+        error = map_error(self.votes, walls.ids, moment.joint, among)
         return {
             "step": k,
             "path_length_m": moment.path_length_m,
@@ -121,8 +122,8 @@ class _Scorer:
             "coverage": self.coverage(moment),
             "wall_rmse_m": off,
             "wall_shape_m": shape,
-            "map_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among),
-            "joint_anees": map_anees(self.votes, walls.ids, moment.joint, true_pose, among, with_pose=True),
+            "map_anees": None if error is None else error.anees,
+            "joint_anees": joint_anees(self.votes, walls.ids, moment.joint, true_pose, among),
             "lines": len(walls),
             "duplicate_lines": duplicate_lines(walls, labels, established),
         }
