@@ -174,7 +174,8 @@ class Mapper:
         return self._told(MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation))
 
     def _told(self, update: MapUpdate) -> MapUpdate:
-        """Return what is told of a scan: all in the frame of the body."""
+        """Return what is told of a scan: all in the frame of the body, and how far walls may be from their lines."""
+        update = replace(update, map=update.map.told)
         scanner, motion = self.config.robot.scanner, update.localisation.unstated_motion
         if scanner.is_at_axle:
             return update
@@ -214,7 +215,7 @@ class Mapper:
     def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
         """Return those of the observations, made by the segments of these rows, that may move the estimate."""
         reliable = self._keeper.landmarks.reliability.may_move(segments.take(rows), observed.ids)
-        cov = as_told(observed.cov[reliable], segments.is_tentative[rows[reliable]], self.config.walls.reliability)
+        cov = as_told(observed.cov[reliable], segments.take(rows[reliable]), self.config.walls.reliability)
         return Observations(observed.ids[reliable], observed.lines[reliable], cov)
 
     def _segments(self, scan: Scan, walls: StochasticMap, vertices: VerticesConfig) -> Segments:

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 7,
+    CONFIG: 8,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -29,7 +29,8 @@ OLDEST = {CONFIG: 1, "summary.json": 1}
 `config.json` had other names for some settings (`older.RENAMED`), and a campaign no `settings`: nothing goes on.
 Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, format 4 no `robot.faults`. Until
 format 5 the body and the step stood at several places (`MOVED`), until format 6 no robot was ever lost
-(`mission.lost`, `mission.mapper.recovery`). Format 1 of `summary.json` had no `coverage_curve`."""
+(`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
+(`mission.mapper.walls.reliability.straightness`). Format 1 of `summary.json` had no `coverage_curve`."""
 
 
 def stamp(name: str) -> dict[str, int]:

@@ -23,7 +23,7 @@ from slam.robot import Odometry
 
 from ..scenario import P0_SIGMAS, load_world
 from ..scoring.truth import truth_of
-from .oracles import PerfectExtraction, Witness, begins_a_line
+from .oracles import PerfectExtraction, Witness, begins_a_line, of_true_lines
 from .replay import RecordedRun
 
 
@@ -107,8 +107,9 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
     world = load_world(trial.world, trial.start, trial.scale)
     witness = Witness(truth_of(world, trial.robot), poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
-    rules, extraction = trial.mission.mapper.walls, trial.mission.mapper.extraction
-    reliability = Reliability(rules.reliability)
+    mapper = of_true_lines(trial.mission.mapper) if perfect_extraction else trial.mission.mapper
+    rules, extraction = mapper.walls.reliability, mapper.extraction
+    reliability = Reliability(rules)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k in range(len(recording)):
@@ -127,7 +128,7 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         owned[begun] = True
         reliability.see(segments, np.where(owned, walls, -1), poses_world[k])
         looks = _looks(segments, walls).take(seen)
-        again.append(replace(looks, cov=as_told(looks.cov, segments.is_tentative[seen], rules.reliability)))
+        again.append(replace(looks, cov=as_told(looks.cov, segments.take(seen), rules)))
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
     motions, covs = np.array([each.motion for each in reported]), np.array([each.cov for each in reported])

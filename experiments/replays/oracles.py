@@ -9,10 +9,12 @@ from jaxtyping import Bool, Float, Int
 
 from sim.chance import Channel, standard_normals
 from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
+from slam.config import MapperConfig
 from slam.estimation.backend import Joint
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
+from slam.extraction.straightness import StraightnessConfig
 from slam.geometry.poses import compose, inverse
 from slam.robot import Scan
 
@@ -116,6 +118,12 @@ class PerfectExtraction:
         exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
         draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
         return replace(segments, lines=as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2)))
+
+
+def of_true_lines(config: MapperConfig) -> MapperConfig:
+    """Return a mapper for perfect extraction, whose short faces are known for what they are."""
+    reliability = replace(config.walls.reliability, straightness=StraightnessConfig(edge_m=0.0))
+    return replace(config, walls=replace(config.walls, reliability=reliability))
 
 
 def as_stated(

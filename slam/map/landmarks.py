@@ -1,12 +1,13 @@
 """All that is known of the walls of one map beside their lines: observed, merged and removed in one place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
+from ..extraction.straightness import edge_cov, edge_variances
 from ..geometry.lines import directions
 from ..robot import Scan
 from .chains import ChainConfig
@@ -37,12 +38,17 @@ class Landmarks:
         self.records = Records()
         self.extents = Extents(walls, self.records)
         self.reliability = Reliability(walls.reliability, self.records)
+        self._straightness = walls.reliability.straightness
         self.change_points = ChangePoints(change_points, self.records)
         self.openings = Openings(gaps, chains, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
-        return self.extents.map(belief, self.reliability.are_crooked(self.records.ids))
+        walls = self.extents.map(belief, self.reliability.are_crooked(self.records.ids))
+        lengths, middles = walls.extents[:, 1] - walls.extents[:, 0], walls.extents.mean(axis=1)
+        across, turned = self.reliability.misfits(self.records.ids)
+        across = across + edge_variances(lengths, self._straightness)
+        return replace(walls, off_line_cov=edge_cov(across, lengths, middles, turned))
 
     def observe(
         self,

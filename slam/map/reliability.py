@@ -6,13 +6,14 @@ wrong ones. One scan cannot tell such a line from a wall; all scans together can
 from a wall that bends by a few degrees, sees of it now one side and then the other: each observation is straight.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaincc
 
 from ..extraction.segments import Segments
+from ..extraction.straightness import StraightnessConfig, cov_of_faces
 from ..geometry.lines import directions
 from ..geometry.poses import to_world, wrap
 from .records import Merger, Records
@@ -22,11 +23,10 @@ from .records import Merger, Records
 class ReliabilityConfig:
     """When a direction is clear, and when a wall is not straight."""
 
-    heading_rad: float = float(np.deg2rad(3.0))
-    """A segment with a larger sigma of direction is matched and stored but moves no estimate: where a line's direction
-    keeps changing by many degrees, so does the direction in which it fixes the robot, and every change adds
-    information that was never measured (pose ANEES in `rooms` 3.5 with such segments, 1.1 without). Between 3 and 6
-    degrees one in six of five or six beams holds a beam of another wall."""
+    heading_rad: float = 0.15
+    """A segment with a larger sigma of direction, that of short faces included (`straightness`), is matched and stored
+    but moves no estimate: where a line's direction keeps changing by many degrees, so does the direction in which it
+    fixes the robot, and every change adds information that was never measured."""
     few_heading_rad: float = float(np.deg2rad(1.0))
     """The same for a segment of fewer than five beams: along a wall seen at a grazing angle they are as good as they
     say, above this they hold beams of other walls too often."""
@@ -39,15 +39,18 @@ class ReliabilityConfig:
     """Directions that differ along the wall by less, root mean square, may be the robot's own turn on its way there."""
     chance: float = 1e-5
     """Straight walls are taken for crooked this rarely by each of the three tests."""
+    straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
+    """How far a face may be from its line."""
 
 
 def are_clear(segments: Segments, config: ReliabilityConfig = ReliabilityConfig()) -> Bool[np.ndarray, " s"]:
     """Return which segments have enough beams and a clear direction."""
-    return ~segments.is_tentative & (segments.cov[:, 0, 0] < config.heading_rad**2)
+    turn = segments.cov[:, 0, 0] + cov_of_faces(segments, config.straightness)[:, 0, 0]
+    return ~segments.is_tentative & (turn < config.heading_rad**2)
 
 
 def as_told(
-    cov: Float[np.ndarray, "m 2 2"], few: Bool[np.ndarray, " m"], config: ReliabilityConfig = ReliabilityConfig()
+    cov: Float[np.ndarray, "m 2 2"], segments: Segments, config: ReliabilityConfig = ReliabilityConfig()
 ) -> Float[np.ndarray, "m 2 2"]:
     """Return the covariances of (alpha, r) of observations that together move the estimate; `few` show few beams.
 
@@ -55,6 +58,7 @@ def as_told(
     corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
+    few, cov = segments.is_tentative, cov + cov_of_faces(segments, config.straightness)
     if few.all():
         return cov
     turn = np.where(few, config.heading_rad, 0.0)[:, None] * cov[:, :, 0] / cov[:, :1, 0]
@@ -75,6 +79,8 @@ class Reliability:
             # Of the clear ones: information times how far along the wall, that times the same, and times direction.
             along=np.zeros(3),
             crooked=False,
+            # Squared residuals beyond those of the noise, m^2, and of how many beams.
+            residue=np.zeros(2),
         )
 
     def see(self, segments: Segments, owners: Int[np.ndarray, " s"], pose_world: Float[np.ndarray, "3"]) -> None:
@@ -89,6 +95,11 @@ class Reliability:
         new = np.isnan(first[rows, 0])
         first[rows[new]] = np.column_stack([alpha, middle])[new]
         np.add.at(columns["fits"], rows, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
+        # Across the line a beam has the variance of the whole fit, times as many beams.
+        across = seen.cov[:, 1, 1] - seen.cov[:, 0, 1] ** 2 / seen.cov[:, 0, 0]
+        dof = seen.beam_counts - 2.0
+        excess = (seen.chi2 - dof) * across * seen.beam_counts
+        np.add.at(columns["residue"], rows, np.stack([excess, seen.beam_counts], axis=-1))
         off = wrap(alpha - first[rows, 0])
         along = np.vecdot(middle - first[rows, 1:], directions(first[rows, 0]))
         clear = are_clear(seen, self._config)
@@ -106,6 +117,7 @@ class Reliability:
         columns, keep, drop = self._records.columns, merger.keep, merger.drop
         first, fits, sums, along = (columns[name] for name in ("first", "fits", "directions", "along"))
         fits[keep] += fits[drop]
+        columns["residue"][keep] += columns["residue"][drop]
         if np.isnan(first[drop, 0]):
             return
         if np.isnan(first[keep, 0]):
@@ -148,6 +160,28 @@ class Reliability:
         crooked: Bool[np.ndarray, " n"] = self._records.columns["crooked"][rows]
         return crooked
 
+    def misfits(self, ids: Int[np.ndarray, " n"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """Return how far the faces of crooked walls are off their line: variances in m^2 across it and in rad^2.
+
+        Of two faces that meet in a corner each is off the line through both by twice what their residuals show; where
+        what is vague and what is clear disagree, the clear ones have moved the line to where the others are not.
+        """
+        rows = self._records.rows(ids)
+        crooked = self._records.columns["crooked"][rows]
+        residue, beams = self._records.columns["residue"][rows].T
+        across = np.where(crooked, 4.0 * np.maximum(residue, 0.0) / np.maximum(beams, 1.0), 0.0)
+        apart, _ = self._apart(rows)
+        return across, np.where(crooked & self._in_conflict(rows), np.square(apart), 0.0)
+
+    def _apart(self, rows: Int[np.ndarray, " n"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """Return by how much vague and clear directions of walls differ, and its variance; 0 and inf without either."""
+        information, sums = np.moveaxis(self._records.columns["directions"][rows], -1, 0)
+        both = (information > 0.0).all(axis=1)
+        apart, variance = np.zeros(len(rows)), np.full(len(rows), np.inf)
+        apart[both] = np.diff(sums[both] / information[both], axis=1)[:, 0]
+        variance[both] = np.sum(1.0 / information[both], axis=1)
+        return apart, variance
+
     def _misfit(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         chi2, dof = self._records.columns["fits"][rows].T
         misfit = chi2 > self._config.excess * dof
@@ -155,13 +189,8 @@ class Reliability:
         return misfit
 
     def _in_conflict(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        information, sums = np.moveaxis(self._records.columns["directions"][rows], -1, 0)
-        both = (information > 0.0).all(axis=1)
-        information, sums = information[both], sums[both]
-        apart = np.diff(sums / information, axis=1)[:, 0] ** 2 / np.sum(1.0 / information, axis=1)
-        conflict = np.zeros(len(rows), dtype=bool)
-        conflict[both] = gammaincc(0.5, 0.5 * apart) < self._config.chance
-        return conflict
+        apart, variance = self._apart(rows)
+        return gammaincc(0.5, 0.5 * np.square(apart) / variance) < self._config.chance
 
     def _bends(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return where the clear directions change along the wall: by a line through them, weighted."""

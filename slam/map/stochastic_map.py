@@ -1,12 +1,12 @@
 """The map: a belief about lines, and how far along each line its wall has been seen."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..estimation.backend import Belief
+from ..estimation.backend import POSE, Belief, Joint
 from ..geometry.lines import directions, distance_to_segments, normals
 
 
@@ -23,10 +23,29 @@ class StochasticMap:
     """Walls that were not seen well enough yet to be followed or chained."""
     crooked: Bool[np.ndarray, " n"]
     """Walls whose beams, over many scans, do not lie on a line (`reliability`): matched and chained, but they move no
-    estimate that another wall can move, and what is stated of them is not to be believed."""
+    estimate that another wall can move."""
+    off_line_cov: Float[np.ndarray, "n 2 2"] | None = None
+    """How far each wall may be from its line, as a covariance of (alpha rad, d m): what no single beam's noise explains
+    (`straightness`). A back end's own belief has none of it."""
 
     def __len__(self) -> int:
         return len(self.extents)
+
+    @property
+    def told(self) -> "StochasticMap":
+        """The map of a back end's own belief, with one that states how far walls may be from their lines as well."""
+        if self.off_line_cov is None:
+            return self
+        belief, blocks = self.belief, self.off_line_cov
+
+        def query(ids: Int[np.ndarray, " m"]) -> Joint:
+            joint, rows = belief.query(ids), np.arange(len(ids))
+            cov = joint.cov.copy()
+            lines = cov[POSE:, POSE:].reshape(len(ids), 2, len(ids), 2)
+            lines[rows, :, rows] += blocks[belief.rows(ids)]
+            return replace(joint, cov=cov)
+
+        return replace(self, belief=replace(belief, query=query))
 
     @property
     def ids(self) -> Int[np.ndarray, " n"]:

@@ -39,6 +39,7 @@ def smooth(
         belief = belief_of_body(backend.belief, scanner)
         if len(poses) <= rows[-1] or not np.array_equal(belief.ids, last.ids):
             return None
-        return Smoothed(poses[rows], replace(last, belief=belief), belief.joint(belief.ids))
+        smoothed = replace(last, belief=belief).told
+        return Smoothed(poses[rows], smoothed, smoothed.belief.joint(belief.ids))
     except Exception:  # whatever a back end raises after a failed run must not cost the results so far
         return None

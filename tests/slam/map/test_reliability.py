@@ -1,5 +1,7 @@
 """Straight walls stay straight whatever the noise; lines laid around corners are found out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -8,6 +10,7 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
+from slam.extraction.straightness import StraightnessConfig, edge_cov
 from slam.geometry.poses import compose, inverse, to_world
 from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
 from slam.mapper import Mapper
@@ -38,7 +41,7 @@ def scans(faces, poses, rng):
         )
 
 
-def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
+def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=1.0):
     """Return one segment with a direction and how well it is known."""
     cov = np.diag([sigma_rad**2, 1e-5])[None]
     ends, none = np.array([[[1.0, 0.0], [1.0, length_m]]]), np.zeros((1, 2), dtype=int)
@@ -48,6 +51,8 @@ def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=0.1):
     )
 
 
+FACES = ReliabilityConfig(straightness=StraightnessConfig(edge_m=0.0))
+"""Every segment is of one face."""
 OWNER = np.array([0])
 POSE = np.zeros(3)
 
@@ -152,10 +157,10 @@ def test_a_line_laid_down_the_stairs_is_found_out_and_moves_nothing_more():
 
 
 def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction():
-    reliability, few = Reliability(), observation(0.0, 0.01, beams=3)
+    reliability, few = Reliability(), observation(0.0, 0.01, beams=3, length_m=0.9)
     assert not reliability.may_move(few, OWNER).any(), "of this wall nothing is known"
     for _ in range(200):
-        reliability.see(observation(0.0, 0.12, beams=6), OWNER, POSE)
+        reliability.see(observation(0.0, 0.2, beams=6), OWNER, POSE)
     assert not reliability.may_move(few, OWNER).any(), "only vague observations"
     reliability.see(observation(0.0, 0.02, beams=8), OWNER, POSE)
     assert not reliability.may_move(few, OWNER).any(), "it would tell more of the wall than was known before"
@@ -167,7 +172,7 @@ def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction(
     for _ in range(300):
         reliability.see(observation(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
     assert not reliability.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
-    assert not reliability.may_move(observation(0.0, 0.02, beams=8), OWNER).any()
+    assert not reliability.may_move(observation(0.0, 0.02, beams=8, length_m=0.9), OWNER).any()
 
 
 def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
@@ -189,11 +194,68 @@ def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middl
     """A line that beams met `middle_m` along it from the foot of the robot's perpendicular."""
     to_robot = np.array([[1.0, 0.0], [middle_m, 1.0]])  # (alpha, across at the middle) to (alpha, r)
     cov = to_robot @ np.diag([1e-6, 4e-6]) @ to_robot.T
-    wide, clear = as_told(np.stack([cov, cov]), np.array([True, False]))
+    both = [replace(observation(0.0, 1e-3, beams, length_m=3.0), cov=cov[None]) for beams in (4, 9)]
+    few = both[0]
+    together = Segments(*(np.concatenate([getattr(each, name) for each in both]) for name in vars(few)))
+    wide, clear = as_told(together.cov, together, FACES)
     at_middle = np.linalg.inv(to_robot)
-    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + np.deg2rad(3.0) ** 2, 4e-6]), atol=1e-12)
+    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + FACES.heading_rad**2, 4e-6]), atol=1e-12)
     np.testing.assert_array_equal(clear, cov)
-    np.testing.assert_array_equal(as_told(cov[None], np.array([True])), cov[None], "alone it is all that there is")
+    np.testing.assert_array_equal(as_told(cov[None], few, FACES), cov[None], "alone it is all that there is")
+
+
+def observed_over(points, rng):
+    """Return the segment of a line by least squares through points near x = 1, seen from the origin with noise."""
+    off = points[:, 0] + SIGMA_M * rng.standard_normal(len(points)) - 1.0
+    y = points[:, 1]
+    slope, offset = np.polyfit(y - y.mean(), off, 1)
+    chi2 = np.sum((off - offset - slope * (y - y.mean())) ** 2) / SIGMA_M**2
+    turn, across = SIGMA_M**2 / np.sum((y - y.mean()) ** 2), SIGMA_M**2 / len(y)
+    cov = np.array([[turn, turn * y.mean()], [turn * y.mean(), across + turn * y.mean() ** 2]])
+    seen = observation(-np.arctan(slope), 1.0, len(y), chi2, y[-1] - y[0])
+    return replace(seen, cov=cov[None], lines=np.array([[-np.arctan(slope), 1.0 + offset]]))
+
+
+@pytest.mark.parametrize("bend_rad", [0.4, 0.8])
+def test_of_two_faces_that_meet_each_is_off_the_line_through_both_by_what_is_told(bend_rad):
+    """The middle of a wall stands out; the faces beside it turn by half the bend either way."""
+    rng, reliability = np.random.default_rng(1), Reliability()
+    y = np.linspace(-0.15, 0.15, 16)
+    for _ in range(100):
+        points = np.column_stack([1.0 + np.tan(0.5 * bend_rad) * np.abs(y), y])
+        reliability.see(observed_over(points, rng), OWNER, POSE)
+    assert reliability.are_crooked(OWNER).all()
+    across, turned = reliability.misfits(OWNER)
+    (told,) = edge_cov(across, np.array([0.3]), np.zeros(1), turned)
+    assert np.sqrt(told[0, 0]) == pytest.approx(np.tan(0.5 * bend_rad), rel=0.1)
+
+
+def test_a_straight_wall_is_on_its_line_however_often_it_was_seen():
+    rng, reliability = np.random.default_rng(2), Reliability()
+    for _ in range(100):
+        points = np.column_stack([np.ones(16), np.linspace(-0.15, 0.15, 16)])
+        reliability.see(observed_over(points, rng), OWNER, POSE)
+    assert reliability.misfits(OWNER) == ([0.0], [0.0])
+
+
+def test_where_vague_and_clear_disagree_the_line_may_be_off_by_as_much():
+    rng, reliability = np.random.default_rng(1), Reliability()
+    for _ in range(35):
+        reliability.see(observation(np.deg2rad(10.0) * rng.standard_normal(), np.deg2rad(10.0)), OWNER, POSE)
+    reliability.see(observation(np.deg2rad(-31.0), np.deg2rad(2.8)), OWNER, POSE)
+    _, turned = reliability.misfits(OWNER)
+    assert np.sqrt(turned[0]) == pytest.approx(np.deg2rad(31.0), abs=np.deg2rad(4.0))
+
+
+def test_what_is_left_of_two_walls_that_are_one_adds_up():
+    rng, apart, one = np.random.default_rng(3), Reliability(), Reliability()
+    y = np.linspace(-0.15, 0.15, 16)
+    for k in range(60):
+        seen = observed_over(np.column_stack([1.0 + 0.3 * np.abs(y), y]), rng)
+        apart.see(seen, np.array([k % 2]), POSE)
+        one.see(seen, OWNER, POSE)
+    apart._records.merge(0, 1, 0.0)
+    np.testing.assert_allclose(apart.misfits(OWNER), one.misfits(OWNER), rtol=1e-9)
 
 
 def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():

@@ -1,0 +1,116 @@
+"""What short faces and misfits add to a covariance: against information summed along the face, and against scans."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.estimation.backend import Belief, Joint
+from slam.extraction.extract import extract
+from slam.extraction.straightness import StraightnessConfig, cov_of_faces, edge_cov, edge_variances
+from slam.geometry.lines import normals, through
+from slam.geometry.poses import wrap
+from slam.map.reliability import ReliabilityConfig, are_clear, as_told
+from slam.map.stochastic_map import StochasticMap
+from slam.robot import Scan
+
+
+@pytest.mark.parametrize(("length", "middle"), [(0.1, 0.0), (0.4, 1.3), (0.2, -2.0)])
+def test_the_covariance_of_an_edge_is_that_of_one_point_spread_along_it(length, middle):
+    """Information about (direction, distance at 0) of a point with variance v at x is (x, 1)' (x, 1) / v."""
+    x = middle + length * (np.arange(20_000) + 0.5) / 20_000 - 0.5 * length
+    rows = np.column_stack([-x, np.ones_like(x)])  # turning the wall moves the point at x off by -x
+    expected = np.linalg.inv(rows.T @ rows / (len(x) * 0.01**2))
+    (found,) = edge_cov(np.array([0.01**2]), np.array([length]), np.array([middle]))
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
+
+
+def test_the_least_variance_of_the_direction_turns_the_wall_about_its_middle():
+    (found,) = edge_cov(np.array([0.0]), np.array([0.5]), np.array([2.0]), np.array([0.01]))
+    np.testing.assert_allclose(found, 0.01 * np.outer([1.0, 2.0], [1.0, 2.0]))
+
+
+def test_long_faces_are_on_their_lines():
+    sigmas = np.sqrt(edge_variances(np.array([0.0, 0.1, 0.2, 0.4, 1.0, 4.0])))
+    assert sigmas[0] == 0.01
+    assert sigmas[2] == 0.005
+    assert (np.diff(sigmas) < 0.0).all()
+    assert sigmas[4] < 2e-5, "far below what a hundred beams tell"
+    assert not edge_variances(np.array([0.05, 1.0]), StraightnessConfig(edge_m=0.0)).any()
+
+
+def room_of_pilasters(rng):
+    """Return the faces of a room in whose walls stand pilasters and niches of 6 to 15 cm, three a metre."""
+    room = shapely.box(0, 0, 4, 3)
+    for at in np.arange(0.5, 3.6, 0.6) + rng.uniform(-0.1, 0.1, 6):
+        width, depth = rng.uniform(0.06, 0.15, 2)
+        room = room.difference(shapely.box(at, 0.0, at + width, depth))
+        room = room.union(shapely.box(at, 3.0 - 1e-6, at + width, 3.0 + depth))
+    ring = shapely.get_coordinates(shapely.orient_polygons(room).exterior)
+    return np.stack([ring[:-1], ring[1:]], axis=1)
+
+
+def short_segments(rng):
+    """Return the NEES over 2 of short segments, as extracted and as told, and which of them are of several faces."""
+    values, mixed = [], []
+    for _ in range(6):
+        faces = room_of_pilasters(rng)
+        finder, lines = RangeFinder(faces, LidarConfig()), through(faces)
+        for _ in range(25):
+            pose = np.append(rng.uniform([0.6, 0.6], [3.4, 2.4]), rng.uniform(-np.pi, np.pi))
+            ranges, hit = finder.cast(pose)
+            scan = Scan(finder.bearings_rad, ranges + 0.01 * rng.standard_normal(len(ranges)), 0.01, 4.0, 0.0)
+            segments = extract(scan)
+            segments = segments.take((segments.lengths_m < 0.2) & (segments.beam_counts >= 4))
+            told = segments.cov + cov_of_faces(segments)
+            for k, (a, b) in enumerate(segments.beams):
+                on = hit[np.arange(a, b + 1 + len(hit) * (b < a)) % len(hit)]
+                alpha, r = lines[np.bincount(on[on >= 0]).argmax()]
+                turn, at = segments.lines[k, 0] + pose[2] - alpha, segments.lines[k, 1] + normals(alpha) @ pose[:2]
+                error = np.array([wrap(turn), at - r])
+                values.append([error @ np.linalg.solve(cov[k], error) / 2.0 for cov in (segments.cov, told)])
+                mixed.append(len(set(on)) > 1)
+    return np.array(values), np.array(mixed)
+
+
+def test_among_short_faces_what_is_told_holds_for_those_of_one_face_and_nearly_for_the_rest():
+    """A room far worse than a flat: four short segments in ten lie across a corner."""
+    values, mixed = short_segments(np.random.default_rng(3))
+    assert mixed.mean() > 0.3
+    as_extracted, told = values.T
+    assert 0.5 < told[~mixed].mean() < 1.5 < as_extracted[~mixed].mean()
+    assert np.median(told) < 0.8 < 1.5 < np.median(as_extracted)
+    assert np.quantile(told, 0.8) < 0.4 * np.quantile(as_extracted, 0.8)
+
+
+def test_a_short_face_is_not_clear_and_moves_the_estimate_by_no_more_than_it_is_told():
+    scan = Scan(np.linspace(-0.3, 0.3, 13), 1.0 / np.cos(np.linspace(-0.3, 0.3, 13)), 0.002, 4.0, 0.0)
+    (segments,) = [extract(scan)]
+    assert len(segments) == 1
+    long, short = segments, replace(segments, ends=0.2 * segments.ends + [0.8, 0.0])
+    config = ReliabilityConfig()
+    assert are_clear(long, config).all()
+    assert not are_clear(short, config).any()
+    np.testing.assert_allclose(as_told(short.cov, short, config), short.cov + cov_of_faces(short))
+    np.testing.assert_allclose(as_told(long.cov, long, config), long.cov, rtol=0.2)
+
+
+def test_a_map_tells_how_far_walls_are_off_in_whatever_order_it_is_asked():
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(9, 9))
+    whole = Joint(rng.normal(size=9), root @ root.T, rng.normal(size=(3, 2)))
+    ids = np.array([4, 7, 9])
+    belief = Belief(whole.mean[:3], whole.cov[:3, :3], ids, whole.anchors, whole.mean[3:].reshape(-1, 2),
+                    lambda asked: whole.take(np.searchsorted(ids, asked)))  # fmt: skip
+    no, blocks = np.zeros(3, dtype=bool), edge_cov(np.array([1.0, 2.0, 3.0]), np.ones(3), np.array([0.5, 0.0, -1.0]))
+    walls = StochasticMap(belief, np.tile([-1.0, 1.0], (3, 1)), np.full(3, 5), no, no, blocks)
+    for asked in ([4, 7, 9], [9, 4], [7], []):
+        rows = np.searchsorted(ids, np.array(asked, dtype=np.int64))
+        expected = whole.take(rows).cov.copy()
+        for k, row in enumerate(rows):
+            expected[3 + 2 * k : 5 + 2 * k, 3 + 2 * k : 5 + 2 * k] += blocks[row]
+        np.testing.assert_allclose(walls.told.belief.joint(np.array(asked, dtype=np.int64)).cov, expected)
+        np.testing.assert_array_equal(walls.belief.joint(np.array(asked, dtype=np.int64)).cov, whole.take(rows).cov)
+    assert replace(walls, off_line_cov=None).told.belief is belief
