@@ -200,7 +200,7 @@ class Mapper:
         """Return the scan beside the walls that it can show."""
         lost_m = 3.0 * float(np.sqrt(np.trace(walls.belief.pose_cov[:2, :2])))
         near = walls.distances_m < scan.range_max_m + max(self.config.matching.offset_m, lost_m)
-        known = KnownWalls(walls.ids[near], walls.extents[near])
+        known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, self.config.matching)
 
     def _reliable(self, matches: Matches, segments: Segments) -> Observations:

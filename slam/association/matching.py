@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Joint, Observations
 from ..estimation.gates import gate_level
@@ -56,6 +56,9 @@ class MatchingConfig:
     the landmark that it fits better, which keeps them apart."""
     clear: float = 9.0
     """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
+    whole_m: float = 0.2
+    """A short wall of which both ends were seen is none of which a segment shows more by this: a face beside it, or a
+    step behind it, passes the gate of a direction that is hardly known."""
     apart_m: float = 0.3
     """Of method `paper`: largest distance between a segment and its wall, half the width of a narrow door."""
 
@@ -102,6 +105,8 @@ class KnownWalls:
     """Ascending."""
     extents: Float[np.ndarray, "n 2"]
     """From and to along the line, m from the anchor."""
+    whole: Bool[np.ndarray, " n"] | None = None
+    """Walls that are known to reach no farther; None where that is not known of any."""
 
 
 @dataclass(frozen=True)
@@ -167,10 +172,22 @@ def _candidates(segments: Segments, walls: KnownWalls, joint: Joint, config: Mat
     model = innovations(pose, joint.anchors[line], means[line], lines, cov)
     model = halfway(model, lines, cov, model.e[:, 0] * _share_of_heading(line, joint, model))
     d2 = pair_distances(model, line, joint)
+    along = _along(segments.ends[segment], joint.anchors[line], means[line, 0], pose)
     near = (np.abs(model.e[:, 1]) < config.offset_m) | (d2 <= gate_level(config.doubt, 2))
+    near &= ~_shows_more(along, walls, line, config)
     segment, line = segment[near], line[near]
-    gap = _gaps(segments.ends[segment], walls.extents[line], joint.anchors[line], means[line, 0], pose)
-    return _Candidates(segment, line, model.take(near), d2[near], gap)
+    return _Candidates(segment, line, model.take(near), d2[near], _gaps(along[near], walls.extents[line]))
+
+
+def _shows_more(
+    along: Float[np.ndarray, "c 2"], walls: KnownWalls, line: Int[np.ndarray, " c"], config: MatchingConfig
+) -> Bool[np.ndarray, " c"]:
+    """Return which segments reach past a short wall of which both ends were seen."""
+    if walls.whole is None:
+        return np.zeros(len(line), dtype=bool)
+    low, high = walls.extents[line].T
+    past = np.maximum(along[:, 1] - high, low - along[:, 0])
+    return walls.whole[line] & (high - low < config.short_m) & (past > config.whole_m)
 
 
 def _share_of_heading(line: Int[np.ndarray, " c"], joint: Joint, model: Innovations) -> Float[np.ndarray, " c"]:
@@ -180,16 +197,19 @@ def _share_of_heading(line: Int[np.ndarray, " c"], joint: Joint, model: Innovati
     return np.asarray(variance / (variance + model.R[:, 0, 0]))
 
 
-def _gaps(
+def _along(
     ends_robot: Float[np.ndarray, "c 2 2"],
-    extents: Float[np.ndarray, "c 2"],
     anchors: Float[np.ndarray, "c 2"],
     alpha: Float[np.ndarray, " c"],
     pose_world: Float[np.ndarray, "3"],
-) -> Float[np.ndarray, " c"]:
-    """Return the distance along the line from each segment to its wall, m; negative where they overlap by that much."""
+) -> Float[np.ndarray, "c 2"]:
+    """Return from and to of each segment along its line, m from the line's anchor."""
     offsets = to_world(ends_robot, pose_world) - anchors[:, None]
-    along = np.vecdot(offsets, directions(alpha)[:, None])
+    return np.vecdot(offsets, directions(alpha)[:, None])
+
+
+def _gaps(along: Float[np.ndarray, "c 2"], extents: Float[np.ndarray, "c 2"]) -> Float[np.ndarray, " c"]:
+    """Return the distance along the line from each segment to its wall, m; negative where they overlap by that much."""
     return np.maximum(along[:, 0] - extents[:, 1], extents[:, 0] - along[:, 1])
 
 
@@ -255,8 +275,8 @@ def _still_overlapping(
     pose = joint.mean[:3] + seen.gain()[:3] @ seen.e
     line = found.line[chosen]
     alpha = joint.mean[3 + 2 * line]
-    gap = _gaps(segments.ends[found.segment[chosen]], walls.extents[line], joint.anchors[line], alpha, pose)
-    return chosen[gap <= -config.overlap_m]
+    along = _along(segments.ends[found.segment[chosen]], joint.anchors[line], alpha, pose)
+    return chosen[_gaps(along, walls.extents[line]) <= -config.overlap_m]
 
 
 def _refusals(

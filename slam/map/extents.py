@@ -70,13 +70,15 @@ class Extents:
             against=0,
             overlaid=np.zeros(2, dtype=np.int64),
             claimed=0,
+            whole=0,
         )
 
     def map(self, belief: Belief, crooked: Bool[np.ndarray, " n"]) -> StochasticMap:
         """Return the belief together with the extents."""
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
         tentative = observations < self._config.trusted_observations
-        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked)
+        whole = self._records.columns["whole"] >= self._config.trusted_observations
+        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole)
 
     def see(
         self,
@@ -94,7 +96,9 @@ class Extents:
         used = np.flatnonzero(owners >= 0)
         rows, seen_often = self._records.rows(owners[used]), self._records.rows(believed)
         columns = self._records.columns
+        before = columns["extents"].copy()
         self._stretch(belief, scan, segments, used, rows)
+        self._note_whole(before, segments, used, rows)
         self._uncover(belief, segments, owners, used, rows)
         observations, last_seen, extents = (columns[name] for name in ("observations", "last_seen", "extents"))
         observations[np.unique(rows)] += 1
@@ -105,6 +109,20 @@ class Extents:
         shaky = stale & (observations < self._config.trusted_observations)
         shaky |= (columns["claimed"] >= self._config.claims) & (observations < self._config.established_observations)
         return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < self._config.least_m)]
+
+    def _note_whole(
+        self,
+        before: Float[np.ndarray, "n 2"],
+        segments: Segments,
+        used: Int[np.ndarray, " m"],
+        rows: Int[np.ndarray, " m"],
+    ) -> None:
+        """Count in how many scans nothing hid either end of a wall, since it last turned out to be longer."""
+        extents, whole = self._records.columns["extents"], self._records.columns["whole"]
+        with np.errstate(invalid="ignore"):
+            grown = np.abs(extents - before).max(axis=1) > self._config.end_margin_m
+        whole[grown] = 0
+        np.add.at(whole, rows, (segments.end_kinds[used] != EndKind.OCCLUDED).all(axis=1))
 
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
         """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
@@ -154,6 +172,7 @@ class Extents:
                 extents[row, side] = theirs[side]
                 spacing[row, side] = spacing[other, side]
         columns["observations"][row] += columns["observations"][other]
+        columns["whole"][row] = 0
         columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:

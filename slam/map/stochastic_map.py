@@ -24,6 +24,8 @@ class StochasticMap:
     crooked: Bool[np.ndarray, " n"]
     """Walls whose beams, over many scans, do not lie on a line (`reliability`): matched and chained, but they move no
     estimate that another wall can move."""
+    whole: Bool[np.ndarray, " n"] | None = None
+    """Walls of which scan after scan showed both ends, hidden by nothing: they reach no farther. None where unknown."""
     off_line_cov: Float[np.ndarray, "n 2 2"] | None = None
     """How far each wall may be from its line, as a covariance of (alpha rad, d m): what no single beam's noise explains
     (`straightness`). A back end's own belief has none of it."""

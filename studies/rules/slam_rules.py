@@ -6,6 +6,9 @@ NO = "np.zeros_like(on())"
 YES = "np.ones_like(on())"
 
 MATCHING = (
+    Switch("matching.whole", "slam.association.matching",
+           "near &= ~«_shows_more(along, walls, line, config)»", "np.zeros(len(line), dtype=bool)",
+           "a segment reaches no farther than a short wall of which both ends were seen"),
     Switch("matching.cross", "slam.association.matching",
            "cross = «model.H_pose @ pose_line @ model.H_line.swapaxes(1, 2)»",
            "0.0 * on()", "the gate counts the covariance of pose with line"),

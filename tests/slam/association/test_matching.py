@@ -111,6 +111,27 @@ def test_how_far_off_a_wall_is_after_a_slip_is_what_the_slip_itself_costs(slip_r
     assert found.distances == pytest.approx([(slip_rad / sigma) ** 2], rel=0.05)
 
 
+@pytest.mark.parametrize(("whole", "longer_m", "one"), [(True, 0.5, False), (True, 0.1, True), (False, 0.5, True)])
+def test_a_short_wall_that_was_seen_whole_is_none_of_which_a_segment_shows_more(whole, longer_m, one):
+    """A wall's end of 0.1 m whose direction is known to 15 degrees, and a face beside it that begins with it."""
+    anchor = np.array([[1.0, 0.0]])
+    joint = Joint(np.array([0.0, 0.0, 0.0, 0.0, 0.0]), np.diag([1e-3, 1e-3, 1e-3, 0.26, 0.005]) ** 2, anchor)
+    y = np.array([-0.05, 0.05 + longer_m])
+    ends, turn = np.column_stack([[1.0, 1.0], y]), np.array([[1.0, 0.0], [y.mean(), 1.0]])
+    cov = turn @ np.diag([0.01, 0.003]) ** 2 @ turn.T
+    segment = Segments(
+        np.array([[0.0, 1.0]]), cov[None], ends[None], np.array([[0, 8]]), np.array([9]), np.zeros((1, 2), int),
+        np.zeros(1), SURE,
+    )  # fmt: skip
+    wall = KnownWalls(np.array([5]), np.array([[-0.05, 0.05]]), np.array([whole]))
+    for clear_only in (True, False):
+        found = match(segment, wall, joint, clear_only=clear_only)
+        assert found.pairs.tolist() == ([[0, 5]] if one else [])
+    assert not len(found.doubtful), "what is none of the wall is a wall of its own"
+    long = KnownWalls(np.array([5]), np.array([[-2.0, 0.05]]), np.array([True]))
+    assert match(segment, long, joint).pairs.tolist() == [[0, 5]], "a long wall's own direction tells"
+
+
 def test_without_walls_nothing_matches_and_nothing_is_doubtful():
     joint = Joint(np.zeros(3), P0, np.zeros((0, 2)))
     _, truth = random_joint(np.random.default_rng(44))
