@@ -272,7 +272,7 @@ def path_of(
 
 
 def wheels_alone(log: Log, recorded: RecordedLog) -> Float[np.ndarray, "s 3"]:
-    """Return where the wheels alone say that a recorded robot was, from where the estimate begins."""
+    """Return where wheel odometry puts a recorded robot, from where the estimate begins."""
     return odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)])
 
 

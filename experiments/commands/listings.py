@@ -3,7 +3,10 @@
 Each listing imports only the registry that it prints.
 """
 
-from collections.abc import Callable
+import ast
+import io
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -56,32 +59,61 @@ class Completion:
         from .parsing import readable
 
         classes: dict[str, Callable[..., Any]] = {name: readable(entry.load()) for name, entry in COMMANDS.items()}
+        script = _completed(_tyros(classes, "bash" if self.shell == "fish" else self.shell))
         if self.shell == "fish":
-            print("\n".join(_fish({name: COMMANDS[name].words for name in classes}, classes)))
-            return 0
-        try:
-            tyro.extras.subcommand_cli_from_dict(
-                classes, prog="chainslam", args=["--tyro-print-completion", self.shell]
-            )
-        except SystemExit as leaving:
-            return int(leaving.code or 0)
+            script = "\n".join(_fish({name: COMMANDS[name].words for name in classes}, _spec(script)))
+        print(script.rstrip("\n"))
         return 0
 
 
 APOSTROPHE, ESCAPED = "'", r"\'"
+SPEC = "COMPLETION_SPEC = "
+"""What the line of tyro's scripts begins with that holds all commands and options."""
 
 
-def _fish(about: dict[str, str], classes: dict[str, Callable[..., Any]]) -> list[str]:
+def _tyros(classes: dict[str, Callable[..., Any]], shell: str) -> str:
+    """Return tyro's own script for bash or zsh."""
+    said = io.StringIO()
+    with redirect_stdout(said), suppress(SystemExit):
+        tyro.extras.subcommand_cli_from_dict(classes, prog="chainslam", args=["--tyro-print-completion", shell])
+    return said.getvalue()
+
+
+def _spec(script: str) -> dict[str, Any]:
+    line = next(line for line in script.splitlines() if line.startswith(SPEC))
+    return dict(ast.literal_eval(line.removeprefix(SPEC)))
+
+
+def _completed(script: str) -> str:
+    """Return tyro's script with the names that our options take, and without what is no option for a user."""
+    from explore.strategies import STRATEGIES
+    from slam.backends import BACKENDS
+
+    spec = _spec(script)
+    names: dict[str, Iterable[str]] = dict.fromkeys(("--backend", "--backends", "--driver"), BACKENDS)
+    names |= dict.fromkeys(("--strategy", "--strategies"), STRATEGIES)
+    for command in spec["subcommands"].values():
+        command["options"] = [option for option in command["options"] if "--given" not in option["flags"]]
+        for option in command["options"]:
+            known = names.get(option["flags"][0], option.get("choices", ()))
+            if known:
+                option |= {"type": "choice", "choices": sorted(set(known) - {"None"})}
+    lines = (f"{SPEC}{spec!r}" if line.startswith(SPEC) else line for line in script.splitlines())
+    return "\n".join(lines)
+
+
+def _fish(about: dict[str, str], spec: dict[str, Any]) -> list[str]:
     """Return fish's `complete` lines, which tyro does not write."""
-    from .parsing import options_of
-
     told = {name: words.replace(APOSTROPHE, ESCAPED) for name, words in about.items()}
     lines = [
         f"complete -c chainslam -n __fish_use_subcommand -f -a {name} -d '{words}'" for name, words in told.items()
     ]
-    for name, command in classes.items():
+    values = {"path": " -r", "value": " -x"}
+    for name in about:
         seen = f"complete -c chainslam -n '__fish_seen_subcommand_from {name}'"
-        lines += [f"{seen} -l {option.removeprefix('--')}" for option in options_of(command)]
+        for option in spec["subcommands"][name]["options"]:
+            taken = f" -x -a '{' '.join(option['choices'])}'" if "choices" in option else values.get(option["type"], "")
+            lines += [f"{seen} -l {flag.removeprefix('--')}{taken}" for flag in option["flags"] if flag[1] == "-"]
     return lines
 
 

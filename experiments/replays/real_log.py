@@ -51,7 +51,7 @@ class RealRun:
 
     @cached_property
     def wheels_alone(self) -> Float[np.ndarray, "s 3"]:
-        """Where the wheels alone say that the robot was at each keyframe, in the map's frame."""
+        """Where wheel odometry puts the robot at each keyframe, in the map's frame."""
         return odometry_poses(np.zeros(3), self.log.recording.odometry)
 
 

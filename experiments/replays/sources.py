@@ -80,5 +80,5 @@ class RealLog:
         return replay_real(self.run, backend, watch)
 
     def wheels_pose(self, step: Step) -> Float[np.ndarray, "3"]:
-        """Return where the wheels alone say the robot was at a step."""
+        """Return where wheel odometry puts the robot at a step."""
         return np.asarray(self.run.wheels_alone[step.index])

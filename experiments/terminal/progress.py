@@ -195,7 +195,7 @@ def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
         "scans mapped": "steps",
         "path by the wheels, m": "path_length_m",
         "walls": "lines",
-        "walls twice": "duplicate_lines",
+        "duplicate walls": "duplicate_lines",
         "closed chains": "chains_closed",
         "computing ms a step": "step_ms",
     }

@@ -12,8 +12,13 @@ from PIL import Image
 ROOT = Path(__file__).parents[2]
 DOCS = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *DOCS]
+SHORT = [
+    *(page for page in DOCS if page.parent.name in ("tutorial", "howto")),
+    *(ROOT / "docs" / name for name in ("index.md", "commands.md", "python.md", "limits.md")),
+]
+"""Pages whose sentences are as short as the README's."""
 LONGEST = 25
-"""Words in a sentence of the README."""
+"""Words in a sentence of these."""
 
 
 def prose(text):
@@ -32,6 +37,28 @@ def test_sentences_of_the_readme_are_short():
     sentences = re.split(r"[.;:!?](?:\s|$)|\n\s*\n", prose((ROOT / "README.md").read_text()))
     words = {len(re.findall(r"[\w'-]+", sentence)): sentence for sentence in sentences}
     assert len(sentences) > 20
+    assert max(words) <= LONGEST, words[max(words)]
+
+
+PRIVATE = "the wheels alone", "walls twice", "times apart", "not its business", "the house"
+"""Words of our own that the field has others for."""
+
+
+def test_texts_reports_and_help_use_the_words_of_the_field():
+    packages = ("slam", "explore", "sim", "viz", "experiments", "chainslam", "studies", "examples")
+    sources = [path for name in packages for path in (ROOT / name).rglob("*.py")]
+    assert len(sources) > 100
+    for path in (*PAGES, *sources):
+        text = " ".join(path.read_text().lower().split())
+        assert [words for words in PRIVATE if words in text] == [], path
+
+
+@pytest.mark.parametrize("page", SHORT, ids=lambda page: str(page.relative_to(ROOT)))
+def test_sentences_of_pages_for_beginners_are_short(page):
+    text = re.sub(r"^(```[\s\S]*?^```|#.*)$", "", page.read_text(), flags=re.MULTILINE)
+    text = re.sub(r"\*\*(.*?)\*\*", r"\1", prose(text))
+    sentences = re.split(r"[.;:!?](?:\s|$)|\n\s*\n|\n\s*[-*\d]+\.? ", text)
+    words = {len(re.findall(r"[\w'-]+", sentence)): sentence for sentence in sentences}
     assert max(words) <= LONGEST, words[max(words)]
 
 

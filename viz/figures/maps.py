@@ -67,7 +67,7 @@ class Picture:
     true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
     """Rings of the true floor, the exterior first; empty where the truth is not known."""
     odometry_path_world: Float[np.ndarray, "s 3"] | None = None
-    """Where the wheels alone say the robot was."""
+    """Where wheel odometry puts the robot."""
     radius_m: float = RobotSpec.radius_m
     """Of the body."""
 

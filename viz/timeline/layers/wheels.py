@@ -1,4 +1,4 @@
-"""Where the wheels alone say the robot was, under `/world/odometry`: the same for all back ends, so sent once."""
+"""Where wheel odometry puts the robot, under `/world/odometry`: the same for all back ends, so sent once."""
 
 import numpy as np
 from jaxtyping import Float
