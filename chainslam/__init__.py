@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from slam.backends import BACKENDS, BackendEntry
     from slam.estimation.backend import Backend, Belief, Joint, Observations
     from slam.robot import MotionCommand, Odometry, Robot, RobotError, RobotSpec, Scan, ScannerSpec, WheelSpec
+    from slam.robot.streaming import SteppedRobot, StreamingRobot, TimedScan, Twist
 
 _PLACES = {
     "experiments.library.running": ("explore", "replay"),
@@ -46,6 +47,7 @@ _PLACES = {
         "ScannerSpec",
         "WheelSpec",
     ),
+    "slam.robot.streaming": ("SteppedRobot", "StreamingRobot", "TimedScan", "Twist"),
 }
 """Where each name comes from."""
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -55,7 +57,7 @@ __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError", "RobotSpec", "Run", "Scan",
     "ScannerSpec", "Situation",
-    "Step", "Strategy", "StrategyEntry", "UsageError",
+    "Step", "SteppedRobot", "Strategy", "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError",
     "WheelSpec", "World", "__version__", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 

@@ -15,6 +15,7 @@ SAID = {
     "own_strategy": "farthest: complete",
     "own_world_format": "complete: coverage 1.000",
     "own_robot": "complete: 6 walls",
+    "streaming_robot": "complete: 6 walls",
     "irsim_robot": "complete: 12 walls",
     "mujoco_robot": "complete: 12 walls",
     "read_results": "wall 1:",
