@@ -95,7 +95,7 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check study intervals interval-causes counts settings
+.PHONY: navigation paper paper-check study intervals real-plans interval-causes counts settings
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
@@ -108,6 +108,10 @@ study: setup
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out results/intervals.jsonl
+
+# The paper's question in real plans: every fourth apartment, explored once and replayed through six back ends.
+real-plans: setup
+	$(BIN)/python -m studies.consistency.real_plans --plans $(PLANS) --out studies/results/rows/real-plans.jsonl
 
 # Is it the matches, or the lines, that make them fail more often in one run than in another?
 interval-causes: setup

@@ -1,0 +1,61 @@
+"""What many rows come to, in the words of a table."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..runner.rows import Row
+
+
+def grouped(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:
+    """Return the rows by what they have under a name."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row[name], []).append(row)
+    return found
+
+
+def numbers(rows: Sequence[Row], name: str) -> list[float]:
+    """Return the numbers that the rows have under a name."""
+    return [row[name] for row in rows if row[name] is not None]
+
+
+def mean_of(rows: Sequence[Row], name: str) -> float:
+    """Return their mean."""
+    return float(np.mean(numbers(rows, name)))
+
+
+def median_of(rows: Sequence[Row], name: str) -> str:
+    """Return their median, in words."""
+    return f"{np.median(numbers(rows, name)):.3g}"
+
+
+def typical(rows: Sequence[Row], name: str) -> str:
+    """Return their mean and their median, in words."""
+    return f"{mean_of(rows, name):.3g}, {median_of(rows, name)}"
+
+
+def total(rows: Sequence[Row], name: str) -> int:
+    """Return their sum."""
+    return round(sum(numbers(rows, name)))
+
+
+def completed(rows: Sequence[Row]) -> str:
+    """Return how many runs are complete, in words."""
+    return f"{sum(row['status'] == 'complete' for row in rows)} of {len(rows)}"
+
+
+def closed_contours(rows: Sequence[Row]) -> str:
+    """Return how many contours are closed, in words."""
+    return f"{total(rows, 'contours_closed')} of {total(rows, 'contours_reachable')}"
+
+
+def touches_of(rows: Sequence[Row]) -> str:
+    """Return how often a wall was touched, in words."""
+    count = total(rows, "collisions")
+    return "no collision" if not count else f"{count} collisions"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names in words."""
+    return ", ".join(names) if names else "none"
