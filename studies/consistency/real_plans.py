@@ -110,7 +110,7 @@ def table_of_backends(rows: Sequence[Row]) -> Table:
     """Return a row for each back end and kind of matching."""
     shown = Table(title="Real plans: one drive each, replayed through every back end", title_justify="left")
     for column in ("back end", "matches", "plans", "pose ANEES", "median", "map ANEES", "median", "95 % intervals held",
-                   "pose rms, mm", "false matches", "twice"):  # fmt: skip
+                   "pose rms, mm", "false matches", "duplicates"):  # fmt: skip
         shown.add_column(column, justify="left" if column in ("back end", "matches") else "right")
     for backend in dict.fromkeys(row["backend"] for row in rows):
         for stage in ("own", "true matches"):
@@ -124,7 +124,7 @@ def table_of_stages(rows: Sequence[Row], driver: str) -> Table:
     """Return a row for each stage that the truth took the place of."""
     shown = Table(title=f"Where the excess comes from ({driver})", title_justify="left")
     for column in ("true is", "plans", "pose ANEES", "median", "map ANEES", "median", "95 % intervals held",
-                   "pose rms, mm", "false matches", "twice"):  # fmt: skip
+                   "pose rms, mm", "false matches", "duplicates"):  # fmt: skip
         shown.add_column(column, justify="left" if column == "true is" else "right")
     for stage in STAGES:
         own = [row for row in rows if (row["backend"], row["stage"]) == (driver, stage)]

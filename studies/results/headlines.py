@@ -136,7 +136,7 @@ def apartments(rows: Sequence[Row]) -> Found:
 def real_plans(rows: Sequence[Row]) -> Found:
     """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones."""
     head = ["back end", "pose ANEES: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
-    table: Table = [["matches", *head, "false matches", "walls twice"]]
+    table: Table = [["matches", *head, "false matches", "duplicate walls"]]
     for stage in dict.fromkeys(row["stage"] for row in rows):
         for backend, mine in grouped([row for row in rows if row["stage"] == stage], "backend").items():
             pairs = np.array([row["pairs"] for row in mine])
