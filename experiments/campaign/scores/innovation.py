@@ -11,6 +11,7 @@ from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
 from slam.evaluation.consistency import nis
 from slam.extraction.segments import Segments
+from slam.extraction.straightness import cov_of_faces
 from slam.map.reliability import ReliabilityConfig, are_clear
 
 
@@ -53,7 +54,8 @@ class InnovationEar:
             self._before = {}
             return
         rows = np.searchsorted(ids, pairs[:, 1])
-        e, S = stacked(joint, rows, segments.lines[pairs[:, 0]], segments.cov[pairs[:, 0]])
+        seen = segments.take(pairs[:, 0])
+        e, S = stacked(joint, rows, seen.lines, seen.cov + cov_of_faces(seen, self.reliability.straightness))
         try:
             value = float(nis(e[None], S[None])[0])
         except np.linalg.LinAlgError:

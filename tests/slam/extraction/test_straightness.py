@@ -105,7 +105,7 @@ def test_a_map_tells_how_far_walls_are_off_in_whatever_order_it_is_asked():
     belief = Belief(whole.mean[:3], whole.cov[:3, :3], ids, whole.anchors, whole.mean[3:].reshape(-1, 2),
                     lambda asked: whole.take(np.searchsorted(ids, asked)))  # fmt: skip
     no, blocks = np.zeros(3, dtype=bool), edge_cov(np.array([1.0, 2.0, 3.0]), np.ones(3), np.array([0.5, 0.0, -1.0]))
-    walls = StochasticMap(belief, np.tile([-1.0, 1.0], (3, 1)), np.full(3, 5), no, no, blocks)
+    walls = StochasticMap(belief, np.tile([-1.0, 1.0], (3, 1)), np.full(3, 5), no, no, off_line_cov=blocks)
     for asked in ([4, 7, 9], [9, 4], [7], []):
         rows = np.searchsorted(ids, np.array(asked, dtype=np.int64))
         expected = whole.take(rows).cov.copy()

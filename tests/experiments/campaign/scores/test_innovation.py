@@ -26,11 +26,13 @@ COV = np.diag([1e-4, 4e-4])
 def seen(lines, sigma_rad=0.01):
     count = len(lines)
     cov = np.tile(np.diag([sigma_rad**2, 4e-4]), (count, 1, 1))
-    none = np.zeros((count, 2), int)
+    none, lines = np.zeros((count, 2), int), np.array(lines)
+    n = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    foot, along = lines[:, 1:] * n, n[:, ::-1] * [-1.0, 1.0]
     return Segments(
-        np.array(lines),
+        lines,
         cov,
-        np.zeros((count, 2, 2)),
+        np.stack([foot - 2.0 * along, foot + 2.0 * along], axis=1),
         none,
         np.full(count, 20),
         none,
@@ -96,7 +98,7 @@ def test_whiteness_is_the_correlation_of_a_wall_s_innovations_in_scans_running()
 
 def test_a_scan_without_a_clear_wall_is_not_heard_and_parts_those_beside_it():
     ear = InnovationEar(ReliabilityConfig())
-    clear, unclear = seen(LINES[[0]] + 0.03), seen(LINES[[0]] + 0.03, sigma_rad=0.06)
+    clear, unclear = seen(LINES[[0]] + 0.03), seen(LINES[[0]] + 0.03, sigma_rad=0.2)
     hear(ear, [(clear, [3]), (unclear, [3]), (clear, [3]), (seen(np.zeros((0, 2))), []), (clear, [3])])
     assert ear.dofs == [2, 2, 2]
     assert ear.whiteness() is None
@@ -105,7 +107,7 @@ def test_a_scan_without_a_clear_wall_is_not_heard_and_parts_those_beside_it():
 def test_only_the_clear_ones_of_a_scan_are_heard():
     ear, alone = InnovationEar(ReliabilityConfig()), InnovationEar(ReliabilityConfig())
     mixed = seen(LINES[[0, 1]] + 0.02)
-    mixed.cov[1] = np.diag([0.06**2, 4e-4])
+    mixed.cov[1] = np.diag([0.2**2, 4e-4])
     hear(ear, [(mixed, [3, 8])])
     hear(alone, [(seen(LINES[[0]] + 0.02), [3])])
     assert (ear.values, ear.dofs) == (alone.values, alone.dofs)
