@@ -70,7 +70,7 @@ class Streaming:
         self.twist = Twist(0.0, 0.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0), st.booleans())
 def test_a_scan_taken_in_motion_is_as_if_it_had_been_taken_at_its_end(speed, turn, heading, clockwise):
     robot = Streaming((1.6, 1.1, heading), clockwise=clockwise)
