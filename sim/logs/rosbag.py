@@ -3,7 +3,9 @@
 import math
 from collections import deque
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -45,7 +47,10 @@ def read_bag(path: Path) -> Iterator[RawScan]:
         path = path.parent
     at = 0
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+        with (
+            _by_another_name(path) as named,
+            AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader,
+        ):
             for scan in _scans(reader):
                 yield scan
                 at += 1
@@ -54,6 +59,18 @@ def read_bag(path: Path) -> Iterator[RawScan]:
     except Exception as error:  # a damaged bag makes the reader fail in any way
         words = " ".join(str(error).split())[:120] or type(error).__name__
         raise LogError(f"after scan {at}: expected more of the bag, found it damaged ({words})") from error
+
+
+@contextmanager
+def _by_another_name(path: Path) -> Iterator[Path]:
+    """Yield a path to the same bag; rosbags takes all that is named `*.bag` for a file of ROS 1, a folder too."""
+    if not (path.is_dir() and path.suffix == ".bag"):
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        link = Path(folder) / "bag"
+        link.symlink_to(path.resolve(), target_is_directory=True)
+        yield link
 
 
 def _scans(reader: Any) -> Iterator[RawScan]:

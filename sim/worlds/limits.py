@@ -86,7 +86,7 @@ def check_apart(shapes: Sequence[BaseGeometry], distance_m: float) -> None:
         if close > CLOSE_MAX:
             raise WorldError(
                 f"expected walls apart from each other, found more than {CLOSE_MAX} pairs nearer than {distance_m:g} m:"
-                " check the scale, or simplify the drawing"
+                " correct the scale (--scale METRES for a picture or an SVG), or simplify the drawing"
             )
 
 

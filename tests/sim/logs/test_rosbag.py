@@ -120,6 +120,14 @@ def named(folder, kind, name="a"):
     return folder / (f"{name}.bag" if kind == "ros1" else name)
 
 
+def test_a_ros_2_bag_may_have_the_name_of_a_ros_1_file(tmp_path):
+    folder = recorded(tmp_path / "a", "mcap")
+    plain = read_recorded_log(folder)
+    renamed = folder.rename(tmp_path / "a.bag")
+    for path in (renamed, next(renamed.glob("*.mcap"))):
+        np.testing.assert_array_equal(read_recorded_log(path).recording.odometry, plain.recording.odometry)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("by", ["topic", "tf"])
 def test_every_kind_of_bag_tells_scans_odometry_and_where_the_scanner_sits(tmp_path, kind, by):
