@@ -75,7 +75,7 @@ adaptive: setup
 
 # Other bodies, and scanners off the axle; begun again, it goes on where it was.
 bodies: setup
-	$(BIN)/python -m studies.exploration.bodies --plans $(PLANS)
+	$(BIN)/python -m studies.robots.bodies --plans $(PLANS)
 
 # Logs of real robots, each through several back ends; begun again, it goes on where it was.
 logs: setup
@@ -83,7 +83,7 @@ logs: setup
 
 # Other scanners and their faults, in one world; begun again, it goes on where it was.
 scanners: setup
-	$(BIN)/python -m studies.exploration.scanners --seeds 5
+	$(BIN)/python -m studies.robots.scanners --seeds 5
 
 courts: setup
 	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 8,
+    CONFIG: 9,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -30,7 +30,8 @@ OLDEST = {CONFIG: 1, "summary.json": 1}
 Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, format 4 no `robot.faults`. Until
 format 5 the body and the step stood at several places (`MOVED`), until format 6 no robot was ever lost
 (`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
-(`mission.mapper.walls.reliability.straightness`). Format 1 of `summary.json` had no `coverage_curve`."""
+(`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
+Format 1 of `summary.json` had no `coverage_curve`."""
 
 
 def stamp(name: str) -> dict[str, int]:

@@ -18,6 +18,7 @@ from ..outcome import Outcome
 from ..planning.wall_routes import route
 from ..strategies import Choice, Place, Situation, Strategy, Watchful
 from ..survey.frontiers import known_floor
+from ..survey.round_things import RoundConfig, is_round
 from .decider import Decision
 from .ledger import Event, Key, Ledger
 from .sweep import Sweep, SweepConfig
@@ -39,6 +40,8 @@ class ExplorerConfig:
     """An end that was gone so often while the robot was about it, and came back, is set aside."""
     grown: float = 0.1
     """An end that could not be looked at is tried again when so much more of the floor around it is known."""
+    round_things: RoundConfig = field(default_factory=RoundConfig)
+    """Ends on these are set aside without a look of their own."""
     patience_m: float = 60.0
     """A goal that takes more steps than so long a way is set aside."""
     second_looks: int = 4
@@ -190,6 +193,7 @@ class Explorer:
     ) -> _Task | None:
         """Ask the strategy where to go, and set out; None when there is nowhere left."""
         self._tire(ends)
+        self._pass_round(around, ends)
         if not self._candidates(ends):
             self._retry(around, ends)
         situation = Situation(
@@ -223,6 +227,12 @@ class Explorer:
         for end in self._candidates(ends):
             if (times := self._ledger.count(Event.GONE, end.position_world)) >= self._config.returns:
                 self._ledger.put_aside(end, f"open again after it was gone {times} times")
+
+    def _pass_round(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
+        """Set aside what lies on something round: each look at it finds another short wall with two more ends."""
+        for end in self._candidates(ends):
+            if is_round(end, around.walls, self._config.round_things):
+                self._ledger.put_aside(end, "on something round")
 
     def _set_out(self, choice: Choice, situation: Situation, is_sweep: bool) -> _Task:
         target, following = choice.target, self._config.following

@@ -2,8 +2,8 @@
 
 A face of a decimetre cannot be told from a line across the corners beside it: four beams lie on either. In the mean
 over all segments so short, those across corners among them, all beams together tell no more than a single one would
-that is off by a centimetre and may lie anywhere along the face (`python -m studies.extraction`). Of a long segment
-nothing is lost: beams of another face would have cut it.
+that is off by a centimetre and may lie anywhere along the face (`python -m studies.consistency.extraction`). Of a
+long segment nothing is lost: beams of another face would have cut it.
 """
 
 from dataclasses import dataclass

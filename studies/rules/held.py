@@ -43,7 +43,7 @@ NEAR = {
     "extraction": "extraction",
     "driving": "driving narrow_doors",
     "wall_following": "wall_following navigation clearance_while_growing ping_pong endings",
-    "explorer": "patience ends_of_missions endings mission",
+    "explorer": "round_things patience ends_of_missions endings mission",
     "sweep": "sweep coast unexplained ends_of_missions",
     "floor_memory": "floor_memory",
     "free_space": "free_space paths",

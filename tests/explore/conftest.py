@@ -108,6 +108,12 @@ def scene_of():
 
 
 @pytest.fixture(scope="session")
+def scene_with():
+    """Return a function from faces, free side on their left, to the map of them."""
+    return lambda faces: Scene(shapely.Polygon(), faces, FreeSpace(), np.zeros((0, 2))).walls(np.zeros(3))
+
+
+@pytest.fixture(scope="session")
 def hall():
     """Return a hall of 16 m without anything in it, seen along its walls only."""
     side = 16.0

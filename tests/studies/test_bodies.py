@@ -1,7 +1,7 @@
 """The table of bodies: a robot is held against the paper's in the same building, seed by seed."""
 
 from experiments.scenario import load_world
-from studies.exploration.bodies import CASES, PAPER, BodiesStudy, fits, table
+from studies.robots.bodies import CASES, PAPER, BodiesStudy, fits, table
 
 
 def row(case, world, seed, steps, **more):

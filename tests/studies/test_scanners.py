@@ -1,6 +1,6 @@
 """The table of scanners: a fault is held against the same scanner without it, seed by seed."""
 
-from studies.exploration.scanners import ScannersStudy, cases, table
+from studies.robots.scanners import ScannersStudy, cases, table
 
 
 def row(case, seed, steps, **more):

@@ -1,6 +1,6 @@
 """Other bodies, and a scanner ahead of the axle: whether exploration still ends, without a collision.
 
-.venv/bin/python -m studies.exploration.bodies --plans ../shared/data/plans   # goes on where it was interrupted
+.venv/bin/python -m studies.robots.bodies --plans ../shared/data/plans   # goes on where it was interrupted
 """
 
 from collections.abc import Mapping, Sequence
@@ -120,6 +120,6 @@ def _median(rows: Sequence[Row], name: str) -> str:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(BodiesStudy, prog="studies.exploration.bodies").run()
+        tyro.cli(BodiesStudy, prog="studies.robots.bodies").run()
     except UsageError as error:
         raise SystemExit(f"bodies_study: {error}") from error

@@ -1,6 +1,6 @@
 """Other scanners, and their faults: whether exploration still ends, and how much longer it takes.
 
-.venv/bin/python -m studies.exploration.scanners --seeds 5     # goes on where it was interrupted
+.venv/bin/python -m studies.robots.scanners --seeds 5     # goes on where it was interrupted
 """
 
 from collections.abc import Mapping, Sequence
@@ -133,6 +133,6 @@ def _median(rows: Sequence[Row], name: str) -> str:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(ScannersStudy, prog="studies.exploration.scanners").run()
+        tyro.cli(ScannersStudy, prog="studies.robots.scanners").run()
     except UsageError as error:
         raise SystemExit(f"scanners_study: {error}") from error

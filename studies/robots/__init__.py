@@ -1,0 +1,1 @@
+"""Studies of other robots: bodies, scanners, faults, and worlds of other simulators."""
