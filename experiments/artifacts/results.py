@@ -3,6 +3,7 @@
 import platform
 import subprocess
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from explore.certificate import Certificate
-from explore.step import Step
 from sim.logs.keyframes import RecordedLog
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
@@ -36,8 +35,8 @@ RUNNING = "log.arrow"
 """The log while the run goes on: it is there until all results are."""
 RECORDING = "run.rrd"
 RUN_FILES = (
-    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.png", "map.pgm"),
-    *("map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
+    *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.dxf", "map.png"),
+    *("map.pgm", "map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
     "trajectory_odometry.tum",
     *(RECORDING, "report.html", "tables.tex"),
 )
@@ -93,16 +92,17 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         files["trajectory_true.tum"] = lambda: trajectory(result, log, log.true_world)
     else:
         files["trajectory_odometry.tum"] = lambda: trajectory(result, log, wheels_alone(log, recorded))
+    drawn = cache(lambda: map_geojson(last, result.joint, certificate, log))
+    told = cache(lambda: _dimensions(result, drawn()["features"]))
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
         MAP: lambda: npz_bytes(map_arrays(result)),
-        "map.geojson": lambda: json_bytes(map_geojson(last, result.joint, certificate, log)),
+        "map.geojson": lambda: json_bytes(drawn()),
         "steps.csv": lambda: steps_csv(log),
         "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
-        "map.svg": lambda: floor_plan(
-            last.map, last.chains, certificate, log.estimated_world, title, _dimensions(result, last, certificate, log)
-        ),
+        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title, told()),
+        "map.dxf": lambda: _drawing(drawn()["features"], told(), title),
         "map.png": lambda: _picture(result),
     }
     if last.free_space.evidence.size:
@@ -112,12 +112,11 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     return files
 
 
-def _dimensions(result: TrialResult, last: Step, certificate: Certificate, log: Log) -> list[Dimension]:
+def _dimensions(result: TrialResult, features: list[dict[str, Any]]) -> list[Dimension]:
     """Return lengths and areas as `measure` would tell them of the files; none where the covariance is lost."""
     arrays = map_arrays(result)
     if not np.all(np.isfinite(arrays["cov"])):
         return []
-    features = map_geojson(last, result.joint, certificate, log)["features"]
     found = {kind: [f for f in features if f["properties"]["kind"] == kind] for kind in ("corner", "chain")}
     return dimensions(corners_of(arrays, found["corner"], found["chain"]))
 
@@ -138,6 +137,13 @@ def _picture(result: TrialResult) -> bytes:
     from .picture import picture_of
 
     return picture_of(result)
+
+
+def _drawing(features: list[dict[str, Any]], told: list[Dimension], title: str) -> bytes:
+    # ezdxf looks through the system's fonts when it is imported: only who writes a run's files waits for that.
+    from .maps.dxf import map_dxf
+
+    return map_dxf(features, told, title)
 
 
 def _commit() -> str | None:

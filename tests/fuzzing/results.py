@@ -9,7 +9,7 @@ from .breaking import broken, pick
 from .intact import CAMPAIGN, intact
 
 Commands = list[list[str]]
-ENDLESS = ("map.png", "map.svg", "map.pgm", "map.yaml", ".tum", ".lock")
+ENDLESS = ("map.png", "map.svg", "map.dxf", "map.pgm", "map.yaml", ".tum", ".lock")
 """What nothing reads again."""
 
 

@@ -46,6 +46,25 @@ class Dimension:
     """What a browser shows under the pointer."""
     is_area: bool = False
 
+    @property
+    def letters_m(self) -> float | None:
+        """Height of its letters; None where there is no room for any."""
+        letters = min(LETTERS_M, SHARE * float(np.hypot(*self.along_world)))
+        return None if letters < SMALLEST_M else letters
+
+    @property
+    def beside_world(self) -> Float[np.ndarray, "2"]:
+        """The middle of its words: of a length on the free side of the wall."""
+        along = self.along_world / float(np.hypot(*self.along_world))
+        beside = 0.0 if self.is_area else 0.9 * (self.letters_m or 0.0)
+        return self.at_world + beside * np.array([-along[1], along[0]])
+
+    @property
+    def clockwise_deg(self) -> float:
+        """How far its words are turned: along the side, and upright."""
+        turn = float(np.rad2deg(np.arctan2(-self.along_world[1], self.along_world[0])))
+        return turn - 180.0 if turn > 90.0 else turn + 180.0 if turn <= -90.0 else turn
+
 
 def floor_plan(
     walls: StochasticMap,
@@ -147,17 +166,13 @@ class _Plan:
 
     def dimension(self, told: Dimension) -> None:
         """Write a length beside its wall, on the free side and upright, or an area in the middle of its room."""
-        length = float(np.hypot(*told.along_world))
-        letters = min(LETTERS_M, SHARE * length)
-        if letters < SMALLEST_M:
+        letters = told.letters_m
+        if letters is None:
             return
-        along = told.along_world / length
-        beside = 0.0 if told.is_area else 0.9 * letters
-        x, y = self._on_page((told.at_world + beside * np.array([-along[1], along[0]]))[None])[0]
-        turn = np.rad2deg(np.arctan2(-along[1], along[0]))
-        upright = turn - 180.0 if turn > 90.0 else turn + 180.0 if turn <= -90.0 else turn
+        x, y = self._on_page(told.beside_world[None])[0]
+        placed = f"translate({x:.3f} {y:.3f}) rotate({told.clockwise_deg:.2f})"
         text = self._add(
-            "text", transform=f"translate({x:.3f} {y:.3f}) rotate({upright:.2f})", fill=WORDS, text_anchor="middle",
+            "text", transform=placed, fill=WORDS, text_anchor="middle",
             dominant_baseline="central", font_size=f"{letters:.3f}", font_family="sans-serif",
             font_weight="bold" if told.is_area else "normal",
         )  # fmt: skip

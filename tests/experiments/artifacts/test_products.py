@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 import yaml
+from ezdxf import recover
 from PIL import Image
 
 from experiments.artifacts.maps.mapped import read_corners
@@ -30,6 +31,10 @@ def explored(world, tmp_path_factory):
     result = run_trial(TrialConfig("square", errorless=True), world=world)
     assert write_results(result, folder) == []
     return result, folder
+
+
+def _features(folder):
+    return json.loads((folder / "map.geojson").read_text())["features"]
 
 
 def test_the_certificate_is_in_the_summary(explored, world):
@@ -89,8 +94,8 @@ def test_the_floor_plan_tells_lengths_and_areas_as_measure_does(explored):
 
 
 def test_a_length_stands_on_the_free_side_of_its_wall_and_an_area_on_free_floor(explored, world):
-    result, _ = explored
-    for each in _dimensions(result, result.last, result.certificate, result.log):
+    result, folder = explored
+    for each in _dimensions(result, _features(folder)):
         left = np.array([-each.along_world[1], each.along_world[0]]) / np.hypot(*each.along_world)
         shift = np.zeros(2) if each.is_area else 0.1 * left
         assert world.free.contains(shapely.Point(each.at_world + shift))
@@ -99,8 +104,19 @@ def test_a_length_stands_on_the_free_side_of_its_wall_and_an_area_on_free_floor(
 
 
 def test_without_a_covariance_the_floor_plan_has_no_intervals(explored):
-    result, _ = explored
-    assert _dimensions(replace(result, joint=None), result.last, result.certificate, result.log) == []
+    result, folder = explored
+    assert _dimensions(replace(result, joint=None), _features(folder)) == []
+
+
+def test_the_drawing_holds_the_chains_of_the_geojson(explored):
+    _, folder = explored
+    drawing, found = recover.readfile(folder / "map.dxf")
+    assert not found.has_errors
+    drawn = [np.array(list(each.get_points("xy"))) for each in drawing.query('LWPOLYLINE[layer=="WALLS"]')]
+    chains = [f["geometry"]["coordinates"][0] for f in _features(folder) if f["properties"]["kind"] == "chain"]
+    assert len(drawn) == len(chains)
+    for mine, theirs in zip(drawn, chains, strict=True):
+        np.testing.assert_allclose(mine, theirs[:-1], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["map.yaml", "map.svg", "map.geojson"])

@@ -10,7 +10,7 @@ from experiments.commands.cli import main
 
 ROOM = (6.0, 4.0)
 MADE = {
-    *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.png", "steps.csv"),
+    *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.dxf", "map.png", "steps.csv"),
     *("trajectory_estimated.tum", "trajectory_odometry.tum"),
 }
 

@@ -11,7 +11,7 @@ from experiments.trial import run_trial
 from experiments.usage import UsageError
 
 FILES = (
-    "config.json summary.json steps.csv log.npz map.npz map.geojson map.svg map.png"
+    "config.json summary.json steps.csv log.npz map.npz map.geojson map.svg map.dxf map.png"
     " trajectory_true.tum trajectory_estimated.tum"
 )
 
