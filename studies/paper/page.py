@@ -34,7 +34,7 @@ NOTES = {
     "fig5": "In the paper motion and perception are without error. Here they have noise, a drive for each seed."
     " Sigmas are of each back end on the same observations, with the true association.",
     "fig6": "As figure 5. The ratio is that of two drives with one seed. Without noise, as in the paper,"
-    " `chainslam reproduce fig5 fig6` drives 147.9 m and 452.4 m, 3.06 times as far, and passes the start once and 14"
+    " `chainslam reproduce fig5 fig6` drives 147.9 m and 452.4 m, 3.06 times as far. It passes the start once and 14"
     " times.",
     "fig10": "The robot starts with an uncertainty of 0.1 m and 2 degrees, and drives back to its start in the end.",
     "fig11": "The drives of figure 10.",

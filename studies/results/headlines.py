@@ -152,7 +152,7 @@ def real_plans(rows: Sequence[Row]) -> Found:
     own = grouped([row for row in rows if row["stage"] == "own"], "backend")
     plans = len({row["world"] for row in rows})
     maps = ", ".join(f"`{name}` {mean_of(mine, 'map_anees'):.3g}" for name, mine in own.items())
-    verdict = f"Over {plans} apartments the mean map ANEES is {maps}. Intervals are too wide where faces are short"
+    verdict = f"The mean map ANEES over {plans} apartments: {maps}. Intervals are too wide where faces are short"
     return Found(table, f"{verdict} ([limits](limits.md)).")
 
 
