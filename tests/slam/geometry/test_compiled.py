@@ -1,0 +1,65 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+CALLED = """
+from slam.geometry.compiled import compiled
+{constant}
+@compiled
+def inner(x):
+    return {inner}
+"""
+CALLER = """
+from inner_kernels import inner
+from slam.geometry.compiled import compiled, is_compiled
+before = is_compiled()
+@compiled
+def outer(xs):
+    total = 0.0
+    for x in xs:
+        total += inner(x)
+    return total
+import numpy as np
+print(outer(np.arange(4.0)), before, is_compiled())
+"""
+
+
+def run(folder: Path, inner: str, constant: str = "FACTOR = 2.0") -> str:
+    folder.mkdir(exist_ok=True)
+    (folder / "inner_kernels.py").write_text(CALLED.format(inner=inner, constant=constant))
+    (folder / "outer_kernels.py").write_text(CALLER)
+    root = Path(__file__).parents[3]
+    environment = {
+        "PYTHONPATH": f"{root}:{folder}",
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    told = subprocess.run(
+        [sys.executable, "outer_kernels.py"], cwd=folder, env=environment, capture_output=True, text=True, check=True
+    )
+    return told.stdout.strip()
+
+
+def test_a_kernel_is_kept_between_processes_and_one_that_changed_is_compiled_anew(tmp_path: Path) -> None:
+    assert run(tmp_path, "x * FACTOR") == "12.0 False True"
+    assert run(tmp_path, "x * FACTOR") == "12.0 True True"
+    # Another file than the one that calls it changes: numba by itself would run what it compiled before.
+    assert run(tmp_path, "x + FACTOR") == "14.0 False True"
+    assert run(tmp_path, "x + FACTOR", "FACTOR = 3.0") == "18.0 False True"
+
+
+def test_a_home_that_cannot_be_written_does_not_stop_a_kernel(tmp_path: Path) -> None:
+    (tmp_path / "cache").write_text("a file where the folder should be")
+    assert run(tmp_path, "x * FACTOR").startswith("12.0")
+
+
+def test_dividing_by_zero_is_infinite_as_in_numpy() -> None:
+    from slam.geometry.compiled import compiled
+
+    @compiled
+    def inverse(x: float) -> float:
+        return 1.0 / x
+
+    assert inverse(0.0) == np.inf
