@@ -71,11 +71,15 @@ heading: setup
 adaptive: setup
 	$(BIN)/python -m studies.exploration.adaptive --out results/adaptive.jsonl
 
-.PHONY: scanners bodies logs
+.PHONY: scanners bodies logs scanner-apartments
 
 # Other bodies, and scanners off the axle; begun again, it goes on where it was.
 bodies: setup
 	$(BIN)/python -m studies.robots.bodies --plans $(PLANS)
+
+# Forty apartments with 541 beams over 270 degrees, 10 m; begun again, it goes on where it was.
+scanner-apartments: setup
+	$(BIN)/python -m studies.robots.apartments --plans $(PLANS)
 
 # Logs of real robots, each through several back ends; begun again, it goes on where it was.
 logs: setup

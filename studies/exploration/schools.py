@@ -37,6 +37,8 @@ class SchoolsStudy:
     """A run is stopped after this many scans."""
     jobs: int = 1
     """Number of processes."""
+    any_code: bool = False
+    """Whether rows of other versions of the code count, too."""
     out: Path = Path("results/schools-short.jsonl")
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
@@ -77,7 +79,7 @@ def main() -> int:
     rows: list[dict[str, Any]] = []
     try:
         trials = study.trials()
-        for row in rows_of(trials, study.out, study.jobs):
+        for row in rows_of(trials, study.out, study.jobs, study.any_code):
             rows.append(row)
             if sys.stderr.isatty():
                 print(f"\r{len(rows)} of {len(trials)}", end="", file=sys.stderr, flush=True)

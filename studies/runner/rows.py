@@ -28,13 +28,14 @@ def rows_of(
     tasks: Iterable[tuple[Task, Sequence[Key]]],
     perform: Callable[[Task], Sequence[Row]],
     jobs: int,
+    any_code: bool = False,
 ) -> Iterator[Row]:
     """Yield the rows of all tasks: those that the file has, then the others, each written as it comes.
 
     `names` are what a row is known by; beside each task stand the keys of its rows. Rows of other code stay in the
-    file and count for nothing. Raises UsageError for a file that holds something else.
+    file, and count only with `any_code`, the newest of each key. Raises UsageError for a file of something else.
     """
-    there = {key_of(row, names): row for row in read(path, names)}
+    there = {key_of(row, names): row for row in read(path, names, any_code)}
     missing = []
     for task, keys in tasks:
         if all(key in there for key in keys):
@@ -51,10 +52,10 @@ def key_of(row: Row, names: Sequence[str]) -> Key:
     return tuple(row[name] for name in names)
 
 
-def read(path: Path, names: Sequence[str] = ()) -> list[Row]:
-    """Return the rows of this code in a file, none where there is none; raises UsageError for a file of other things.
+def read(path: Path, names: Sequence[str] = (), any_code: bool = False) -> list[Row]:
+    """Return the rows of this code, or of any, in a file, none where there is none.
 
-    The last line is left out where it was cut short by a crash.
+    Raises UsageError for a file of other things. The last line is left out where it was cut short by a crash.
     """
     if not path.exists():
         return []
@@ -67,7 +68,7 @@ def read(path: Path, names: Sequence[str] = ()) -> list[Row]:
         raise UsageError(
             f"expected rows with {', '.join(names)} in {path}, found {error!r}: name another --out"
         ) from error
-    return [row for row in rows if row["code"] == fingerprint()]
+    return [row for row in rows if any_code or row["code"] == fingerprint()]
 
 
 def append(path: Path, rows: Iterable[Row]) -> list[Row]:

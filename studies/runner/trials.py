@@ -24,14 +24,16 @@ KEYS = ("file", *SETTINGS)
 """What makes a trial this one and no other."""
 
 
-def rows_of(trials: Sequence[TrialConfig], path: Path, jobs: int) -> Iterator[Row]:
+def rows_of(trials: Sequence[TrialConfig], path: Path, jobs: int, any_code: bool = False) -> Iterator[Row]:
     """Run what the file lacks of the trials, append each row as it comes, and yield the rows of all of them.
+
+    With `any_code` a row counts whatever version of the code made it.
 
     Raises UsageError for bad names and for a file that holds something else.
     """
     check(trials[0])
     numbered = [(number, [rows.key_of(_settings(trial), KEYS)]) for number, trial in enumerate(trials)]
-    return rows.rows_of(path, KEYS, numbered, partial(_one_of, tuple(trials)), jobs)
+    return rows.rows_of(path, KEYS, numbered, partial(_one_of, tuple(trials)), jobs, any_code)
 
 
 def _one_of(trials: Sequence[TrialConfig], number: int) -> Sequence[Row]:

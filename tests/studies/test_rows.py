@@ -75,3 +75,11 @@ def test_a_row_has_times_along_the_run_memory_and_survives_json():
 
 def test_a_world_that_is_none_is_a_row():
     assert one(replace(trials(1)[0], world="nowhere.json"))["status"] == "not loaded"
+
+
+def test_rows_of_other_code_count_where_that_is_asked_for(instant, tmp_path, monkeypatch):
+    out = tmp_path / "rows.jsonl"
+    list(rows_of(trials(2), out, 1))
+    monkeypatch.setattr(rows, "fingerprint", lambda: "another")
+    assert len(list(rows_of(trials(3), out, 1, any_code=True))) == 3
+    assert instant == ["random:1", "random:2", "random:3"]
