@@ -176,6 +176,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
     wheels = log if recorded is None else recorded.recording
     return {
         "time_s": log.time_s,
+        "scan_start_s": log.scan_start_s,
         "bearings_rad": log.bearings_rad,
         "ranges_m": log.ranges_m,
         "sigma_m": log.sigma_m,

@@ -92,7 +92,7 @@ def _own_log(log: Log) -> RecordedLog:
     """Return what a robot reported on its own drive, every scan of it a keyframe."""
     recording = Recording(
         log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
-        log.touched, log.sigma_share,
+        log.touched, log.sigma_share, log.scan_start_s,
     )  # fmt: skip
     steps = len(log)
     return RecordedLog(recording, log.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(3))

@@ -20,6 +20,8 @@ class Log:
     """A run, step by step; s steps, k beams."""
 
     time_s: Float[np.ndarray, " s"]
+    scan_start_s: Float[np.ndarray, " s"]
+    """When the first beam of each scan was taken; NaN where nobody told."""
     bearings_rad: Float[np.ndarray, " k"]
     ranges_m: Float[np.ndarray, "s k"]
     sigma_m: Float[np.ndarray, " k"]
@@ -105,6 +107,7 @@ class Recorder:
         self._rows.append(
             {
                 "time_s": step.time_s,
+                "scan_start_s": step.scan.start_s,
                 "ranges_m": step.scan.ranges_m,
                 "odometry": step.odometry.motion,
                 "odometry_cov": step.odometry.cov,

@@ -31,7 +31,7 @@ TRUTH = {
     "true_face_of_beam": "int s k",
 }
 """What a simulated run tells besides."""
-LATER = {"touched": "bool s", "sigma_share": "float"}
+LATER = {"touched": "bool s", "sigma_share": "float", "scan_start_s": "float s"}
 """What older logs do not hold."""
 MOST_M = 1e6
 """Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
@@ -58,15 +58,18 @@ class Recording:
     """Whether the body met something on the way to each scan; None where nobody kept it."""
     sigma_share: float = 0.0
     """What of the standard deviation grows with the range, as a share of it."""
+    scan_start_s: Float[np.ndarray, " s"] | None = None
+    """When the first beam of each scan was taken, NaN or None where nobody tells; it ended at `time_s`."""
 
     def __len__(self) -> int:
         return len(self.time_s)
 
     def scan(self, index: int) -> Scan:
         """Return one of its scans."""
+        start_s = np.nan if self.scan_start_s is None else float(self.scan_start_s[index])
         return Scan(
             self.bearings_rad, self.ranges_m[index], self.sigma_m, self.range_max_m, float(self.time_s[index]),
-            self.sigma_share,
+            self.sigma_share, start_s,
         )  # fmt: skip
 
 
@@ -122,7 +125,7 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
     recording = Recording(
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], arrays["sigma_m"],
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
-        float(arrays.get("sigma_share", 0.0)),
+        float(arrays.get("sigma_share", 0.0)), arrays.get("scan_start_s"),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:
@@ -139,6 +142,8 @@ def _faults(r: Recording) -> Iterator[tuple[bool, str]]:
     noise = not least > 0 or not r.range_max_m > 0 or r.sigma_share < 0
     yield noise, f"sigma_m {least:g}, sigma_share {r.sigma_share:g}, range_max_m {r.range_max_m:g}"
     yield bool(np.any(np.diff(r.time_s) < 0)), "times that run backwards"
+    late = r.scan_start_s is not None and bool(np.any(r.scan_start_s > r.time_s))
+    yield late, "scans that end before they begin"
     steps = np.diff(r.bearings_rad)
     even = np.allclose(steps, steps.mean(), rtol=1e-3, atol=1e-6)
     yield not even or not 0 < steps.sum() < 2 * np.pi, "bearings that are not evenly spread over a turn at most"

@@ -35,6 +35,8 @@ class Scan:
     """When the scan was complete."""
     sigma_share: float = 0.0
     """Standard deviation as a share of the range, beside `sigma_m`; both add by squares."""
+    start_s: float = np.nan
+    """When its first beam was taken; NaN where nobody tells."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for bearings out of order and for returns that are none."""
@@ -46,6 +48,11 @@ class Scan:
         if count > max(FEW_BEAMS, FEW_SHARE * len(self.ranges_m)):
             raise RobotError(
                 f"expected returns, found {count} at exactly the maximum of {self.range_max_m:g} m: {none}"
+            )
+        if self.start_s > self.time_s:
+            raise RobotError(
+                f"expected a scan that ends after it began, found {self.start_s:g} s to {self.time_s:g} s:"
+                " give both on one clock"
             )
         if not self.range_max_m > 0.0 or not np.all(np.asarray(self.sigma_m) >= 0.0):
             raise RobotError(
@@ -61,6 +68,7 @@ class Scan:
         range_max_m: float,
         time_s: float,
         sigma_share: float = 0.0,
+        start_s: float = np.nan,
     ) -> "Scan":
         """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first."""
         bearings = np.unwrap(bearings_rad)
@@ -70,7 +78,7 @@ class Scan:
         if len(beams) > 2 and abs(bearings[-1] - bearings[0]) > 2 * np.pi - 0.5 * abs(bearings[1] - bearings[0]):
             beams = beams[:-1]
         sigma = sigma_m if isinstance(sigma_m, float) else sigma_m[beams]
-        return cls(bearings[beams], ranges_m[beams], sigma, range_max_m, time_s, sigma_share)
+        return cls(bearings[beams], ranges_m[beams], sigma, range_max_m, time_s, sigma_share, start_s)
 
     @cached_property
     def passed_m(self) -> Float[np.ndarray, " k"]:

@@ -134,7 +134,7 @@ def de_skewed(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> 
     the chord between them. Raises RobotError for what no scan is.
     """
     taken = (scan.sigma_m, scan.range_max_m, scan.end_s)
-    as_taken = Scan.ordered(scan.bearings_rad, scan.ranges_m, *taken)
+    as_taken = Scan.ordered(scan.bearings_rad, scan.ranges_m, *taken, start_s=scan.start_s)
     places = _places(scan, odometry)
     if np.abs(places).max() < AT_REST:
         return as_taken
@@ -145,7 +145,7 @@ def de_skewed(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> 
     ranges = np.full(len(as_taken.bearings_rad), np.nan)
     if known.any():
         ranges = _seen_from_the_end(points[known], np.isposinf(scan.ranges_m[known]), as_taken)
-    return Scan(as_taken.bearings_rad, ranges, *taken)
+    return Scan(as_taken.bearings_rad, ranges, *taken, start_s=scan.start_s)
 
 
 def _places(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> Float[np.ndarray, "k 3"]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.commands.cli import main
-from sim.logs.recorded_robot import read_log
+from sim.logs.recorded_robot import read_log, recording_of
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +26,7 @@ def with_nan(values):
 CHANGES = {
     "a scalar time": lambda log: {"time_s": np.float64(1.0)},
     "times as words": lambda log: {"time_s": np.array([str(t) for t in log["time_s"]])},
+    "scans that end before they begin": lambda log: {"scan_start_s": log["time_s"] + 1.0},
     "times backwards": lambda log: {"time_s": log["time_s"][::-1]},
     "an object": lambda log: {"odometry": np.array([[None] * 3] * 4)},
     "bearings all zero": lambda log: {"bearings_rad": 0 * log["bearings_rad"]},
@@ -115,11 +116,12 @@ def test_a_log_of_format_1_is_read_as_it_was_meant(run, tmp_path):
     now = read_log(run / "log.npz")
     older = dict(np.load(run / "log.npz")) | {"format": np.int64(1), "sigma_m": np.float64(0.01)}
     older["ranges_m"] = np.where(np.isposinf(older["ranges_m"]), np.nan, older["ranges_m"])
-    del older["sigma_share"]
+    del older["sigma_share"], older["scan_start_s"]
     np.savez(tmp_path / "log.npz", **older)
     read = read_log(tmp_path / "log.npz")
     assert np.isposinf(now["ranges_m"]).any()
-    assert "sigma_share" not in read
+    assert not {"sigma_share", "scan_start_s"} & set(read)
+    assert np.isnan(recording_of(read).scan(0).start_s)
     for name, values in read.items():
         np.testing.assert_array_equal(values, now[name], err_msg=name)
 
