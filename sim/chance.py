@@ -21,6 +21,8 @@ class Channel(IntEnum):
     DROPOUTS = 5
     MIXED = 6
     BUMPS = 7
+    MOVING = 8
+    """Which scans are taken while the robot still drives."""
 
 
 def standard_normals(seed: int, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:

@@ -8,8 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from slam.geometry.poses import inverse, to_world
+
 from .chance import Channel, uniforms
 from .drive import Slip
+
+MOMENTS = 32
+"""The beams of a scan in motion are taken from so many places on its way."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,8 @@ class FaultsConfig:
     """Share of the drives in which a bump turns the robot by `bump_rad`, to either side alike."""
     bump_rad: float = float(np.deg2rad(8.0))
     """How far a bump turns the robot rad; the wheels report nothing of it."""
+    moving: float = 0.0
+    """Share of the scans that are taken over the end of the drive, not after it; nobody corrects them for that."""
     slip: float = 1.0
     """How many times as far as stated the wheels slip."""
     scanner_ahead_m: float = 0.0
@@ -82,3 +89,21 @@ def bump_rad(config: FaultsConfig, seed: int, step: int) -> float:
         return 0.0
     share, side = uniforms(seed, Channel.BUMPS, step, 2)
     return 0.0 if share >= config.bump else float(np.copysign(config.bump_rad, side - 0.5))
+
+
+def is_moving(config: FaultsConfig, seed: int, step: int) -> bool:
+    """Return whether a scan is taken while the robot still drives."""
+    return config.moving > 0.0 and bool(uniforms(seed, Channel.MOVING, step, 1)[0] < config.moving)
+
+
+def places_of_beams(way: Float[np.ndarray, "n 3"], drive_s: float, scan_s: float) -> Float[np.ndarray, "m 3"]:
+    """Return where the robot was at `MOMENTS` moments of a scan that ended with its drive, in the frame of its end.
+
+    `way` are places at even times of the drive, m m rad in the frame of its start, without that.
+    """
+    before_s = scan_s * (1.0 - (np.arange(MOMENTS) + 0.5) / MOMENTS)
+    at_s = np.linspace(0.0, drive_s, len(way) + 1)
+    columns = np.vstack([np.zeros(3), way]).T
+    places = np.column_stack([np.interp(drive_s - before_s, at_s, column) for column in columns])
+    to_end = inverse(way[-1])
+    return np.column_stack([to_world(places[:, :2], to_end), places[:, 2] - way[-1, 2]])

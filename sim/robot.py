@@ -12,7 +12,15 @@ from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Channel, standard_normals
 from .drive import clamp, draw_slip, odometry, seconds, true_motion
-from .faults import FaultsConfig, bump_rad, slipped, with_dropouts, with_mixed_pixels
+from .faults import (
+    FaultsConfig,
+    bump_rad,
+    is_moving,
+    places_of_beams,
+    slipped,
+    with_dropouts,
+    with_mixed_pixels,
+)
 from .lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 
 _CELL_M = 0.5
@@ -90,6 +98,7 @@ class SimulatedRobot:
         self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
         self._pose = np.array(world.start, dtype=np.float64)
         self._time_s, self._drives = 0.0, 0
+        self._way, self._drive_s = np.zeros((0, 3)), 0.0
 
     @property
     def record(self) -> TrueRecord:
@@ -103,9 +112,8 @@ class SimulatedRobot:
 
     def sense(self) -> Scan:
         """Return the scan at the present place and record the truth about it."""
-        scanner = self.config.true_scanner
-        ranges, faces = self._finder.cast(self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot))
         lidar, faults, step = self.config.lidar, self.config.faults, len(self._record.poses_world)
+        ranges, faces = self._cast(len(self._way) > 0 and is_moving(faults, self._seed, step))
         ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._seed, step)
         if not self._errorless:
             draws = standard_normals(self._seed, Channel.LASER, step, len(ranges))
@@ -113,10 +121,28 @@ class SimulatedRobot:
         ranges = with_dropouts(ranges, faults, self._seed, step)
         self._record.poses_world.append(self._pose.copy())
         self._record.faces_of_beams.append(np.where(np.isfinite(ranges) & ~mixed, faces, -1))
-        self._time_s += self.config.scan_s
+        start_s, self._time_s = self._time_s, self._time_s + self.config.scan_s
         return Scan(
-            self._finder.bearings_rad, ranges, lidar.sigma_m, lidar.range_max_m, self._time_s, lidar.sigma_share
+            self._finder.bearings_rad,
+            ranges,
+            lidar.sigma_m,
+            lidar.range_max_m,
+            self._time_s,
+            lidar.sigma_share,
+            start_s,
         )
+
+    def _cast(self, moving: bool) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+        """Return exact ranges m and faces of the beams, of a scan in motion each from where the robot was then."""
+        scanner = self.config.true_scanner
+        if not moving:
+            at = self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot)
+            return self._finder.cast(at)
+        places = places_of_beams(self._way, self._drive_s, self.config.scan_s)
+        casts = [self._finder.cast(compose(compose(self._pose, place), scanner.pose_robot)) for place in places]
+        taken = np.arange(self.config.lidar.beams) * len(casts) // self.config.lidar.beams
+        beams = np.arange(self.config.lidar.beams)
+        return np.array([each[0] for each in casts])[taken, beams], np.array([each[1] for each in casts])[taken, beams]
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
@@ -144,6 +170,7 @@ class SimulatedRobot:
         self._drives += 1
         duration = seconds(command, drive, self.config.wheel_speed_m_s)
         self._time_s += duration
+        self._way, self._drive_s = motions[:free], duration
         self._record.drive_time_s += duration
         return replace(odometry(command, drive), touched=touched)
 

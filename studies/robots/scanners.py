@@ -42,8 +42,9 @@ WHEELS = {
     "bumps of 8 degrees": FaultsConfig(bump=0.02),
     "bumps of 60 degrees": FaultsConfig(bump=0.01, bump_rad=float(np.deg2rad(60.0))),
     "slip of three times": FaultsConfig(slip=3.0),
+    "all scans in motion": FaultsConfig(moving=1.0),
 }
-"""What the wheels do not report."""
+"""What the wheels do not report, and how the robot moves while it scans."""
 
 
 def cases() -> Mapping[str, RobotConfig]:

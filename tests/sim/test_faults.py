@@ -1,11 +1,15 @@
 """Faults that a simulated robot does not know of: as many as asked for, and no other draw is shifted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sim.drive import Slip
-from sim.faults import FaultsConfig, bump_rad, slipped, with_dropouts, with_mixed_pixels
+from sim.drive import Slip, seconds
+from sim.faults import FaultsConfig, bump_rad, is_moving, slipped, with_dropouts, with_mixed_pixels
+from sim.lidar import RangeFinder
 from sim.robot import RobotConfig, SimulatedRobot
+from slam.geometry.poses import arc, compose
 from slam.robot import MotionCommand
 from tests.sim.test_robot import room
 
@@ -78,3 +82,36 @@ def test_wheels_slip_as_many_times_as_asked_and_state_the_same(times):
     for before, after in zip(right[1], worse[1], strict=True):
         np.testing.assert_array_equal(before.cov, after.cov)
     assert not np.array_equal(right[2], worse[2])
+
+
+def test_a_scan_in_motion_is_taken_from_where_the_robot_was_at_each_beam():
+    """Held against one ray for each beam from its own place, along the true arc; all else is as without."""
+    exact = RobotConfig(faults=FaultsConfig(slip=0.0))
+    robots = [
+        SimulatedRobot(room(), 5, True, exact),
+        SimulatedRobot(room(), 5, True, replace(exact, faults=FaultsConfig(slip=0.0, moving=1.0))),
+    ]
+    for command in (MotionCommand(0.15, 0.1), MotionCommand(0.0, 0.17), MotionCommand(-0.1, -0.05)):
+        before = robots[0].true_pose
+        for robot in robots:
+            robot.drive(command)
+        resting, moving = (robot.sense() for robot in robots)
+        drive_s = seconds(command, exact.wheels, exact.wheel_speed_m_s)
+        beams = len(moving.ranges_m)
+        shares = np.clip(1.0 - exact.scan_s / drive_s * (1.0 - (np.arange(beams) + 0.5) / beams), 0.0, 1.0)
+        finder = RangeFinder(room().faces, exact.lidar)
+        poses = [compose(before, arc(share * command.forward_m, share * command.turn_rad)) for share in shares]
+        true = np.array([finder.cast(pose)[0][beam] for beam, pose in enumerate(poses)])
+        off = np.abs(moving.ranges_m - true)
+        assert np.median(off[np.isfinite(off)]) < 1e-3
+        assert np.mean(off[np.isfinite(off)] < 0.01) > 0.95
+        assert np.median(np.abs(resting.ranges_m - moving.ranges_m)) > 5 * np.median(off)
+        assert moving.start_s < moving.time_s
+
+
+def test_as_many_scans_as_asked_are_in_motion_and_no_other_draw_is_shifted():
+    right, moving = driven(FaultsConfig()), driven(FaultsConfig(moving=1.0))
+    np.testing.assert_array_equal(right[2], moving[2])
+    np.testing.assert_array_equal(right[0][0].ranges_m, moving[0][0].ranges_m)
+    assert all(np.any(a.ranges_m != b.ranges_m) for a, b in zip(right[0][1:], moving[0][1:], strict=True))
+    assert 0.4 < np.mean([is_moving(FaultsConfig(moving=0.5), 1, step) for step in range(400)]) < 0.6
