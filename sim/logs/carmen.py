@@ -16,6 +16,8 @@ SICK_BEAMS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5}
 """Beams of a scanner of 180 degrees, the first of them to the right, and the degrees between two."""
 SICK_RANGE_M = 40.0
 """`FLASER` lines do not tell the scanner's range. SICK's scanners say 50 m or 81.8 m where nothing came back."""
+SICK_CODES_M = (8.1825, 8.1915)
+"""In its mode of 8 m the same scanner says 8183 to 8191 mm where it measured nothing, and no range is larger."""
 KNOWN = ("FLASER", "ROBOTLASER1", "ODOM", "Laser", "Odometry")
 EVERY_S = 1.0
 """Between two scans of a log without times."""
@@ -94,7 +96,13 @@ def _sick(words: list[str], place: str) -> tuple[Float[np.ndarray, " k"], Float[
     if count not in SICK_BEAMS:
         raise LogError(f"{place}: expected {', '.join(map(str, SICK_BEAMS))} beams, found {count}")
     bearings = -0.5 * np.pi + np.deg2rad(SICK_BEAMS[count]) * np.arange(count)
-    return bearings, _ranges(words[2:], count, place), words[2 + count :]
+    return bearings, _without_codes(_ranges(words[2:], count, place)), words[2 + count :]
+
+
+def _without_codes(ranges: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+    """Return ranges with NaN where a scanner in its mode of 8 m says why it measured nothing."""
+    low, high = SICK_CODES_M
+    return np.where(ranges >= low, np.nan, ranges) if ranges.max(initial=0.0) < high else ranges
 
 
 def _count(word: str, place: str, least: int = 2) -> int:

@@ -49,6 +49,13 @@ def test_no_return_is_infinite_and_a_range_of_nothing_is_unknown(tmp_path):
     assert recording.range_max_m == 40.0
 
 
+def test_codes_of_a_scanner_in_its_mode_of_8_m_are_no_returns(tmp_path):
+    near = read(tmp_path, [flaser(0.0, ranges=(1.5, 8.183, 8.191, 8.18))]).recording
+    np.testing.assert_array_equal(near.ranges_m[0, :4], [1.5, np.nan, np.nan, 8.18])
+    far = read(tmp_path, [flaser(0.0, ranges=(1.5, 8.183, 8.19, 8.2))]).recording
+    np.testing.assert_array_equal(far.ranges_m[0, :4], [1.5, 8.183, 8.19, 8.2])
+
+
 def test_a_scan_is_mapped_where_the_wheels_have_moved_far_enough_or_turned(tmp_path):
     lines = ["# a comment", "PARAM robot_length 1", "ODOM 0 0 0 0 0 0 99 robot 0"]
     lines += [flaser(x) for x in (0.0, 0.06, 0.11, 0.15)] + [flaser(0.16, theta=0.1), flaser(0.4, theta=0.1)]
