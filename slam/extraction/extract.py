@@ -143,8 +143,9 @@ def _fitted(
     place = np.arange(len(line)) + (start - offsets)[line]
     at = place % len(returns.beam)
     beams = Beams(returns.beams.cos[at], returns.beams.sin[at], returns.beams.rho[at])
-    sigma2 = returns.sigma_m[at] ** 2
+    sigma2 = _variances(fit, beams, line, returns.sigma_m[at], returns.sigma_share)
     fit = refit(fit, beams, line, offsets, 1.0 / sigma2)
+    sigma2 = _variances(fit, beams, line, returns.sigma_m[at], returns.sigma_share)
     gate = np.full(len(line), config.noise_sigmas**2)
     free = np.concatenate((offsets[~is_corner[:, 0]], (offsets + size - 1)[~is_corner[:, 1]]))
     gate[free] = config.open_gate_sigmas**2
@@ -161,6 +162,21 @@ def _fitted(
     if not good.all():
         fit, first, last, counts, chi2 = _take(fit, good), first[good], last[good], counts[good], chi2[good]
     return _described(fit, np.array((first, last)).T, counts, chi2, returns, config)
+
+
+def _variances(
+    fit: Fit, beams: Beams, line: Int[np.ndarray, " m"], sigma_m: Float[np.ndarray, " m"], share: float
+) -> Float[np.ndarray, " m"]:
+    """Return the variances m^2 of ranges, where noise grows with the range that of the range at which a line is met.
+
+    The measured range would give more weight to beams that fell short by chance, and bias the line towards the robot.
+    """
+    sigma2 = sigma_m**2
+    if share == 0.0:
+        return sigma2
+    met_m = 1.0 / (fit.a[line] * beams.cos + fit.b[line] * beams.sin)
+    grown = share**2 * (met_m**2 - beams.rho**2)
+    return np.asarray(np.where(np.isfinite(grown), np.maximum(sigma2 + grown, 0.25 * sigma2), sigma2))
 
 
 def _described(

@@ -32,7 +32,9 @@ class Returns(NamedTuple):
     step_rad: float
     """Angle between neighbouring beams."""
     sigma_m: Float[np.ndarray, " m"]
-    """Standard deviation of each range."""
+    """Standard deviation of each range, at the measured range."""
+    sigma_share: float
+    """What of it grows with the range, as a share of the range."""
 
 
 class Pieces(NamedTuple):
@@ -82,7 +84,8 @@ def returns_of(scan: Scan, config: ExtractionConfig) -> Returns | None:
         turn[m - first :] += period
         rho, sigma = ranges[beam], sigmas[beam]
     theta = bearings[beam]
-    return Returns(Beams(np.cos(theta), np.sin(theta), rho), beam, turn, breaks, len(found) == 0, period, step, sigma)
+    beams = Beams(np.cos(theta), np.sin(theta), rho)
+    return Returns(beams, beam, turn, breaks, len(found) == 0, period, step, sigma, scan.sigma_share)
 
 
 def split_gains(

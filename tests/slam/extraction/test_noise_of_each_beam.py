@@ -139,3 +139,15 @@ def test_the_returns_of_a_ring_keep_the_noise_of_their_beams_wherever_it_begins(
     assert returns.is_ring
     for one in (returns, rolled(returns, by)):
         np.testing.assert_array_equal(one.sigma_m, sigmas[one.beam])
+
+
+def test_beams_that_fell_short_by_chance_draw_no_wall_nearer():
+    """The noise at the measured range would weigh them more: a bias of 2 share^2 r, against sigma over many scans."""
+    config = LidarConfig(beams=541, range_max_m=10.0, sigma_m=0.001, sigma_share=0.03)
+    lines = []
+    for scan in scans(config, np.array([[[-2.0, 0.0], [2.0, 0.0]]]), np.array([0.0, 3.0, 0.0])):
+        segments = extract(scan)
+        lines.append(segments.lines[int(np.argmax(segments.beam_counts)), 1])
+    off = np.array(lines) - 3.0
+    assert abs(off.mean()) < 3.3 * off.std() / np.sqrt(DRAWS)
+    assert 6.0 * off.std() / np.sqrt(DRAWS) < 2 * 0.03**2 * 3.0
