@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
-from scipy.spatial import cKDTree
+from jaxtyping import Float
 
-from ..geometry.poses import rotation, to_world, wrap
+from ..geometry.poses import wrap
+from .surface_kernels import Buckets, normal_equations
 
-NEAREST = 6
-"""So many earlier points tell where a surface is: their mean has less noise than the nearest one."""
 ROUNDS = 5
 STILL_M = 1e-4
 """A round that moves less is the last one."""
@@ -17,11 +15,10 @@ STILL_M = 1e-4
 
 @dataclass(frozen=True)
 class Surfaces:
-    """A scan's points, robot frame, with the unit normals of their surfaces where these are known."""
+    """Those of a scan's points, robot frame, whose surfaces have known unit normals."""
 
     points: Float[np.ndarray, "n 2"]
     normals: Float[np.ndarray, "n 2"]
-    known: Bool[np.ndarray, " n"]
 
 
 @dataclass(frozen=True)
@@ -33,31 +30,18 @@ class Prior:
 
 
 def settle(
-    tree: cKDTree, surfaces: Surfaces, start: Float[np.ndarray, "3"], prior: Prior, sigma_m: float, reach_m: float
+    earlier: Buckets, surfaces: Surfaces, start: Float[np.ndarray, "3"], prior: Prior, sigma_m: float, reach_m: float
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
     """Return the pose near a start that agrees best with earlier points and the prior, and the points' information.
 
-    Each point says how far it is off across its surface, and nothing along it; farther off than `reach_m` it says
-    nothing at all, and before that the less the farther. Gauss and Newton's method with fixed weights in each round.
+    Gauss and Newton's method with fixed weights in each round.
     """
-    points, normals = surfaces.points[surfaces.known], surfaces.normals[surfaces.known]
-    earlier = np.asarray(tree.data)
-    nearest = min(NEAREST, len(earlier))
     pose, information = start, np.zeros((3, 3))
     for _ in range(ROUNDS):
-        placed, across = to_world(points, pose), normals @ rotation(pose[2]).T
-        _, rows = tree.query(placed, k=nearest)
-        surface = earlier[rows.reshape(len(points), nearest)].mean(axis=1)
-        off = surface - placed
-        left = np.vecdot(across, off)
-        weights = np.exp(-0.5 * (np.hypot(*off.T) / reach_m) ** 2) / sigma_m**2
-        arm = placed - pose[:2]
-        jacobian = np.column_stack([across, across[:, 1] * arm[:, 0] - across[:, 0] * arm[:, 1]])
-        information = (weights[:, None] * jacobian).T @ jacobian
+        information, gradient = normal_equations(earlier, surfaces.points, surfaces.normals, pose, sigma_m, reach_m)
         away = prior.pose - pose
         away[2] = wrap(away[2])
-        gradient = jacobian.T @ (weights * left) + prior.information @ away
-        change = np.linalg.solve(information + prior.information, gradient)
+        change = np.linalg.solve(information + prior.information, gradient + prior.information @ away)
         pose = pose + change
         if np.abs(change).max() < STILL_M:
             break

@@ -4,14 +4,15 @@ from collections import deque
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from ..geometry.poses import compose, inverse, rotation, to_world
 from ..robot import Odometry, Scan
 from .config import ScanMatchingConfig
-from .likelihood_field import LikelihoodField, field_of, joined, surface_normals, thinned
+from .field_kernels import LikelihoodField, field_of
+from .point_kernels import joined, surface_normals, thinned
 from .point_to_line import Prior, Surfaces, settle
-from .search import Window, correlate, refine
+from .search_kernels import Window, correlate, refine
+from .surface_kernels import NEAREST, NOTHING_SIGMAS, sorted_into_buckets
 
 DEFAULTS = ScanMatchingConfig()
 
@@ -63,7 +64,8 @@ class ScanMatcher:
         before = thinned(np.concatenate(self._points), 0.5 * c.cell_m)
         half_m = max(c.least_m, c.share * float(np.hypot(*wheels.motion[:2])))
         half_rad = max(c.least_rad, c.share * abs(float(wheels.motion[2])))
-        field = self._field(before, points, guess, half_m)
+        farthest = float(np.hypot(*points.T).max())
+        field = self._field(before, guess, farthest + half_m, half_m)
         pose, score = self._best(field, points, Window(guess, half_m, half_rad, c.step_rad, c.penalty))
         wheels_cov = wheels.cov + np.diag([1e-8, 1e-8, 1e-10])
         if score < c.slip_score:
@@ -75,10 +77,11 @@ class ScanMatcher:
         R = np.eye(3)
         R[:2, :2] = rotation(self._pose[2])
         prior = np.linalg.inv(wheels_cov)
+        normals, known = surface_normals(points, c.surface_m)
+        earlier = sorted_into_buckets(before, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)
         pose, information = settle(
-            cKDTree(before), Surfaces(points, *surface_normals(points, c.surface_m)), pose,
-            Prior(guess, R @ prior @ R.T), c.sigma_m, c.kernel_m,
-        )  # fmt: skip
+            earlier, Surfaces(points[known], normals[known]), pose, Prior(guess, R @ prior @ R.T), c.sigma_m, c.kernel_m
+        )
         cov = np.linalg.inv(prior + c.independent * R.T @ information @ R)
         floor = np.diag([c.floor_m**2, c.floor_m**2, c.floor_rad**2])
         return Odometry(compose(inverse(self._pose), pose), 0.5 * (cov + cov.T) + floor, wheels.touched)
@@ -86,14 +89,13 @@ class ScanMatcher:
     def _field(
         self,
         before: Float[np.ndarray, "m 2"],
-        points: Float[np.ndarray, "n 2"],
         guess: Float[np.ndarray, "3"],
+        reach_m: float,
         half_m: float,
     ) -> LikelihoodField:
         c = self._config
-        farthest = float(np.hypot(*points.T).max())
         margin = int(np.ceil(half_m / c.cell_m)) + 2
-        return field_of(before, guess[:2], farthest + half_m, c.cell_m, c.kernel_m, margin)
+        return field_of(before, guess[:2], reach_m, c.cell_m, c.kernel_m, margin)
 
     def _best(
         self, field: LikelihoodField, points: Float[np.ndarray, "n 2"], window: Window

@@ -6,12 +6,10 @@ import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
 from slam.evaluation.consistency import nees
-from slam.geometry.poses import compose, inverse, to_world, wrap
+from slam.geometry.poses import compose, inverse, wrap
 from slam.odometry.config import ScanMatchingConfig
-from slam.odometry.likelihood_field import field_of, joined, surface_normals, thinned
 from slam.odometry.matched_robot import MatchedRobot
 from slam.odometry.scan_matching import ScanMatcher
-from slam.odometry.search import Window, correlate, placed, refine
 from slam.robot import MotionCommand, Odometry, Robot, Scan
 
 ROOM = shapely.box(0, 0, 5, 3.5).difference(shapely.box(2, 2, 2.8, 3.5)).difference(shapely.box(4, 0, 5, 0.6))
@@ -140,67 +138,3 @@ def test_a_matched_robot_senses_once_at_each_place_and_hands_that_scan_on():
         if k < 3:
             odometry = robot.drive(MotionCommand(0.1, 0.0))
             np.testing.assert_allclose(odometry.motion, compose(inverse(poses[k]), poses[k + 1]), atol=0.012)
-
-
-def brute_field(points, at, kernel):
-    return np.exp(-0.5 * (np.hypot(*(at[:, None] - points).transpose(2, 0, 1)).min(axis=1) / kernel) ** 2)
-
-
-def test_the_field_is_the_kernel_of_the_nearest_point():
-    rng = np.random.default_rng(2)
-    points = rng.uniform(-1.0, 1.0, (30, 2))
-    field = field_of(points, np.zeros(2), 1.5, 0.05, 0.06, 4)
-    rows, columns = np.indices(field.values.shape)
-    middles = field.corner + 0.05 * np.stack([columns, rows], axis=-1).reshape(-1, 2)
-    truth = brute_field(points, middles, 0.06).reshape(field.values.shape)
-    near = truth > np.exp(-0.5 * 2.3**2)
-    np.testing.assert_allclose(field.values[near], truth[near], atol=1e-12)
-    assert np.all(field.values <= truth + 1e-12)
-    np.testing.assert_allclose(field.at(middles[:50]), field.values.ravel()[:50], atol=1e-12)
-    assert not field.at(np.array([[99.0, 0.0], [0.0, -99.0]])).any()
-
-
-def test_the_search_finds_what_trying_each_pose_by_itself_finds():
-    rng = np.random.default_rng(3)
-    points = rng.uniform(-1.0, 1.0, (60, 2))
-    field = field_of(to_world(points, np.array([0.1, -0.05, 0.07])), np.zeros(2), 1.6, 0.05, 0.06, 6)
-    window = Window(np.zeros(3), 0.2, 0.12, 0.02, 0.02)
-    found, score = correlate(field, points, window)
-    tried = [
-        [dx, dy, turn]
-        for dx in np.arange(-4, 5) * 0.05 for dy in np.arange(-4, 5) * 0.05 for turn in np.arange(-6, 7) * 0.02
-    ]  # fmt: skip
-    each = []
-    for pose in np.array(tried):
-        rows, columns = field.cells(placed(points, np.array([[0.0, 0.0, pose[2]]]))[0])
-        rows, columns = rows + round(pose[1] / 0.05), columns + round(pose[0] / 0.05)
-        far = (pose[0] ** 2 + pose[1] ** 2) / 0.2**2 + pose[2] ** 2 / 0.12**2
-        each.append(field.values[rows, columns].mean() - 0.02 * far)
-    np.testing.assert_allclose(found, tried[int(np.argmax(each))], atol=1e-12)
-    fine, better = refine(field, points, found, 0.02, 0.001)
-    assert better > score - 0.05
-    np.testing.assert_allclose(fine, [0.1, -0.05, 0.07], atol=0.006)
-
-
-def test_a_surface_is_told_by_its_neighbours_on_both_sides():
-    wall = np.column_stack([np.linspace(0, 1, 11), 0.5 * np.linspace(0, 1, 11)])
-    points = np.concatenate([wall, [[5.0, 5.0]], wall[::-1] + 9.0])
-    normals, known = surface_normals(points, 0.5)
-    np.testing.assert_array_equal(np.flatnonzero(known), [*range(3, 8), *range(15, 20)])
-    np.testing.assert_allclose(np.abs(normals[known] @ [2.0, 1.0]), 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.hypot(*normals[known].T), 1.0)
-    assert not surface_normals(points[:6], 0.5)[1].any()
-
-
-def test_neighbouring_returns_of_one_surface_are_joined_and_others_are_not():
-    points = np.array([[0.0, 0.0], [0.2, 0.0], [1.0, 0.0], [1.0, 0.1]])
-    expected = [[0, 0], [0.05, 0], [0.1, 0], [0.15, 0], [0.2, 0], [1, 0], [1, 0.05], [1, 0.1]]
-    np.testing.assert_allclose(joined(points, 0.05, 0.3), expected, atol=1e-12)
-    for few in (points[:0], points[:1]):
-        np.testing.assert_array_equal(joined(few, 0.05, 0.3), few)
-
-
-def test_thinning_keeps_the_last_point_of_each_cell():
-    points = np.array([[0.01, 0.01], [0.04, 0.04], [0.06, 0.01], [-0.01, 0.01], [0.02, 0.03]])
-    kept = {tuple(point) for point in thinned(points, 0.05)}
-    assert kept == {(0.02, 0.03), (0.06, 0.01), (-0.01, 0.01)}
