@@ -23,7 +23,8 @@ from ..scenario import load_world
 from ..scoring.without_truth.references import read_references
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
-from ..terminal.progress import print_comparison, print_recorded, print_references, progress
+from ..terminal.measured_tables import print_references
+from ..terminal.progress import print_comparison, print_recorded, progress
 from ..trial import TrialResult
 from ..usage import UsageError, choose
 from ..views.timelines import TimelineOutput

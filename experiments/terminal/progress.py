@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
-from itertools import product
 from typing import Any
 
 from rich.progress import (
@@ -115,9 +114,9 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("false matches", str(summary["false_matches"])),
         ("pose error, rms", f"{100 * summary['pose_rmse_m']:.2f} cm, {57.29578 * summary['heading_rmse_rad']:.3f} deg"),
         ("odometry alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
-        ("pose ANEES (1 is ideal)", _number(summary["pose_anees"])),
-        ("pose NEES in the 95 % band", _number(summary["pose_nees_in_band"])),
-        ("map ANEES (1 is ideal)", _number(summary["map_anees"])),
+        ("pose ANEES (1 is ideal)", number(summary["pose_anees"])),
+        ("pose NEES in the 95 % band", number(summary["pose_nees_in_band"])),
+        ("map ANEES (1 is ideal)", number(summary["map_anees"])),
         *_faults(summary),
     ]
     if home := summary["return_to_start"]:
@@ -161,7 +160,8 @@ def _counts(summary: dict[str, Any]) -> str:
     return f"{summary['lines']} ({summary['lines_tentative']}, {summary['duplicate_lines']})"
 
 
-def _number(value: float | None) -> str:
+def number(value: float | None) -> str:
+    """Return a number with three digits after the point, a dash for none."""
     return "-" if value is None else f"{value:.3f}"
 
 
@@ -205,47 +205,6 @@ def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
     for name, key in columns.items():
         table.add_row(name, *(_short(summary.get(key)) for summary in summaries))
     plain_console().print(table)
-
-
-def print_references(summaries: Sequence[dict[str, Any]]) -> None:
-    """Print how far each back end is from what others measured, where they did."""
-    for tail in ("", "_smoothed"):
-        smoothed = ", smoothed" if tail else ""
-        told = [s for s in summaries if "relations" + tail in s]
-        for kind, (words, scale) in _KINDS.items() if told else ():
-            title = f"errors of relations{smoothed}: {words}"
-            plain_console().print(_relations(title, kind, scale, [(s["backend"], s["relations" + tail]) for s in told]))
-        told = [s for s in summaries if "reference" + tail in s]
-        if told:
-            title = f"distance from the reference path{smoothed}, m rms"
-            plain_console().print(_reference(title, [(s["backend"], s["reference" + tail]) for s in told]))
-
-
-_KINDS = {"translation_m": ("translation, m", 1.0), "rotation_rad": ("rotation, degrees", 57.29578)}
-_TIMES = {"at_scans": "at scans", "interpolated": "interpolated"}
-
-
-def _relations(title: str, kind: str, scale: float, told: Sequence[tuple[str, dict[str, Any]]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    table.add_column("", no_wrap=True)
-    for name in ("count", "mean", "median", "sd", "max"):
-        table.add_column(name, justify="right")
-    for name, scores in told:
-        for (times, words), (part, far) in product(_TIMES.items(), (("all", ""), ("far", ", 60 s apart"))):
-            found = scores[times][part]
-            spread = found[kind] or {}
-            cells = [_number(scale * spread[key] if spread else None) for key in ("mean", "median", "sd", "max")]
-            table.add_row(f"{name}, {words}{far}", str(found["count"]), *cells)
-    return table
-
-
-def _reference(title: str, told: Sequence[tuple[str, dict[str, Any]]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for name in ("", "poses", "as it is", "aligned"):
-        table.add_column(name, justify="left" if not name else "right")
-    for name, scores in told:
-        table.add_row(name, str(scores["poses"]), _number(scores["ate_m"]), _number(scores["ate_aligned_m"]))
-    return table
 
 
 def _short(value: Any) -> str:

@@ -144,3 +144,19 @@ class Smoother(Backend, Protocol):
     def finish(self) -> Float[np.ndarray, "n 3"]:
         """Return the poses, world frame, at the start and after every prediction; beliefs then are of that solution."""
         ...
+
+
+@runtime_checkable
+class PathKeeper(Backend, Protocol):
+    """A back end that keeps every pose, so that it knows how any two of them err together."""
+
+    def trajectory(self) -> Float[np.ndarray, "n 3"]:
+        """Return the present estimates, world frame, of the pose at the start and after every prediction."""
+        ...
+
+    def pair_covs(self, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
+        """Return the joint covariance of pairs of these poses, by their rows, each pose's error in its own frame.
+
+        NaN for a pose of before the first wall came into sight: what is known of it is not in the map.
+        """
+        ...

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from slam.estimation.backend import Backend, Joint, Smoother
 from slam.estimation.mounting import belief_of_body, body_poses
@@ -22,6 +22,14 @@ class Smoothed:
     """The pose at the last step and all lines."""
 
 
+def rows_of_steps(unstated_motion: Bool[np.ndarray, " s"]) -> Int[np.ndarray, " s"]:
+    """Return which of a back end's poses, one after each prediction, is that of each step.
+
+    `unstated_motion` tells at which of the steps a second motion was predicted.
+    """
+    return np.arange(len(unstated_motion)) + np.cumsum(unstated_motion)
+
+
 def smooth(
     backend: Backend, last: StochasticMap, unstated_motion: Bool[np.ndarray, " s"], scanner: ScannerSpec
 ) -> Smoothed | None:
@@ -32,10 +40,7 @@ def smooth(
     try:
         if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
             return None
-        poses, rows = (
-            body_poses(backend.finish(), scanner),
-            np.arange(len(unstated_motion)) + np.cumsum(unstated_motion),
-        )
+        poses, rows = body_poses(backend.finish(), scanner), rows_of_steps(unstated_motion)
         belief = belief_of_body(backend.belief, scanner)
         if len(poses) <= rows[-1] or not np.array_equal(belief.ids, last.ids):
             return None

@@ -58,6 +58,23 @@ def believe(
     return belief
 
 
+def pair_covs(
+    solver: Solver, record: Record, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]
+) -> Float[np.ndarray, "m 6 6"]:
+    """Return the joint covariance of pairs of poses, by their rows in the path of a solver that is settled.
+
+    Each pose's error is in its own frame; NaN for a pose of before the first wall.
+    """
+    steps = np.array(record.steps) - len(record.lead)
+    covs = np.full((len(first), 6, 6), np.nan)
+    for k, (a, b) in enumerate(zip(steps[first].tolist(), steps[second].tolist(), strict=True)):
+        if a == b >= 0:
+            covs[k] = np.tile(solver.isam.pose_cov(a), (2, 2))
+        elif min(a, b) >= 0:
+            covs[k] = solver.isam.pair_cov(a, b)
+    return covs
+
+
 def _joint_cov(
     solver: Solver, rows: Int[np.ndarray, " m"], anchors: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, "s s"]:

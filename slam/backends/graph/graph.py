@@ -16,7 +16,7 @@ from ...estimation.backend import Belief, Observations
 from ...estimation.models import initialise
 from ...geometry.poses import to_robot, to_world
 from ...robot import Odometry
-from .belief import believe
+from .belief import believe, pair_covs
 from .config import GraphConfig
 from .loose import wrapped
 from .optimum import solve_anew
@@ -172,6 +172,13 @@ class Graph:
         Where no solution is left they are where it was linearised last, within `GraphConfig.relinearise_place_m` of it.
         """
         return self._record.path_world(self._last_known()[0] if self._is_lost else self._all_entered().poses())
+
+    def pair_covs(self, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
+        """Return the joint covariance of pairs of poses by their rows in `trajectory`, each error in its pose's frame.
+
+        NaN for a pose of before the first wall, which the graph does not hold.
+        """
+        return pair_covs(self._all_entered(), self._record, first, second)
 
     def relinearise(self) -> None:
         """Linearise everything anew at the present estimates."""

@@ -112,6 +112,12 @@ class Isam:
         """Return the covariance of a pose, body frame."""
         return np.asarray(self._isam.marginalCovariance(pose_key(index))[np.ix_(POSE_ROWS, POSE_ROWS)])
 
+    def pair_cov(self, first: int, second: int) -> Float[np.ndarray, "6 6"]:
+        """Return the covariance of two poses, each in its body frame."""
+        found = self._isam.jointMarginalCovariance([pose_key(first), pose_key(second)]).fullMatrix()
+        rows = np.concatenate([POSE_ROWS, 6 + np.array(POSE_ROWS)])
+        return np.asarray(found[np.ix_(rows, rows)])
+
     def joint_cov(self, index: int, keys: Sequence[int]) -> Float[np.ndarray, "s s"]:
         """Return the covariance of a pose (body frame) and of lines (alpha, r) by their keys, by one query."""
         if len(keys) <= self._config.near:

@@ -53,6 +53,22 @@ def test_the_summary_has_the_spread_of_the_errors_at_scans_between_and_far_apart
     assert "relations_smoothed" not in summary
 
 
+def test_errors_are_told_in_units_of_what_is_stated_and_relations_only_where_all_poses_are_kept(scored):
+    graph, ekf = (
+        json.loads((scored / "out" / name / "summary.json").read_text()) for name in ("graph-batch", "full-ekf")
+    )
+    relations = graph["relations_normalised"]
+    assert (relations["all"]["count"], relations["far"]["count"]) == (2, 1)
+    assert relations["far"]["anees"] > 1.0  # off by 0.3 m
+    assert relations["measured"]["sigma_m"] is None
+    assert "relations_normalised" not in ekf
+    for summary in (graph, ekf):
+        path = summary["reference_normalised"]["all"]
+        assert path["count"] == 11
+        assert path["error_m"] < 0.05
+        assert path["anees"] > 0.0
+
+
 def test_a_smoothed_path_is_scored_beside_the_one_of_each_step(scored):
     summary = json.loads((scored / "out" / "graph-batch" / "summary.json").read_text())
     assert summary["relations_smoothed"]["at_scans"]["all"]["count"] == 2
@@ -71,7 +87,13 @@ def test_scores_are_printed(scored, capsys):
     words = ["replay", str(scored / "a.log"), "--relations", str(scored / "a.relations"), "--out"]
     assert main([*words, str(scored / "again"), "--reference", str(scored / "a.txt")]) == 0
     said = capsys.readouterr().out
-    for words in ("errors of relations", "at scans, 60 s apart", "interpolated", "distance from the reference path"):
+    for words in (
+        "errors of relations",
+        "at scans, 60 s apart",
+        "interpolated",
+        "distance from the reference path",
+        "1 is honest",
+    ):
         assert words in said
 
 

@@ -6,6 +6,8 @@ import pytest
 from slam.backends.graph.batch import GraphBatch
 from slam.backends.graph.config import GraphConfig
 from slam.backends.graph.graph import Graph
+from slam.evaluation.relation_noise import relation_covs
+from slam.evaluation.relations import between
 from slam.geometry.lines import normals
 from slam.geometry.poses import compose, rotation, to_world, wrap
 from slam.robot import Odometry
@@ -126,3 +128,34 @@ def test_a_wide_loop_closure_ends_at_the_optimum():
     backend.relinearise()
     backend.relinearise()
     assert_same(found, everything(backend), place=2e-3, angle=1e-3, cov=0.1)
+
+
+def test_two_poses_err_together_as_in_the_dense_solution():
+    trip = Trip.record(1, steps=30)
+    backend = trip.run(Graph(START, P0))
+    backend.relinearise()
+    poses, _, cov = trip.dense(by_wall(trip, backend).anchors)
+    first, second = np.array([0, 3, 20, 29]), np.array([29, 4, 7, 0])
+    found = backend.pair_covs(first, second)
+    for k, pair in enumerate(zip(first, second, strict=True)):
+        index = np.concatenate([3 * pose + np.arange(3) for pose in pair])
+        to_body = np.zeros((6, 6))
+        for half, pose in enumerate(pair):
+            to_body[3 * half : 3 * half + 2, 3 * half : 3 * half + 2] = rotation(-poses[pose, 2])
+            to_body[3 * half + 2, 3 * half + 2] = 1.0
+        truth = to_body @ cov[np.ix_(index, index)] @ to_body.T
+        # The dense one has the error of the start on top, which moves both poses as one and no relation.
+        motion = between(poses[[pair[0]]], poses[[pair[1]]])
+        (mine,), (theirs,) = relation_covs(motion, found[[k]]), relation_covs(motion, truth[None])
+        sigma = np.sqrt(np.diag(theirs))
+        np.testing.assert_allclose(mine / np.outer(sigma, sigma), theirs / np.outer(sigma, sigma), atol=0.01)
+
+
+def test_a_pose_and_itself_err_as_one_and_poses_before_the_map_have_no_covariance():
+    graph = Graph(START, P0)
+    graph.predict(Odometry(np.array([0.3, 0.0, 0.1]), ODOMETRY_COV))
+    trip = Trip.record(1, steps=4)
+    trip.run(graph)
+    same, before = graph.pair_covs(np.array([3, 0]), np.array([3, 3]))
+    np.testing.assert_allclose(relation_covs(np.zeros((1, 3)), same[None])[0], 0.0, atol=1e-12)
+    assert np.all(np.isnan(before))
