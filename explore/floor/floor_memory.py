@@ -94,6 +94,7 @@ class FloorMemory:
         self._kept: dict[tuple[int, ...], _Kept] = {}
         self._rested = 0
         self._last: deque[tuple[Float[np.ndarray, 3], Scan]] = deque(maxlen=config.last_scans)
+        self._odometry = np.zeros(3)
         self._before_world: Float[np.ndarray, 2] | None = None
         self._expected_world: Float[np.ndarray, 3] | None = None
 
@@ -101,20 +102,23 @@ class FloorMemory:
         """Take note that the robot has moved."""
         if self._expected_world is not None:
             self._expected_world = compose(self._expected_world, odometry.motion)
-        back = inverse(odometry.motion)
-        for k, (pose, scan) in enumerate(self._last):
-            self._last[k] = compose(back, pose), scan
+        self._odometry = compose(self._odometry, odometry.motion)
+
+    def _last_robot(self) -> Float[np.ndarray, "k 3"]:
+        """Return where the odometry says that the last scans were taken, from the robot of now, the last at the end."""
+        back = inverse(self._odometry)
+        return np.array([compose(back, pose) for pose, _ in self._last]).reshape(-1, 3)
 
     def last_way_world(self, pose_world: Float[np.ndarray, "3"], length_m: float) -> Float[np.ndarray, "w 2"]:
         """Return where the odometry says that the robot drove last, m, if it now is at a pose: the last place first."""
-        way = to_world(np.array([pose[:2] for pose, _ in reversed(self._last)]).reshape(-1, 2), pose_world)
+        way = to_world(self._last_robot()[::-1, :2], pose_world)
         along = np.cumsum(np.hypot(*np.diff(way, axis=0, prepend=pose_world[None, :2]).T))
         return way[along <= length_m]
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Take in one scan at the pose that the map believes in."""
         pose = walls.belief.pose_world
-        self._last.append((np.zeros(3), scan))
+        self._last.append((self._odometry, scan))
         self._rested += 1
         jumped = self._has_jumped(pose)
         self._expected_world = pose.copy()
@@ -151,7 +155,7 @@ class FloorMemory:
         self._kept.clear()
         self._before_world, self._rested = None, 0
         here = walls.belief.pose_world
-        poses = [compose(here, pose) for pose, _ in self._last]
+        poses = [compose(here, pose) for pose in self._last_robot()]
         distances = distance_to_segments(np.array([pose[:2] for pose in poses]), walls.ends_world)
         for pose, (_, scan), away in zip(poses, self._last, distances, strict=True):
             self._take_in(walls, away, pose, scan)

@@ -1,19 +1,20 @@
 """What the scans have seen free and what they have hit, on a grid at the estimated poses."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import distance_transform_edt
 
-from slam.geometry.poses import compose, to_world, wrap_positive
+from slam.geometry.poses import compose
 from slam.robot import RobotSpec, Scan, of_robot
 
+from .kernels import Box, squared_distances, take_in
+
+NO_CELLS = np.zeros((0, 0), dtype=bool)
 _FARTHEST_M = 1e9
 """Cells farther from the origin are not counted any more."""
-_Box = tuple[int, int, int, int]
-"""First and end row, first and end column."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,6 @@ class FreeSpaceConfig:
         return self.robot.beyond(self.clearance_beyond_m)
 
 
-HALF_DIAGONAL = 0.71
-"""From the middle of a cell of side one to its corner: no part of a free cell lies beyond a beam's end."""
-
-
 class FloorTooLargeError(ValueError):
     """The robot believes to be where no grid can hold it and the floor that it has seen."""
 
@@ -66,7 +63,7 @@ class FreeSpace:
         self._beyond = np.zeros((0, 0), dtype=bool)
         self._fence = None if config.fence is None else shapely.Polygon(config.fence)
         self._first = np.zeros(2, dtype=np.int64)
-        self._dirty: _Box | None = None
+        self._dirty: Box | None = None
         self._too_tight = np.zeros((0, 2))
         self.range_m = np.inf
         """Maximum range of the last scan."""
@@ -169,14 +166,12 @@ class FreeSpace:
     def clearance(self) -> Float[np.ndarray, "h w"]:
         """Return the distance from each cell to the nearest occupied one, m, up to the configured limit."""
         if self._dirty is not None:
-            limit = self.config.clearance_limit_m
-            pad = int(np.ceil(limit / self.config.cell_m)) + 1
-            inner, outer = (_grown(self._dirty, k * pad, self._evidence.shape) for k in (1, 2))
+            limit, cell = self.config.clearance_limit_m, self.config.cell_m
+            reach = int(np.ceil(limit / cell))
+            inner, outer = (_grown(self._dirty, k * (reach + 1), self._evidence.shape) for k in (1, 2))
             occupied = (self._evidence[_slices(outer)] > 0) | self._touched[_slices(outer)]
-            distance = np.full(occupied.shape, limit, dtype=np.float32)
-            if occupied.any():
-                distance = np.minimum(distance_transform_edt(~occupied, sampling=self.config.cell_m), limit)
-            self._clearance[_slices(inner)] = distance[_slices(inner, outer)]
+            metres = np.minimum(cell * np.sqrt(np.arange((reach + 1) ** 2 + 1)), limit).astype(np.float32)
+            self._clearance[_slices(inner)] = metres[squared_distances(occupied, reach)][_slices(inner, outer)]
             self._dirty = None
         return self._clearance
 
@@ -185,7 +180,8 @@ class FreeSpace:
         self._evidence[:] = 0
         self._driven[:] = False
         self._touched[:] = False
-        self._evidence[self._beyond] = self.config.limit
+        if self._fence is not None:
+            self._evidence[self._beyond] = self.config.limit
         self._too_tight = np.zeros((0, 2))
         self._mark(0, self.shape[0], 0, self.shape[1])
 
@@ -198,81 +194,41 @@ class FreeSpace:
         self.range_m = scan.range_max_m
         # With this much to spare, no cell that is added later lies near enough to an old hit to lack clearance.
         self._reserve(pose_world[:2], scan.range_max_m + self.config.clearance_limit_m + 2 * cell)
-        reach = scan.shown_m
-        beams = np.stack([np.cos(scan.bearings_rad), np.sin(scan.bearings_rad)], axis=-1)
-        tips = self.cells(to_world(beams * reach[:, None], pose_world))
-        here = self.cells(pose_world[None, :2])[0]
-        box = self._box(here, tips, scan)
-        window, hits = self._evidence[_slices(box)], tips[np.isfinite(scan.ranges_m)] - (box[0], box[2])
-        free, body = self._seen_free(pose_world, body_world, scan, reach, box)
-        free[tuple(hits.T)] = body[tuple(hits.T)] = False
-        change = -free.astype(np.int8)
-        change[tuple(hits.T)] = self.config.hit
-        before = window > 0
-        np.clip(window + change, -self.config.limit, self.config.limit, out=window)
-        window[body] = np.minimum(window[body], -1)
-        window[self._beyond[_slices(box)]] = self.config.limit
-        changed = np.nonzero((window > 0) != before)
-        if len(changed[0]):
-            (r0, r1), (c0, c1) = ((int(axis.min()), int(axis.max()) + 1) for axis in changed)
-            self._mark(box[0] + r0, box[0] + r1, box[2] + c0, box[2] + c1)
-
-    def _box(self, here: Int[np.ndarray, "2"], tips: Int[np.ndarray, "k 2"], scan: Scan) -> _Box:
-        """Return the part of the grid that a scan says something of, given the robot's cell and its beams' tips."""
-        step = float(scan.bearings_rad[1] - scan.bearings_rad[0])
         # Two beams and the arc between them: it stands out beyond the line from tip to tip.
-        beyond = scan.range_max_m * (1.0 - np.cos(step))
-        body_m = self.config.body_m + self.config.robot.scanner.off_m
-        spare = int(np.ceil(max(beyond, body_m) / self.config.cell_m)) + 1
-        r0, c0 = (np.minimum(tips.min(axis=0), here) - spare).tolist()
-        r1, c1 = (np.maximum(tips.max(axis=0), here) + spare + 1).tolist()
-        return r0, r1, c0, c1
-
-    def _seen_free(
-        self,
-        pose_world: Float[np.ndarray, "3"],
-        body_world: Float[np.ndarray, "2"],
-        scan: Scan,
-        reach: Float[np.ndarray, " k"],
-        box: _Box,
-    ) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-        """Cells of a part of the grid before the nearer of the two beams beside them, and those within the body.
-
-        The pose is the scanner's.
-        """
-        here = self.cells(pose_world[None, :2])
-        offset, (r, c) = self.points(here)[0] - pose_world[:2], here[0].tolist()
-        x = (np.arange(box[2] - c, box[3] - c) * self.config.cell_m + offset[0]).astype(np.float32)
-        y = (np.arange(box[0] - r, box[1] - r) * self.config.cell_m + offset[1]).astype(np.float32)
-        distance = np.hypot(x[None, :], y[:, None])
-        k = len(scan.bearings_rad)
-        step = (scan.bearings_rad[-1] - scan.bearings_rad[0]) / (k - 1)
-        bearing = np.arctan2(y[:, None], x[None, :]) - np.float32(pose_world[2] + scan.bearings_rad[0])
-        beam = np.floor(wrap_positive(bearing) / np.float32(step)).astype(np.int64)
-        shown = reach - HALF_DIAGONAL * self.config.cell_m
-        between = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1.0, dtype=np.float32)
-        between[: k - 1] = np.minimum(shown[:-1], shown[1:])
-        if scan.is_full_turn:
-            between[k - 1 :] = min(shown[-1], shown[0])
-        from_body = distance
-        if not self.config.robot.scanner.is_at_axle:
-            off = (pose_world[:2] - body_world).astype(np.float32)
-            from_body = np.hypot(x[None, :] + off[0], y[:, None] + off[1])
-        body = from_body < self.config.body_m
-        return (distance < between[beam]) | body, from_body < self.config.body_m - HALF_DIAGONAL * self.config.cell_m
+        beyond_m = scan.range_max_m * (1.0 - math.cos(scan.bearings_rad[1] - scan.bearings_rad[0]))
+        r0, r1, c0, c1 = take_in(
+            self._evidence,
+            self._beyond if self._fence is not None else NO_CELLS,
+            self._first,
+            pose_world,
+            body_world,
+            scan.bearings_rad,
+            scan.shown_m,
+            np.isfinite(scan.ranges_m),
+            scan.is_full_turn,
+            cell,
+            max(beyond_m, self.config.body_m + scanner.off_m),
+            self.config.body_m,
+            self.config.hit,
+            self.config.limit,
+        )
+        if r0 < r1:
+            self._mark(r0, r1, c0, c1)
 
     def _reserve(self, centre_world: Float[np.ndarray, "2"], reach_m: float) -> None:
         """Grow the grid, with room to spare, until it holds everything within reach."""
-        reach = int(np.ceil(reach_m / self.config.cell_m)) + 1
+        reach = math.ceil(reach_m / self.config.cell_m) + 1
         if not np.all(np.abs(centre_world) < _FARTHEST_M):
             raise self._too_large(centre_world)
-        at = np.floor(centre_world / self.config.cell_m).astype(np.int64)
+        x, y = (math.floor(metres / self.config.cell_m) for metres in centre_world.tolist())
+        (column, row), (rows, columns) = self._first.tolist(), self.shape
+        if column + reach <= x < column + columns - reach and row + reach <= y < row + rows - reach:
+            return
+        at = np.array([x, y])
         low, high = at - reach, at + reach + 1
         old_first, old_end = self._first, self._first + self._evidence.shape[::-1]
         if self._evidence.size == 0:
             old_first = old_end = at
-        if np.all(low >= old_first) and np.all(high <= old_end):
-            return
         spare = reach
         first = np.where(low < old_first, low - spare, old_first)
         end = np.where(high > old_end, high + spare, old_end)
@@ -312,9 +268,9 @@ class FreeSpace:
         self._dirty = min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1)
 
 
-def _grown(box: _Box, pad: int, shape: tuple[int, ...]) -> _Box:
+def _grown(box: Box, pad: int, shape: tuple[int, ...]) -> Box:
     return max(box[0] - pad, 0), min(box[1] + pad, shape[0]), max(box[2] - pad, 0), min(box[3] + pad, shape[1])
 
 
-def _slices(box: _Box, within: _Box = (0, 0, 0, 0)) -> tuple[slice, slice]:
+def _slices(box: Box, within: Box = (0, 0, 0, 0)) -> tuple[slice, slice]:
     return slice(box[0] - within[0], box[1] - within[0]), slice(box[2] - within[2], box[3] - within[2])

@@ -1,0 +1,55 @@
+"""Cost of the grid of free floor: one scan taken in, and the clearances of a whole grid."""
+
+from collections.abc import Iterator
+
+import jaxtyping
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from explore.floor.free_space import FreeSpace
+from sim.robot import SimulatedRobot
+from sim.worlds import load
+from slam.robot import MotionCommand, Scan
+
+STEPS = 300
+
+
+@pytest.fixture(autouse=True)
+def _unchecked() -> Iterator[None]:
+    """Measure without the shape checks that pytest adds: they cost more than the work itself."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
+def drive() -> list[tuple[np.ndarray, Scan]]:
+    """Return the scans of a robot that turns in a hall, at their true poses."""
+    robot, views = SimulatedRobot(load("hall"), 1), []
+    for _ in range(STEPS):
+        scan = robot.sense()
+        views.append((robot.record.poses_world[-1], scan))
+        robot.drive(MotionCommand(0.02, 0.15))
+    return views
+
+
+def test_one_scan(benchmark: BenchmarkFixture) -> None:
+    views, grid = drive(), FreeSpace()
+    for pose, scan in views:
+        grid.integrate(pose, scan)
+    rounds = iter(range(10**9))
+    benchmark(lambda: grid.integrate(*views[next(rounds) % STEPS]))
+
+
+def test_clearances_of_a_whole_grid(benchmark: BenchmarkFixture) -> None:
+    grid = FreeSpace()
+    for pose, scan in drive():
+        grid.integrate(pose, scan)
+    everywhere = (0, grid.shape[0], 0, grid.shape[1])
+
+    def anew() -> None:
+        grid._mark(*everywhere)
+        grid.clearance()
+
+    benchmark(anew)
+    benchmark.extra_info |= {"cells": grid.evidence.size}
