@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from .association.ambiguity import AmbiguityConfig
 from .association.matching import MatchingConfig
 from .association.recovery import RecoveryConfig
 from .extraction.config import ExtractionConfig
@@ -29,7 +28,6 @@ class MapperConfig:
     walls: WallsConfig = field(default_factory=WallsConfig)
     candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
     openings: OpeningsConfig = field(default_factory=OpeningsConfig)
-    ambiguity: AmbiguityConfig = field(default_factory=AmbiguityConfig)
     change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
     """None where no wall is cut for bends that only all scans together show; they are never looked for either where
     `vertices` is None."""

@@ -27,7 +27,7 @@ class MapKeeper:
         self.config = config
         change_points = config.change_points or ChangePointsConfig()
         self.landmarks = Landmarks(config.walls, change_points, config.openings, config.chains)
-        self._candidates = LandmarkCandidates(config.candidates)
+        self._candidates = LandmarkCandidates(config.matching.gate, config.matching.angle_rad, config.candidates)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""
@@ -94,7 +94,8 @@ class MapKeeper:
         walls = self.map()
         if self.config.vertices is None:
             return walls
-        pairs, along = meetings(walls, scan.range_max_m, self.config.vertices, self.landmarks.change_points.cut)
+        one_wall, sides = self.config.matching.one_wall, self.landmarks.change_points
+        pairs, along = meetings(walls, scan.range_max_m, one_wall, self.config.vertices, sides.cut)
         if not len(pairs):
             return walls
         self.landmarks.extents.meet(pairs, along)

@@ -7,7 +7,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from .association.ambiguity import observed_either_way
 from .association.joint_compatibility import Nis
 from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
@@ -131,7 +130,7 @@ class Mapper:
             found = self._localised(scan, segments, walls)
         matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(found.first, self._reliable(matches, segments) or self._ambiguous(found.view, matches))
+        self.backend.update(found.first, self._reliable(matches, segments))
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
@@ -145,7 +144,9 @@ class Mapper:
         if self.config.vertices is None:
             return self._pieces(scan), walls
         segments = self._segments(scan, walls, self.config.vertices)
-        return segments, self._keeper.without(mistaken(segments, walls, self.config.vertices), walls)
+        return segments, self._keeper.without(
+            mistaken(segments, walls, self.config.matching.gate, self.config.vertices), walls
+        )
 
     def _localised(self, scan: Scan, segments: Segments, walls: StochasticMap) -> Localised:
         # 2. Match observed features to the best fitting equivalents in the map.
@@ -205,15 +206,7 @@ class Mapper:
 
     def _reliable(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""
-        return self._may_move(segments, matches.pairs[:, 0], matches.observations(segments))
-
-    def _ambiguous(self, view: View, matches: Matches) -> Observations:
-        """Return what can be said of segments that may be of either of two walls, where nothing else is left."""
-        found = observed_either_way(matches, view.segments, view.walls.ids, view.joint, self.config.ambiguity)
-        return self._may_move(view.segments, *found)
-
-    def _may_move(self, segments: Segments, rows: Int[np.ndarray, " k"], observed: Observations) -> Observations:
-        """Return those of the observations, made by the segments of these rows, that may move the estimate."""
+        rows, observed = matches.pairs[:, 0], matches.observations(segments)
         reliable = self._keeper.landmarks.reliability.may_move(segments.take(rows), observed.ids)
         cov = as_told(observed.cov[reliable], segments.take(rows[reliable]), self.config.walls.reliability)
         return Observations(observed.ids[reliable], observed.lines[reliable], cov)
@@ -229,7 +222,8 @@ class Mapper:
         return sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
 
     def _bends(self, segments: Segments, walls: StochasticMap, vertices: VerticesConfig) -> Float[np.ndarray, " b"]:
-        return vertices_within(segments, walls, vertices, self._keeper.landmarks.change_points.cut)
+        cut = self._keeper.landmarks.change_points.cut
+        return vertices_within(segments, walls, self.config.matching.one_wall, vertices, cut)
 
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
@@ -237,7 +231,7 @@ class Mapper:
         """Forget a wall that all scans together show to bend, and others laid across it: its sides take their place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
-        beside the bend; all as it was, and none, while the scan shows a side too poorly or another turn.
+        beside the bend; all as it was, and none, while the scan shows a side too poorly.
         """
         vertices, change_points = self.config.vertices, self._keeper.landmarks.change_points
         if vertices is None or self.config.change_points is None:

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 9,
+    CONFIG: 10,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -31,6 +31,7 @@ Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, 
 format 5 the body and the step stood at several places (`MOVED`), until format 6 no robot was ever lost
 (`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
 (`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
+Until format 9 some settings said what another says.
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -58,8 +59,8 @@ RENAMED: dict[str, str | None] = {
     "mission.explorer.sweeping.near_m": "mission.explorer.near_m",
     "mission.explorer.following.looks": "mission.explorer.following.viewpoints",
     "mission.mapper.bends": "mission.mapper.vertices",
-    "mission.mapper.bends.young_sightings": "mission.mapper.vertices.young_observations",
-    "mission.mapper.chains.bend_sightings": "mission.mapper.chains.vertex_observations",
+    "mission.mapper.bends.young_sightings": None,
+    "mission.mapper.chains.bend_sightings": None,
     "mission.mapper.duplicates": "mission.mapper.merging",
     "mission.mapper.duplicates.gate": None,
     "mission.mapper.faint": "mission.mapper.candidates",
@@ -67,10 +68,10 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.gaps.widest_m": None,
     "mission.mapper.gaps.corner_m": None,
     "mission.mapper.kinks": "mission.mapper.change_points",
-    "mission.mapper.torn": "mission.mapper.ambiguity",
+    "mission.mapper.torn": None,
     "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
     "mission.mapper.walls.trusted_sightings": "mission.mapper.walls.trusted_observations",
-    "mission.mapper.walls.established_sightings": "mission.mapper.walls.established_observations",
+    "mission.mapper.walls.established_sightings": None,
     "robot.drive.step_max_m": "robot.step_m",
     "robot.drive.turn_max_rad": "robot.turn_rad",
     "robot.drive.wheel_base_m": "robot.wheels.base_m",
@@ -83,8 +84,27 @@ RENAMED: dict[str, str | None] = {
 counts. None stands where a setting said nothing of its own."""
 
 
-DROPPED = ("mission.mapper.change_points.most_rad",)
-"""Settings of format 2 whose rules are no more."""
+DROPPED = {
+    "mission.mapper.change_points.most_rad",
+    "mission.mapper.ambiguity.turn_rad",
+    "mission.mapper.ambiguity.across_m",
+    "mission.mapper.candidates.gate",
+    "mission.mapper.chains.vertex_observations",
+    "mission.mapper.change_points.agrees_sigmas",
+    "mission.mapper.change_points.ends",
+    "mission.mapper.extraction.corner_beams",
+    "mission.mapper.extraction.loose_cost",
+    "mission.mapper.merging.overlap_m",
+    "mission.mapper.openings.least_m",
+    "mission.mapper.vertices.known",
+    "mission.mapper.vertices.shown",
+    "mission.mapper.vertices.young_observations",
+    "mission.mapper.walls.established_observations",
+    "mission.mapper.walls.pass_margin_m",
+    "mission.mapper.walls.reliability.crooked_m",
+}
+"""Settings of older formats whose rules are no more, or that said what another says: the first until format 2, the
+others until format 9."""
 EXPLORER = "mission.explorer."
 FOLLOWING = f"{EXPLORER}following."
 RADIUS, STEP, TURN = "robot.radius_m", "robot.step_m", "robot.turn_rad"

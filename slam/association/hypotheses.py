@@ -108,10 +108,8 @@ def nearest_alone(
     R: Float[np.ndarray, "c 2 2"],
     gate: float,
     clear: float,
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "t 2"]]:
+) -> Int[np.ndarray, " k"]:
     """Return for each segment its nearest candidate, unless another wall costs hardly more (by less than `clear`).
-
-    The second are the segments that are ambiguous, each by its nearest candidate and the likeliest of the others.
 
     Two landmarks of one wall are not another: by the gate their covariance does not tell them apart. `R` is the noise
     of each candidate's segment, which is the same for all candidates of one.
@@ -125,9 +123,7 @@ def nearest_alone(
     cov = S[best, :, best, :] + S[each, :, each, :] - S[best, :, each, :] - S[each, :, best, :] - 2.0 * R
     differ = np.einsum("ci,cij,cj->c", apart, np.linalg.pinv(cov, hermitian=True), apart) > gate_level(gate, 2)
     rivals = (best != each) & differ & (d2 < d2[best] + clear)
-    likeliest = order[rivals[order]]
-    likeliest = likeliest[np.unique(segment[likeliest], return_index=True)[1]]
-    return np.setdiff1d(first, best[likeliest]), np.stack([best[likeliest], likeliest], axis=-1)
+    return np.setdiff1d(first, best[rivals])
 
 
 def _own_distances(seen: JointObservations) -> Float[np.ndarray, " c"]:

@@ -75,8 +75,6 @@ class Matches:
     """Indices of the segments that belong to no wall."""
     doubtful: Int[np.ndarray, " d"]
     """Those of the unmatched that lie too near a wall to be a new one."""
-    ambiguous: Int[np.ndarray, "t 3"]
-    """Those of the unmatched that two walls fit about as well: index of the segment, ids of the likelier and other."""
     refusals: dict[int, str]
     """For each unmatched segment with a wall near it, why that wall was refused."""
 
@@ -86,13 +84,11 @@ class Matches:
         return Observations(self.pairs[:, 1], segments.lines[rows], segments.cov[rows])
 
 
-NONE_AMBIGUOUS = np.zeros((0, 3), dtype=np.int64)
 NO_MATCHES = Matches(
     np.zeros((0, 2), dtype=np.int64),
     np.zeros(0),
     np.zeros(0, dtype=np.int64),
     np.zeros(0, dtype=np.int64),
-    NONE_AMBIGUOUS,
     {},
 )
 
@@ -144,9 +140,8 @@ def match(
     if clear_only:
         chosen = _agreed(found, np.flatnonzero(covers), segments, joint, config)
         chosen = _still_overlapping(chosen, found, segments, walls, joint, config)
-        ambiguous = np.zeros((0, 2), dtype=np.int64)
     else:
-        chosen, ambiguous = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
+        chosen = _nearest(found, np.flatnonzero(covers & (found.d2 <= level)), joint, config)
     matched = np.zeros(count, dtype=bool)
     matched[found.segment[chosen]] = True
     beside = _is_beside(found, segments, config)
@@ -158,7 +153,6 @@ def match(
         found.d2[chosen],
         np.flatnonzero(~matched),
         np.flatnonzero(~matched & doubtful),
-        np.column_stack([found.segment[ambiguous[:, 0]], ids[found.line[ambiguous]]]),
         _refusals(found, ids, ~matched, level, config),
     )
 
@@ -249,13 +243,12 @@ def _agreed(
 
 def _nearest(
     found: _Candidates, rows: Int[np.ndarray, " r"], joint: Joint, config: MatchingConfig
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "t 2"]]:
-    """Return for each segment its nearest candidate among `rows`, unless another is nearly as near; and those two."""
+) -> Int[np.ndarray, " k"]:
+    """Return for each segment its nearest candidate among `rows`, unless another is nearly as near."""
     model = found.model.take(rows)
     seen = taken_together(joint, found.line[rows], model)
     segment, d2 = found.segment[rows], found.d2[rows]
-    alone, ambiguous = nearest_alone(segment, d2, seen, model.R, config.one_wall, config.clear)
-    return rows[alone], rows[ambiguous]
+    return rows[nearest_alone(segment, d2, seen, model.R, config.one_wall, config.clear)]
 
 
 def _still_overlapping(

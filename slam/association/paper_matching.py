@@ -16,7 +16,7 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions, normals, segment_distances
 from ..geometry.poses import to_world
 from .joint_compatibility import relocate
-from .matching import NONE_AMBIGUOUS, KnownWalls, Matches, MatchingConfig, pair_distances
+from .matching import KnownWalls, Matches, MatchingConfig, pair_distances
 
 
 def match_alone(
@@ -47,7 +47,6 @@ def match_alone(
         d2[rows, best],
         unmatched,
         np.zeros(0, dtype=np.int64),
-        NONE_AMBIGUOUS,
         _refusals(d2, apart, unmatched, walls.ids, config) if lines else {},
     )
 

@@ -53,6 +53,5 @@ class View:
             np.concatenate([clear.distances, again.distances]),
             rest[again.unmatched],
             rest[again.doubtful],
-            np.column_stack([rest[again.ambiguous[:, 0]], again.ambiguous[:, 1:]]),
             {int(rest[k]): why for k, why in again.refusals.items()},
         )

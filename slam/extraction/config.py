@@ -30,8 +30,6 @@ class ExtractionConfig:
     """Saving from which the neighbours of a candidate are candidates too: a beam there may belong to neither line."""
     segment_cost: float = 20.0
     """Chi-square that one more segment must save: with less, noise cuts straight walls."""
-    loose_cost: float = 9.0
-    """Chi-square of a beam that belongs to no segment: three sigmas off a line it is better left loose."""
     least_beams: int = 3
     """Fewer beams make no segment: any two lie on a line. An end loses its last beam only where so many remain."""
     sure_beams: int = 5
@@ -39,11 +37,9 @@ class ExtractionConfig:
     1.4 times with 4."""
     settling_rounds: int = 4
     """Cuts move to where their two lines fit best at most so often; most stay at once."""
-    corner_beams: float = 1.0
-    """Two lines meet in a corner where they cross at most this many beams outside the gap between them: farther off,
-    beams would have met one of them."""
     open_gate_sigmas: float = 3.0
-    """Residual beyond which the last beam leaves the fit where no lines cross: another surface begins there."""
+    """A beam so far off a line is better left loose; so is the last one where no lines cross: another surface begins
+    there."""
     doubt_sigmas: float = 2.5
     """The last beam before a joint is left out where the other line predicts it within this: it may be either's."""
     sure_gap_m: float = 0.35

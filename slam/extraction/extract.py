@@ -95,7 +95,7 @@ def _sharpen(
     wrapped *= m
     begins, ends = start[after] + wrapped, stop[after] + wrapped
     meets = np.minimum(cut - start[k], ends - cut) >= config.least_beams
-    meets &= np.abs(past) <= config.corner_beams + half
+    meets &= np.abs(past) <= 1.0 + half
     k, after, cut, wrapped, begins = k[meets], after[meets], cut[meets], wrapped[meets], begins[meets]
     # Beams that were left loose between the two pieces lie off both lines and stay loose.
     outside = (cut < stop[k]) | (cut > begins)
@@ -235,7 +235,7 @@ def _corners(
     half = 0.5 * (turn[after, 0] + returns.period * (after < k) - turn[k, 1])
     cm, sm = _turned(returns.beams, place[k, 1] % m, half * returns.step_rad)
     past = crossing(fit.a[k] - fit.a[after], fit.b[k] - fit.b[after], cm, sm)
-    meet = (np.abs(past) <= (half + config.corner_beams) * returns.step_rad) & (2 * half <= config.gap_beams + 1)
+    meet = (np.abs(past) <= (half + 1.0) * returns.step_rad) & (2 * half <= config.gap_beams + 1)
     meet &= run[k, 1] == run[after, 0]
     k, after, past, cm, sm = k[meet], after[meet], past[meet], cm[meet], sm[meet]
     turn_cos, turn_sin = np.cos(past), np.sin(past)

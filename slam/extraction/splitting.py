@@ -169,7 +169,7 @@ def choose(
     start, stop = cuts[i], cuts[j]
     costs = fit_runs(sums, start, stop)[1] + config.segment_cost
     costs[stop - start < config.least_beams] = np.inf
-    return _least(costs.tolist(), run_start.tolist(), cuts, config.loose_cost)
+    return _least(costs.tolist(), run_start.tolist(), cuts, config.open_gate_sigmas**2)
 
 
 def split(

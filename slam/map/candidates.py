@@ -15,9 +15,6 @@ from ..geometry.lines import directions, lines_to_world, normals
 from ..geometry.poses import to_world, wrap
 from ..robot import RobotSpec, of_robot
 
-FACING_COSINE = 0.5
-"""Lines that turn by more than 60 degrees from one another are never one, however poor their directions."""
-
 
 @dataclass(frozen=True)
 class CandidatesConfig:
@@ -36,8 +33,6 @@ class CandidatesConfig:
     patience_m: float = 150.0
     """It is forgotten when it was not seen for the steps that so long a way takes: the second look may be on the way
     back."""
-    gate: float = 0.99
-    """Probability level of the test whether two observations are of one line."""
     slack_m: float = 0.01
     """What the pose may have drifted between two observations, sigma."""
 
@@ -74,8 +69,9 @@ class _Lines:
 class LandmarkCandidates:
     """The lines of few beams that may become walls."""
 
-    def __init__(self, config: CandidatesConfig = CandidatesConfig()) -> None:
-        self._config = config
+    def __init__(self, gate: float, angle_rad: float, config: CandidatesConfig = CandidatesConfig()) -> None:
+        """Lines of which two observations are farther apart than this gate, or turn by more, are never one."""
+        self._config, self._level, self._least_cosine = config, gate_level(gate, 2), float(np.cos(angle_rad))
         self._lines = _Lines(np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
         self._places = np.zeros((0, 2))
         self._looks = np.zeros(0, dtype=np.int64)
@@ -125,7 +121,7 @@ class LandmarkCandidates:
         s11 = seen.var_across[:, None] + known.var_across + along * s01 + self._config.slack_m**2
         d2 = (s11 * turn**2 - 2 * s01 * turn * off + s00 * off**2) / (s00 * s11 - s01**2)
         apart = np.abs(along) >= seen.half_m[:, None] + known.half_m
-        d2[apart | (d2 > gate_level(self._config.gate, 2)) | (np.cos(turn) < FACING_COSINE)] = np.inf
+        d2[apart | (d2 > self._level) | (np.cos(turn) < self._least_cosine)] = np.inf
         line_of = np.full(len(seen.alpha), -1, dtype=np.int64)
         for flat in np.argsort(d2, axis=None)[: np.count_nonzero(np.isfinite(d2))]:
             row, line = divmod(int(flat), d2.shape[1])

@@ -32,13 +32,11 @@ class ChainConfig:
     """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
     the wall between, as far apart as that is thick."""
     overlap_m: float = 1.0
-    """Largest overlap of the two sides of a bend: within the noise each reaches past it ..."""
+    """Largest overlap of the two sides of a bend, both established: within the noise each reaches past it ..."""
     beside_m: float = 0.04
     """... where it lies no farther than this from the other: four sigmas of a beam."""
     bend_rad: tuple[float, float] = (float(np.deg2rad(1.0)), float(np.deg2rad(30.0)))
     """What such a bend turns: less, and it may be one wall entered twice; more, and beams tell where it is."""
-    vertex_observations: int = 10
-    """Both sides were seen this often: a line laid across a bend joins neither for being near to both."""
     corner_reach_m: float = 0.3
     """A corner is the intersection of the two lines where that lies this near to both ends, else their middle."""
 
@@ -90,7 +88,7 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    often = walls.observations[rows] >= config.vertex_observations
+    often = walls.established[rows]
     successor = _links(ends, lines, ids, often, set_aside, passed, cut_off, config)
     before = np.flatnonzero(successor >= 0)
     after = successor[before]

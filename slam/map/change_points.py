@@ -16,7 +16,7 @@ from ..estimation.backend import Belief
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import beam_step, beams_of
 from ..geometry.lines import directions, normals
-from ..geometry.poses import to_world, wrap
+from ..geometry.poses import to_world
 from ..robot import Scan
 from .records import Merger, Records
 
@@ -37,13 +37,9 @@ class ChangePointsConfig:
     least_rad: float = float(np.deg2rad(0.2))
     """Smaller turns are none: over thousands of beams every real wall shows one."""
     gate_sigmas: float = 4.0
-    """Beams farther off the line belong to something else ..."""
-    ends: int = 1
-    """... and so may, on either end of what a scan shows, so many."""
+    """Beams farther off the line belong to something else; so may the last one on either end."""
     least_beams: int = 4
     """A scan counts at a place where it has so many beams on either side."""
-    agrees_sigmas: float = 3.0
-    """The scan in which a wall is cut shows the same turn, up to so many of its own sigmas."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ class ChangePoints:
         ours = np.abs(across) < self._config.gate_sigmas * sigma
         number = np.arange(len(of))
         from_end = np.minimum(number - np.searchsorted(of, of), np.searchsorted(of, of, side="right") - 1 - number)
-        ours &= from_end >= self._config.ends
+        ours &= from_end >= 1
         if not ours.any():
             return None
         # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along the wall, too.
@@ -121,7 +117,7 @@ class ChangePoints:
     ) -> tuple[int, int] | None:
         """Return the neighbours among `pieces`, of the same scan cut at a bend, between which it lies.
 
-        None where there are no two, or where they do not show that turn.
+        None where there are no two.
         """
         beams, margin = len(scan.bearings_rad), 2
         first, last = segments.beams[change_point.segment] + [
@@ -137,9 +133,7 @@ class ChangePoints:
         bend = np.mod(bend - first, beams)
         nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
         before, after = ours[nearest : nearest + 2].tolist()
-        off = wrap(pieces.lines[after, 0] - pieces.lines[before, 0]) - change_point.turn_rad
-        variance = pieces.cov[before, 0, 0] + pieces.cov[after, 0, 0] + change_point.sigma_rad**2
-        return (before, after) if off**2 < self._config.agrees_sigmas**2 * variance else None
+        return before, after
 
     def _add(
         self, walls: Int[np.ndarray, " m"], place: Int[np.ndarray, " p"], place_of: Int[np.ndarray, " p"], terms: Sums

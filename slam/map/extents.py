@@ -14,7 +14,7 @@ from ..robot import RobotSpec, Scan, of_robot
 from .ray_evidence import RayEvidence, ray_evidence
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
-from .stochastic_map import StochasticMap
+from .stochastic_map import ESTABLISHED, StochasticMap
 
 CLAIMED_BEAMS = 4
 """Fewer beams on a wall say nothing about whose they are."""
@@ -35,18 +35,15 @@ class WallsConfig:
     """A tentative wall is forgotten once it was not observed for the steps that so long a way takes."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
     """Which observations may move the estimate."""
-    pass_margin_m: float = 0.1
-    """A beam that goes on this far beyond a line has passed through it."""
     contradictions: int = 2
     """A wall is cut back once so many scans have shown beams passing through it."""
     end_margin_m: float = 0.1
-    """Beams that pass this near to an end do not count: ends and corners are known no better."""
+    """A beam that goes on this far beyond a line has passed through it; those that pass this near to an end do not
+    count: ends and corners are known no better."""
     least_m: float = 0.05
     """A wall cut back to less than this is forgotten."""
     claims: int = 6
-    """A wall is forgotten when so many scans in turn gave all its beams to other walls ..."""
-    established_observations: int = 10
-    """... unless it was seen at least this often."""
+    """A wall is forgotten when so many scans in turn gave all its beams to other walls, unless it is established."""
 
     @property
     def patience_steps(self) -> int:
@@ -68,7 +65,6 @@ class Extents:
             observations=0,
             last_seen=0,
             against=0,
-            overlaid=np.zeros(2, dtype=np.int64),
             claimed=0,
             whole=0,
         )
@@ -99,7 +95,6 @@ class Extents:
         before = columns["extents"].copy()
         self._stretch(belief, scan, segments, used, rows)
         self._note_whole(before, segments, used, rows)
-        self._uncover(belief, segments, owners, used, rows)
         observations, last_seen, extents = (columns[name] for name in ("observations", "last_seen", "extents"))
         observations[np.unique(rows)] += 1
         observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)
@@ -107,7 +102,7 @@ class Extents:
         self._weigh(belief, scan, segments, owners)
         stale = self._scans - last_seen > self._config.patience_steps
         shaky = stale & (observations < self._config.trusted_observations)
-        shaky |= (columns["claimed"] >= self._config.claims) & (observations < self._config.established_observations)
+        shaky |= (columns["claimed"] >= self._config.claims) & (observations < ESTABLISHED)
         return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < self._config.least_m)]
 
     def _note_whole(
@@ -129,7 +124,7 @@ class Extents:
         walls = self.map(belief, np.zeros(len(self._records), dtype=bool))
         near = np.flatnonzero(walls.distances_m < scan.range_max_m)
         anchors, means = belief.anchors[near], belief.means[near]
-        lines = ray_evidence(scan, belief.pose_world, anchors, means, self._config.pass_margin_m)
+        lines = ray_evidence(scan, belief.pose_world, anchors, means, self._config.end_margin_m)
         self._note_claims(near, lines, owners_of_beams(segments, owners, len(scan.bearings_rad)))
         self._cut_back(near, lines)
 
@@ -204,37 +199,6 @@ class Extents:
                 if beyond > 0 or (sharper and -beyond < spacing[row, side]):
                     extents[row, side] = along[k, side]
                     spacing[row, side] = apart[k, side]
-
-    def _uncover(
-        self,
-        belief: Belief,
-        segments: Segments,
-        owners: Int[np.ndarray, " s"],
-        used: Int[np.ndarray, " m"],
-        rows: Int[np.ndarray, " m"],
-    ) -> None:
-        """Move an end back to the corner that scan after scan shows before it, if another wall runs on from there.
-
-        From afar a wall that turns by a few degrees is taken for one straight wall, and so reaches past the corner.
-        """
-        extents, spacing, seen_over = (self._records.columns[name] for name in ("extents", "spacing", "overlaid"))
-        ends_world = to_world(segments.ends, belief.pose_world)
-        t, anchors = directions(belief.means[rows, 0]), belief.anchors[rows]
-        is_corner = segments.end_kinds == EndKind.CORNER
-        margin = self._config.end_margin_m
-        for side, outward in enumerate((-1, 1)):
-            after = (used + outward) % len(segments)
-            corner, far = (np.vecdot(ends_world[k, side] - anchors, t) for k in (used, after))
-            end = extents[rows, side]
-            runs_on = is_corner[used, side] & is_corner[after, 1 - side] & (outward * (far - end) > -margin)
-            others = (owners[after] >= 0) & (owners[after] != owners[used])
-            overlaid = runs_on & others & (outward * (end - corner) > margin)
-            scans = seen_over[rows, side] + 1
-            seen_over[rows, side] = 0
-            seen_over[rows[overlaid], side] = scans[overlaid]
-            due = overlaid & (scans >= self._config.contradictions)
-            extents[rows[due], side] = corner[due]
-            spacing[rows[due], side] = margin
 
 
 def _kept_piece(

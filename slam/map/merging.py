@@ -24,10 +24,9 @@ class MergingConfig:
     """Largest difference in direction; the other face of a wall differs by pi."""
     across_m: float = 0.05
     """Largest distance of the shorter one from the other's line, at both its ends: a wall's thickness or a niche is
-    0.1 m deep, however little is known about where the two stand."""
-    overlap_m: float = 0.05
-    """Along the line they overlap by at least this: two rooms' walls on one line stand 0.1 m apart, and where the robot
-    sees nothing but such walls it knows its place along them, and so their ends, to a few centimetres only."""
+    0.1 m deep, however little is known about where the two stand. And the least by which they overlap along it: two
+    rooms' walls on one line stand 0.1 m apart, and where the robot sees nothing but such walls it knows its place along
+    them, and so their ends, to a few centimetres only."""
     turn_sigma_rad: float = float(np.deg2rad(1.0))
     """The turn from one to the other is known to this, sigma: the direction of half a metre seen twice is known to a
     degree or two, and a wall that turns by as much would be made straight for good."""
@@ -97,7 +96,7 @@ def lying_along(
     along = np.vecdot(off, directions(alpha[longer])[:, None])
     # By so much one would have to slide until they part: their overlap, or more where one lies amid the other.
     overlap = np.minimum(length[longer] - along[:, 0], along[:, 1])
-    found = (across <= config.across_m) & (overlap >= config.overlap_m)
+    found = (across <= config.across_m) & (overlap >= config.across_m)
     hidden = (across <= config.hidden_m) & (length[shorter] >= config.hidden_overlap_m)
     hidden &= overlap >= np.maximum(config.hidden_overlap_m, config.hidden_share * length[shorter])
     return walls.ids[np.stack([older, younger], axis=-1)[found]], hidden[found]

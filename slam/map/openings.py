@@ -20,10 +20,9 @@ from .stochastic_map import StochasticMap
 class OpeningsConfig:
     """When a gap counts as passed."""
 
-    least_m: float = 0.15
-    """Narrower gaps are not watched: ends are known no better. Nor are those that no chain would join."""
     beyond_m: float = 0.15
-    """A beam passes a gap if it goes on this far beyond it, ..."""
+    """A beam passes a gap if it goes on this far beyond it, ... Narrower gaps are not watched, since ends are known no
+    better; nor are those that no chain would join."""
     margin_m: float = 0.04
     """... this far from the two ends."""
     beams: int = 2
@@ -61,7 +60,7 @@ class Openings:
         is_near = (width <= widest_m) & ~np.eye(len(rows), dtype=bool)
         is_near &= np.hypot(*(heads - pose[:2]).T)[:, None] < scan.range_max_m
         pairs = np.argwhere(is_near)
-        gaps = pairs[width[tuple(pairs.T)] > config.least_m]
+        gaps = pairs[width[tuple(pairs.T)] > config.beyond_m]
         if len(gaps):
             through = passing(heads[gaps[:, 0]], tails[gaps[:, 1]], pose, scan, config.beyond_m, config.margin_m)
             self.passed.update(self._pairs(walls.ids[rows], gaps, through))

@@ -30,8 +30,6 @@ class ReliabilityConfig:
     few_heading_rad: float = float(np.deg2rad(1.0))
     """The same for a segment of fewer than five beams: along a wall seen at a grazing angle they are as good as they
     say, above this they hold beams of other walls too often."""
-    crooked_m: float = 1.0
-    """A shorter piece of a crooked wall moves nothing even where no other wall is in sight."""
     excess: float = 1.2
     """Chi-square over degrees of freedom of all fits: misfits of 0.45 times the noise. Smaller ones any real wall shows
     over thousands of beams."""
@@ -139,7 +137,7 @@ class Reliability:
     def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
         """Return which segments of one scan, each on the wall of that id, may move the estimate.
 
-        Where nothing else would, a long crooked wall does: it bends by a degree or two, which the wheels lose in 0.2 m.
+        Where nothing else would, a crooked wall does: it bends by a degree or two, which the wheels lose in 0.2 m.
 
         A few beams tell where the robot stands, not where the wall does: its clear observations together know its
         direction better. Three beams from one wall's corner over the next to a third are a line, known to 0.1 degrees
@@ -149,10 +147,9 @@ class Reliability:
         crooked = self.are_crooked(ids)
         rows = self._records.rows(ids)
         few &= self._records.columns["directions"][rows, 1, 0] * segments.cov[:, 0, 0] > 1.0
-        told = are_clear(segments, self._config) | few
-        if (told & ~crooked).any():
-            return told & ~crooked
-        return told & (segments.lengths_m >= self._config.crooked_m)
+        clear = are_clear(segments, self._config)
+        straight = (clear | few) & ~crooked
+        return straight if straight.any() else clear
 
     def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return which walls are surely not straight: by their fits, or by what vague and clear observations say."""

@@ -9,6 +9,9 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.backend import POSE, Belief, Joint
 from ..geometry.lines import directions, distance_to_segments, normals
 
+ESTABLISHED = 10
+"""A wall seen this often outlives one scan that speaks against it, and may be the side of a bend."""
+
 
 @dataclass(frozen=True)
 class StochasticMap:
@@ -48,6 +51,11 @@ class StochasticMap:
             return replace(joint, cov=cov)
 
         return replace(self, belief=replace(belief, query=query))
+
+    @property
+    def established(self) -> Bool[np.ndarray, " n"]:
+        """Walls that were seen often."""
+        return self.observations >= ESTABLISHED
 
     @property
     def ids(self) -> Int[np.ndarray, " n"]:

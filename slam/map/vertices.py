@@ -35,9 +35,6 @@ class VerticesConfig:
     step."""
     beside_m: float = 0.08
     """Distance across a segment within which a bend lies on it."""
-    known: float = 0.9999
-    """Probability level at which the two walls are not one line: in a straight building two pieces of one wall may
-    stand in the map for a while."""
     cut_reach_m: float = 0.5
     """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
     met either of them near the bend."""
@@ -47,10 +44,6 @@ class VerticesConfig:
     """The same for a bend that a scan shows: a beam of the other side was taken in, at 4 m one in 0.13 m."""
     sharpest_rad: float = float(np.deg2rad(30.0))
     """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
-    young_observations: int = 10
-    """A wall seen this often is not forgotten for a bend that one scan shows: all scans together tell."""
-    shown: float = 0.99
-    """Probability level at which two neighbours in a scan turn: that they are two, the cut between them tells, too."""
     past_m: float = 0.05
     """Ends are known no better: a segment goes on at least so far on both sides of a bend, and walls that overlap by
     less do not."""
@@ -59,12 +52,15 @@ class VerticesConfig:
 def vertices_within(
     segments: Segments,
     walls: StochasticMap,
+    one_wall: float,
     config: VerticesConfig = VerticesConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> Float[np.ndarray, " b"]:
     """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief.
 
-    `cut` are pairs of ids, the lower first, of which it is known that they are two walls (`change_points`).
+    At the probability level `one_wall` the two sides are not one line: in a straight building two pieces of one wall
+    may stand in the map for a while. `cut` are pairs of ids, the lower first, of which it is known that they are two
+    walls (`change_points`).
     """
     if not len(segments):
         return np.zeros(0)
@@ -77,24 +73,25 @@ def vertices_within(
     length = segments.lengths_m
     on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
     on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
-    found = points[_are_known(bends, on.any(axis=1), walls, config)]
+    found = points[_are_known(bends, on.any(axis=1), walls, one_wall)]
     return np.arctan2(found[:, 1], found[:, 0])
 
 
 def meetings(
     walls: StochasticMap,
     range_m: float,
+    one_wall: float,
     config: VerticesConfig = VerticesConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> tuple[Int[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
     """Return ids of walls that overlap, before and after a bend, and how far along each from its anchor they meet, m.
 
-    Within `range_m` of the robot; `cut` as above.
+    Within `range_m` of the robot; `one_wall` and `cut` as above.
     """
     bends = _bends(walls, range_m, config, cut)
     slight = (bends.turn_rad > config.least_rad) & (bends.turn_rad < config.slight_rad)
     asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
-    known = _are_known(bends, asked, walls, config)
+    known = _are_known(bends, asked, walls, one_wall)
     rows = bends.rows[known]
     from_anchor = bends.points_world[known][:, None] - walls.belief.anchors[rows]
     along = np.vecdot(from_anchor, directions(walls.belief.means[rows, 0]))
@@ -114,9 +111,11 @@ def laid_across(
 
 
 def mistaken(
-    segments: Segments, walls: StochasticMap, config: VerticesConfig = VerticesConfig()
+    segments: Segments, walls: StochasticMap, gate: float, config: VerticesConfig = VerticesConfig()
 ) -> Int[np.ndarray, " n"]:
     """Return the ids of walls laid across a bend that this scan shows, and few scans before it.
+
+    Two neighbours in it turn, at the probability level `gate`: that they are two, the cut between them tells, too.
 
     From 4 m the sides of a bend of a few degrees are one line of eight beams; from a step nearer they are two, and the
     clearer of them passes every gate of that line and turns the robot by half the bend.
@@ -126,13 +125,13 @@ def mistaken(
     variance = segments.cov[:, 0, 0] + segments.cov[after, 0, 0]
     between = segments.ends[after, 0] - segments.ends[:, 1]
     shown = ~segments.is_tentative & ~segments.is_tentative[after] & (np.abs(turn) < config.sharpest_rad)
-    shown &= (turn**2 > gate_level(config.shown, 1) * variance) & (np.linalg.norm(between, axis=1) < config.cut_reach_m)
+    shown &= (turn**2 > gate_level(gate, 1) * variance) & (np.linalg.norm(between, axis=1) < config.cut_reach_m)
     before = np.flatnonzero(shown)
     pose = walls.belief.pose_world
     points = to_world(segments.ends[before, 1] + 0.5 * between[before], pose)
     alpha = segments.lines[before, 0] + pose[2] + 0.5 * turn[before]
     laid = _across(walls, points, alpha, config.past_shown_m, config).any(axis=0)
-    return walls.ids[laid & (walls.observations < config.young_observations)]
+    return walls.ids[laid & ~walls.established]
 
 
 def _across(
@@ -170,7 +169,7 @@ class _Vertices:
 
 
 def _are_known(
-    bends: _Vertices, asked: Bool[np.ndarray, " b"], walls: StochasticMap, config: VerticesConfig
+    bends: _Vertices, asked: Bool[np.ndarray, " b"], walls: StochasticMap, one_wall: float
 ) -> Bool[np.ndarray, " b"]:
     """Return which of the bends asked for lie between walls that are surely not one straight wall."""
     known = asked & bends.is_cut
@@ -178,7 +177,7 @@ def _are_known(
     if len(open_to_doubt):
         used, places = np.unique(bends.rows[open_to_doubt], return_inverse=True)
         joint = walls.belief.joint(walls.ids[used])
-        known[open_to_doubt] = [not same_line(joint.take(pair), config.known) for pair in places.reshape(-1, 2)]
+        known[open_to_doubt] = [not same_line(joint.take(pair), one_wall) for pair in places.reshape(-1, 2)]
     return known
 
 

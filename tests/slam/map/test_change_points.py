@@ -1,7 +1,5 @@
 """What the beams of many scans say of a bend that none of them shows, and what the map makes of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -125,17 +123,11 @@ def test_the_scan_cut_at_the_bend_has_a_side_before_and_one_after(heading):
     one, other = pieces.ends[[before, after]].mean(axis=1)
     assert one[0] * other[1] - one[1] * other[0] > 0, "counter-clockwise"
     assert change_points.sides_of(change_point, segments, pieces.take(np.array([0])), scan) is None
-    assert change_points.sides_of(replace(change_point, turn_rad=np.deg2rad(8.0)), segments, pieces, scan) is None, (
-        "not that turn"
-    )
 
 
-@pytest.mark.parametrize(
-    ("rules", "is_bend"), [(ChangePointsConfig(), False), (ChangePointsConfig(ends=0, least_beams=1), True)]
-)
-def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_bend):
+def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend():
     """In cml_Vipiteno2 44 beams of a wall of 7 m and one of a face of 0.1 m made a turn of 19 degrees of six sigmas."""
-    change_points, found = ChangePoints(rules), False
+    change_points, found = ChangePoints(), False
     poses = np.column_stack([np.linspace(1.0, 0.0, 60), np.full(60, -1.0), np.zeros(60)])
     for pose, scan in zip(poses, scans(bent(0.0), poses, np.random.default_rng(5), 0.0), strict=True):
         segments = extract(scan)
@@ -144,7 +136,7 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend(rules, is_be
         ranges[last] += 0.03
         taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
         found |= change_points.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
-    assert found == is_bend
+    assert not found
 
 
 @pytest.mark.parametrize(("turn_deg", "is_bend"), [(0.05, False), (0.1, False), (0.3, True), (8.0, True)])

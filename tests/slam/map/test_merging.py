@@ -50,7 +50,7 @@ def beside(alpha, at, along=0.0, across=0.0):
 def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, one, two, share, seed):
     """The pieces overlap; their lines are drawn with the errors that the covariance states."""
     rng = np.random.default_rng(seed)
-    along = share * (0.5 * (one + two) - CONFIG.overlap_m)
+    along = share * (0.5 * (one + two) - CONFIG.across_m)
     draw = rng.standard_normal((2, 2)) * [0.002, 0.003]
     draw = np.clip(draw, [-0.003, -0.005], [0.003, 0.005])
     lines = [(alpha + draw[0, 0], (x, y), one), (alpha + draw[1, 0], beside(alpha, (x, y), along, draw[1, 1]), two)]
@@ -148,7 +148,7 @@ def test_candidates_are_those_of_a_plain_loop():
             off = known.ends_world[short] - known.ends_world[long, 0]
             near = np.abs(off @ n).max() <= CONFIG.across_m
             apart = max((off @ t)[0] - lines[long][2], -(off @ t)[1])
-            if near and apart <= -CONFIG.overlap_m and np.cos(lines[i][0] - lines[j][0]) > np.cos(CONFIG.turn_rad):
+            if near and apart <= -CONFIG.across_m and np.cos(lines[i][0] - lines[j][0]) > np.cos(CONFIG.turn_rad):
                 plain.append((int(known.ids[i]), int(known.ids[j])))
     assert len(plain) > 5
     pairs, hidden = lying_along(known, touched, CONFIG)

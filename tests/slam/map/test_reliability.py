@@ -171,21 +171,19 @@ def test_few_beams_say_where_the_robot_is_only_beside_a_wall_of_known_direction(
     assert not reliability.may_move(observation(0.0, 0.03, beams=4), OWNER).any(), "above a degree other walls mix in"
     for _ in range(300):
         reliability.see(observation(0.0, 0.01, beams=12, chi2=20.0), OWNER, POSE)
-    assert not reliability.may_move(few, OWNER).any(), "of a crooked wall nothing short moves the estimate"
-    assert not reliability.may_move(observation(0.0, 0.02, beams=8, length_m=0.9), OWNER).any()
+    assert not reliability.may_move(few, OWNER).any(), "of a crooked wall few beams tell nothing"
 
 
-def test_a_long_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
+def test_a_crooked_wall_moves_the_estimate_only_where_nothing_else_does():
     """Refused, the only wall in sight cost 8 degrees of heading in 3.5 m; its bend is one."""
     reliability, straight = Reliability(), 1
     for _ in range(60):
         reliability.see(observation(0.0, 0.005, beams=30, chi2=80.0, length_m=3.0), OWNER, POSE)
         reliability.see(observation(0.0, 0.02, beams=8), np.array([straight]), POSE)
     assert reliability.are_crooked(np.array([0, straight])).tolist() == [True, False]
-    long, short = (observation(0.0, 0.005, beams=30, length_m=length) for length in (3.0, 0.5))
-    assert reliability.may_move(long, OWNER).tolist() == [True]
-    assert reliability.may_move(short, OWNER).tolist() == [False]
-    both = long.take(np.array([0, 0]))
+    seen = observation(0.0, 0.005, beams=30, length_m=3.0)
+    assert reliability.may_move(seen, OWNER).tolist() == [True]
+    both = seen.take(np.array([0, 0]))
     assert reliability.may_move(both, np.array([0, straight])).tolist() == [False, True]
 
 

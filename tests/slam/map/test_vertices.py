@@ -1,5 +1,7 @@
 """Bends that the map knows: which walls make one, and on which segments it lies."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,14 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, through
 from slam.geometry.poses import to_robot, to_world
+from slam.map import vertices
 from slam.map.stochastic_map import StochasticMap
-from slam.map.vertices import laid_across, meetings, mistaken, vertices_within
+from slam.map.vertices import laid_across
 
 POSE = np.array([1.0, 2.0, 0.7])
+vertices_within = partial(vertices.vertices_within, one_wall=0.9999)
+meetings = partial(vertices.meetings, one_wall=0.9999)
+mistaken = partial(vertices.mistaken, gate=0.99)
 
 
 def map_of(ends, sigma=1e-3):
