@@ -71,7 +71,7 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int) -> Iterator[Step]:
 
     Nobody plans, so nobody keeps the free floor.
     """
-    return _mission(robot, mapper, ReplayDriver(scans), None)
+    return _mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot)), None)
 
 
 def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:

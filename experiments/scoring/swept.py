@@ -54,7 +54,7 @@ class Floor:
     ) -> None:
         """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor.
 
-        One that is missing alone is not.
+        One that was lost is not (`Scan.shown_m`).
         """
         row, column = self._unseen_around(pose_world, range_max_m)
         dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
@@ -117,6 +117,10 @@ def swept(
     """Return the share of the visible floor that scans at these true poses of the body have seen."""
     target = visible_floor(world, config)
     floor = Floor(world.floor)
+    finder = RangeFinder(world.faces, config.lidar) if config.faults.dropout > 0.0 else None
     for pose, ranges in zip(scanner_poses(poses_world, config.true_scanner), ranges_m, strict=True):
+        if finder is not None:
+            # A beam that the scanner lost shows nothing, however many beside it are lost, too.
+            ranges = np.where(np.isposinf(ranges) & np.isfinite(finder.cast(pose)[0]), np.nan, ranges)
         floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
     return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)

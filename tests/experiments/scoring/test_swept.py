@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 from experiments.scoring.swept import CELL_M, Floor, swept, visible_floor
+from sim.faults import FaultsConfig
 from sim.lidar import RangeFinder
 from sim.robot import RobotConfig
 from sim.worlds import World
@@ -13,6 +14,7 @@ ROOM = shapely.Polygon(
     [(1.0, -2.0), (4.02, -2.0), (4.02, 0.01), (1.0, 0.01)], [[(2, -1), (2, -1.5), (3, -1.5), (3, -1)]]
 )
 POSE = np.array([1.5, -0.7, 0.4])
+LOSING = FaultsConfig(dropout=0.05)
 
 
 def cells():
@@ -49,6 +51,7 @@ def test_a_cell_is_seen_if_it_lies_before_the_return_of_its_nearest_beam(bearing
     rng = np.random.default_rng(2)
     ranges = rng.uniform(0.2, 2.0, len(bearings))
     ranges[::7], ranges[3::11], ranges[20:24] = np.nan, np.inf, np.inf
+    ranges[[19, 24]] = 0.9  # wide enough for a doorway: of narrower gaps tells tests/slam/test_scan.py
     floor = Floor(ROOM)
     floor.look(POSE, bearings, ranges, range_max_m)
     full = len(bearings) == 90
@@ -128,3 +131,18 @@ def test_a_scan_for_each_pose_or_none():
         swept(room, RobotConfig(), np.zeros((2, 3)), bearings, np.ones((3, 60)))
     with pytest.raises((ValueError, TypeError)):
         swept(room, RobotConfig(), np.zeros((3, 3)), bearings, np.ones((2, 60)))
+
+
+def test_beams_that_a_scanner_lost_show_nothing_however_many_are_lost_together():
+    """A pillar whose beams are all lost: without a fault they would show the floor behind it."""
+    world = World("room", ROOM, POSE, {})
+    finder = RangeFinder(world.faces, RobotConfig().lidar)
+    ranges = finder.cast(POSE)[0]
+    lost = np.where(ranges < 1.2, np.inf, ranges)
+    assert 20 < np.count_nonzero(np.isposinf(lost)) < 120
+    scores = [
+        swept(world, RobotConfig(faults=faults), POSE[None], finder.bearings_rad, each[None])
+        for faults, each in ((FaultsConfig(), lost), (LOSING, lost), (LOSING, np.where(ranges < 1.2, np.nan, ranges)))
+    ]
+    assert scores[0] > 1.2 * scores[1]
+    assert scores[1] == scores[2]

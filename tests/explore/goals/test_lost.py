@@ -7,6 +7,7 @@ import pytest
 
 from explore.goals.decider import Decision
 from explore.goals.lost import Lost, LostConfig
+from explore.goals.replay_driver import ReplayDriver
 from explore.outcome import Outcome
 from slam.robot import MotionCommand
 
@@ -60,3 +61,19 @@ def test_a_robot_that_stays_lost_fails_and_says_since_when():
     assert last.outcome is Outcome.FAILED
     assert last.words.startswith("lost at step 2")
     assert [decision.command is None for decision in decisions[:-1]] == [False] * 5
+
+
+@pytest.mark.parametrize(
+    ("lost", "outcome", "words"),
+    [
+        ([False, True, False, False], Outcome.RECORDING_ENDED, "the recording has ended"),
+        ([False, False, False, True], Outcome.RECORDING_ENDED, "lost since step 3"),
+        ([False, True, True, True], Outcome.FAILED, "lost at step 1"),
+    ],
+)
+def test_a_recording_that_ends_while_the_robot_is_lost_says_so(lost, outcome, words):
+    driver = ReplayDriver(len(lost), LostConfig(turns=3 * 10.0 / 360.0))
+    decisions = [driver.decide(Around(is_lost), (), nx.DiGraph()) for is_lost in lost]
+    assert all(decision.outcome is None for decision in decisions[:-1])
+    assert decisions[-1].outcome is outcome
+    assert words in decisions[-1].words
