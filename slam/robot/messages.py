@@ -11,8 +11,6 @@ from .spec import RobotError
 
 FEW_BEAMS, FEW_SHARE = 3, 0.1
 """More returns at exactly the maximum range than both of these are none."""
-SLIT_M = 0.2
-"""Beams without a return in a gap narrower than this m are lost ones: no door is so narrow."""
 UNEVEN = 0.05
 """Beams are evenly spaced where each step is the mean one to within this share of it."""
 
@@ -71,8 +69,13 @@ class Scan:
         time_s: float,
         sigma_share: float = 0.0,
         start_s: float = np.nan,
+        range_min_m: float = 0.0,
     ) -> "Scan":
-        """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first."""
+        """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first.
+
+        Returns below the scanner's minimum range tell nothing, and so does -inf: too near, as ROS drivers say it.
+        """
+        ranges_m = without_near(ranges_m, range_min_m)
         bearings = np.unwrap(bearings_rad)
         beams = np.arange(len(bearings))
         if len(bearings) > 1 and bearings[-1] < bearings[0]:
@@ -94,40 +97,15 @@ class Scan:
 
     @cached_property
     def shown_m(self) -> Float[np.ndarray, " k"]:
-        """How far each beam shows free floor, m; where returns are lost, the nearer of those beside the gap says.
+        """How far each beam shows free floor, m; where a return is missing alone, the nearer of its neighbours' says.
 
-        A return that is missing alone is lost, and so are neighbouring ones in a gap narrower than `SLIT_M`. 0 where
-        beams tell nothing.
+        0 where beams tell nothing.
         """
         before, after = self._beside
         lone = ~np.isfinite(self.ranges_m) & np.isfinite(np.maximum(before, after))
         free = np.where(np.isposinf(self.ranges_m), self.range_max_m, self.ranges_m)
         shown = np.where(lone, np.minimum(before, after), free)
-        missing = np.isposinf(self.ranges_m)
-        if np.any(missing & ~lone):
-            nearer, gap_rad = self._around_gaps
-            shown = np.where(missing & (nearer * gap_rad < SLIT_M), nearer, shown)
         return np.where(np.isnan(shown), 0.0, shown)
-
-    @property
-    def _around_gaps(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        """Return the nearer of the next returns to both sides of each beam, m, and the angle between these, rad.
-
-        Infinite where there is none to one side, as beyond the ends of less than a full turn.
-        """
-        k = len(self.ranges_m)
-        if self.is_full_turn:
-            ranges, index, first = np.tile(self.ranges_m, 3), np.arange(3 * k), k
-        else:
-            ranges, index, first = self.ranges_m, np.arange(k), 0
-        found = np.isfinite(ranges)
-        here = slice(first, first + k)
-        before = np.maximum.accumulate(np.where(found, index, -1))[here]
-        after = np.minimum.accumulate(np.where(found, index, len(index))[::-1])[::-1][here]
-        between = (before >= 0) & (after < len(index))
-        nearer = np.minimum(ranges[before], ranges[np.minimum(after, len(index) - 1)])
-        gap_rad = (after - before) * self.step_rad
-        return np.where(between, nearer, np.inf), np.where(between, gap_rad, np.inf)
 
     @cached_property
     def _beside(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
@@ -153,6 +131,12 @@ class Scan:
     def is_full_turn(self) -> bool:
         """Whether the first beam follows the last one (a 360 degree scanner)."""
         return bool(len(self.bearings_rad) * self.step_rad > 2 * np.pi - 0.5 * self.step_rad)
+
+
+def without_near(ranges_m: Float[np.ndarray, " k"], range_min_m: float) -> Float[np.ndarray, " k"]:
+    """Return ranges m, NaN for those below the scanner's minimum range and for -inf."""
+    near = np.isneginf(ranges_m) | (ranges_m < range_min_m)
+    return np.where(near, np.nan, ranges_m) if near.any() else ranges_m
 
 
 def _check_bearings(bearings_rad: Float[np.ndarray, " k"], count: int) -> None:

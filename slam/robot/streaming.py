@@ -1,14 +1,14 @@
 """A robot that streams, made into one that steps: scans come by the clock, motion goes on until it is stopped."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from ..geometry.poses import inverse, wrap
-from .messages import MotionCommand, Odometry, Scan
+from .messages import MotionCommand, Odometry, Scan, without_near
 from .spec import RobotError
 
 KNOTS = 9
@@ -37,6 +37,10 @@ class TimedScan:
     """When the first beam was taken, on the robot's clock."""
     end_s: float
     """When the last one was."""
+    range_min_m: float = 0.0
+    """Returns below this tell nothing."""
+    sigma_share: float = 0.0
+    """As in `Scan`: standard deviation as a share of the range, beside `sigma_m`."""
 
 
 @dataclass(frozen=True)
@@ -133,8 +137,9 @@ def de_skewed(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> 
     Each return is carried along with the motion from its own time to the end; a range between two of one face lies on
     the chord between them. Raises RobotError for what no scan is.
     """
-    taken = (scan.sigma_m, scan.range_max_m, scan.end_s)
-    as_taken = Scan.ordered(scan.bearings_rad, scan.ranges_m, *taken, start_s=scan.start_s)
+    scan = replace(scan, ranges_m=without_near(scan.ranges_m, scan.range_min_m))
+    taken = (scan.sigma_m, scan.range_max_m, scan.end_s, scan.sigma_share, scan.start_s)
+    as_taken = Scan.ordered(scan.bearings_rad, scan.ranges_m, *taken)
     places = _places(scan, odometry)
     if np.abs(places).max() < AT_REST:
         return as_taken
@@ -145,7 +150,7 @@ def de_skewed(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> 
     ranges = np.full(len(as_taken.bearings_rad), np.nan)
     if known.any():
         ranges = _seen_from_the_end(points[known], np.isposinf(scan.ranges_m[known]), as_taken)
-    return Scan(as_taken.bearings_rad, ranges, *taken, start_s=scan.start_s)
+    return Scan(as_taken.bearings_rad, ranges, *taken)
 
 
 def _places(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> Float[np.ndarray, "k 3"]:

@@ -8,33 +8,15 @@ from hypothesis import strategies as st
 from slam.backends import BACKENDS, BackendOptions
 from slam.mapper import Mapper
 from slam.robot import Odometry, RobotError, Scan
-from slam.robot.messages import SLIT_M
 
 FULL = np.linspace(-np.pi, np.pi, 12, endpoint=False)
 PART = np.linspace(-1.0, 1.0, 12)
-A_RANGE = st.one_of(st.just(np.inf), st.just(np.nan), st.floats(0.1, 3.9), st.floats(0.02, 0.2))
+A_RANGE = st.one_of(st.just(np.inf), st.just(np.nan), st.floats(0.1, 3.9))
 
 
 def around(ranges, k, full):
     """The beams before and after one; beyond the last of less than a full turn nothing contradicts."""
     return [ranges[n % 12] if full or 0 <= n < 12 else np.inf for n in (k - 1, k + 1)]
-
-
-def around_gap(ranges, k, full):
-    """Beams from the last return before a beam to the next one after it, and both; None where there is none."""
-    found = []
-    for way in (-1, 1):
-        for beams in range(1, 13):
-            n = k + way * beams
-            if not full and not 0 <= n < 12:
-                return None
-            if np.isfinite(ranges[n % 12]):
-                found.append((beams, ranges[n % 12]))
-                break
-        else:
-            return None
-    (before, one), (after, other) = found
-    return before + after, one, other
 
 
 @given(st.lists(A_RANGE, min_size=12, max_size=12), st.booleans())
@@ -47,11 +29,8 @@ def test_free_space_is_told_by_returns_and_by_beams_whose_neighbours_have_none_e
             assert scan.passed_m[k] == scan.shown_m[k] == here
             continue
         assert scan.passed_m[k] == (4.0 if here == np.inf and beside == [np.inf, np.inf] else 0.0)
-        gap = around_gap(ranges, k, full)
         if np.isfinite(beside).all():
             assert scan.shown_m[k] == min(beside)
-        elif here == np.inf and gap is not None and min(gap[1:]) * gap[0] * scan.step_rad < SLIT_M:
-            assert scan.shown_m[k] == min(gap[1:])
         else:
             assert scan.shown_m[k] == (4.0 if here == np.inf else 0.0)
 
@@ -139,11 +118,12 @@ def test_odometry_that_states_no_error_is_refused_before_anything_is_believed():
         Odometry(np.array([0.1, np.nan, 0.0]), np.eye(3))
 
 
-@pytest.mark.parametrize(("lost", "shown_m"), [(1, 2.0), (2, 2.0), (3, 2.0), (9, 4.0)])
-@pytest.mark.parametrize("first", [100, 540])
-def test_beams_lost_beside_each_other_show_no_floor_behind_a_wall_and_a_doorway_does(lost, shown_m, first):
-    ranges = np.full(541, 2.0)
-    ranges[(first + np.arange(lost)) % 541] = np.inf
-    scan = Scan(np.linspace(-np.pi, np.pi, 541, endpoint=False), ranges, 0.01, 4.0, 0.0)
-    assert set(scan.shown_m[np.isposinf(ranges)]) == {shown_m}
-    assert set(scan.shown_m[np.isfinite(ranges)]) == {2.0}
+def test_returns_below_the_minimum_range_tell_nothing():
+    """As ROS drivers say it (REP 117): -inf is too near, and so is any number below the minimum."""
+    ranges = np.where(np.arange(12) == 3, 0.04, RANGES)
+    ranges[[5, 7]] = 0.0, -np.inf
+    scan = Scan.ordered(FULL, ranges, 0.01, 4.0, 0.0, range_min_m=0.05)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(scan.ranges_m)), [3, 5, 7])
+    np.testing.assert_array_equal(scan.ranges_m[~np.isnan(scan.ranges_m)], np.delete(RANGES, [3, 5, 7]))
+    with pytest.raises(RobotError, match="1 of 12 at 0"):
+        Scan.ordered(FULL, np.where(np.arange(12) == 5, 0.0, RANGES), 0.01, 4.0, 0.0)

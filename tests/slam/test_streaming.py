@@ -171,3 +171,13 @@ def test_what_is_no_scan_is_refused():
     with pytest.raises(RobotError, match="at 0 or below"):
         de_skewed(zeros, robot.odometry)
     assert isinstance(de_skewed(taken, robot.odometry), Scan)
+
+
+def test_a_scan_of_a_streaming_robot_keeps_its_times_its_noise_and_its_minimum_range():
+    ranges = np.where(np.arange(360) < 20, 0.05, 2.0)
+    taken = TimedScan(BEARINGS, ranges, 0.01, 8.0, 3.0, 3.1, range_min_m=0.1, sigma_share=0.02)
+    for motion in (np.zeros(3), np.array([0.02, 0.0, 0.01])):
+        scan = de_skewed(taken, lambda from_s, to_s, motion=motion: Odometry((to_s - from_s) / 0.1 * motion, COV))
+        assert (scan.start_s, scan.time_s, scan.sigma_share) == (3.0, 3.1, 0.02)
+        assert np.isnan(scan.ranges_m[5:15]).all()
+        assert np.isfinite(scan.ranges_m[30:-30]).all()
