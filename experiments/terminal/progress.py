@@ -170,13 +170,13 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
     table = Table(title=title, title_justify="left")
     columns = {
         "pose ANEES": "pose_anees",
-        "in band": "pose_nees_in_band",
+        "NEES in 95 % band": "pose_nees_in_band",
         "map ANEES": "map_anees",
-        "pose m": "pose_rmse_m",
-        "heading rad": "heading_rmse_rad",
+        "pose error m": "pose_rmse_m",
+        "heading error rad": "heading_rmse_rad",
         "lines": "lines",
-        "double": "duplicate_lines",
-        "false": "false_matches",
+        "duplicate walls": "duplicate_lines",
+        "false matches": "false_matches",
         "computing ms a step": "step_ms",
     }
     table.add_column("", no_wrap=True)

@@ -146,7 +146,7 @@ def _answer(name: str, summary: dict[str, Any]) -> str:
     if summary.get("coverage") is not None:
         words += f" {percent(summary['coverage'])} % of the reachable contour mapped;"
     if summary.get("pose_rmse_m") is None:
-        return f"{words} {summary['lines']} walls, {number(summary['duplicate_lines'])} of them twice."
+        return f"{words} {summary['lines']} walls, {number(summary['duplicate_lines'])} of them duplicates."
     words += f" the pose {_told(summary['pose_rmse_m'], 100.0)} cm off (rms)"
     if summary.get("pose_anees") is None:
         return f"{words}."
@@ -156,7 +156,13 @@ def _answer(name: str, summary: dict[str, Any]) -> str:
 def _honest(anees: float) -> str:
     """Return what the ANEES of one run says; those of an ideal filter scatter by a factor of two or three."""
     low, high = 0.2, 3.0
-    return "more than it thinks" if anees > high else "less than it thinks" if anees < low else "about as it thinks"
+    return (
+        "more than it states"
+        if anees > high
+        else "less than it states"
+        if anees < low
+        else "about as much as it states"
+    )
 
 
 def _told(value: Any, scale: float) -> str:

@@ -27,7 +27,7 @@ class ReplayDriver:
         elif self._lost_since < 0:
             self._lost_since = self._step
         if self._step + 1 < self._scans:
-            return Decision(MotionCommand(0.0, 0.0), "riding along")
+            return Decision(MotionCommand(0.0, 0.0), "replaying")
         if self._lost_since < 0:
             return Decision(None, "the recording has ended", outcome=Outcome.RECORDING_ENDED)
         if self._step + 1 - self._lost_since >= self._lost.steps:

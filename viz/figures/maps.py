@@ -196,7 +196,7 @@ def _walls(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     for row in np.flatnonzero(picture.map.crooked):
         axes.plot(*ends[row].T, color=palette.CROOKED, linewidth=3.4, solid_capstyle="round", zorder=4.2)
     if picture.map.crooked.any():
-        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="crooked: not to be relied on"))
+        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="not straight (crooked): unreliable"))
     handles.append(_marker("o", palette.PAGE, palette.INK, 4, "corner"))
     return handles
 
