@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.backend import Joint, Observations
+from ..geometry.matrix_kernels import whitening
 from ..geometry.poses import rotation
 from ..robot import Odometry
 from .joint_compatibility import NO_NIS, Nis, seen_halfway
@@ -51,12 +52,12 @@ def surprise(
     """
     if not len(observed.ids):
         return NO_NIS, None
-    seen, model = seen_halfway(joint, ids, observed)
-    HG = model.H_pose.reshape(-1, 3) @ motion_root
-    weighted = np.linalg.solve(seen.S, np.column_stack([seen.e, HG]))
-    a, axes = np.linalg.eigh(HG.T @ weighted[:, 1:])
-    innovation = MotionInnovation(np.clip(a, 0.0, 1.0), axes.T @ (HG.T @ weighted[:, 0]))
-    return Nis(float(seen.e @ weighted[:, 0]), len(seen.e)), innovation
+    seen = seen_halfway(joint, ids, observed)
+    W = whitening(seen.S)
+    e, HG = W @ seen.e, W @ (seen.H_pose.reshape(-1, 3) @ motion_root)
+    a, axes = np.linalg.eigh(HG.T @ HG)
+    innovation = MotionInnovation(np.clip(a, 0.0, 1.0), axes.T @ (HG.T @ e))
+    return Nis(float(e @ e), len(e)), innovation
 
 
 def motion_root(odometry: Odometry, heading_rad: float) -> Float[np.ndarray, "3 3"]:

@@ -16,7 +16,8 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions, normals, segment_distances
 from ..geometry.poses import to_world
 from .joint_compatibility import relocate
-from .matching import KnownWalls, Matches, MatchingConfig, pair_distances
+from .kernels.joint_kernels import pair_distances
+from .matching import KnownWalls, Matches, MatchingConfig
 
 
 def match_alone(
@@ -35,7 +36,8 @@ def match_alone(
     segment, line = np.divmod(np.arange(count * lines), max(lines, 1))
     pose, means, anchors = joint.mean[:POSE], joint.mean[POSE:].reshape(-1, 2), joint.anchors
     seen = innovations(pose, anchors[line], means[line], segments.lines[segment], segments.cov[segment])
-    d2 = pair_distances(seen, line, joint).reshape(count, lines)
+    cov = np.ascontiguousarray(joint.cov)
+    d2 = pair_distances(seen.e, seen.H_pose, seen.H_line, seen.R, line, cov).reshape(count, lines)
     apart = segment_distances(to_world(segments.ends, pose), _ends_world(walls.extents, anchors, means))
     passes = (d2 <= gate_level(config.gate, 2)) & (apart <= config.apart_m)
     matched = passes.any(axis=1)

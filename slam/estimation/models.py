@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from ..geometry.lines import directions, normals
 from ..geometry.poses import J, compose, rotation, wrap
 from .backend import POSE
+from .kernels import innovation_rows, turn_halfway
 
 
 @dataclass(frozen=True)
@@ -84,31 +85,8 @@ def innovations(
 
     e and R are those of the estimate; H is taken at the robot's `position` and the lines' directions `alpha` if given.
     """
-    m = len(lines)
-    n = normals(means[:, 0])
-    to_anchor = anchors - pose_world[:2]
-    r_predicted = means[:, 1] + np.vecdot(n, to_anchor)
-    epsilon = wrap(lines[:, 0] - (means[:, 0] - pose_world[2]))
-    t0 = cov[:, 0, 1] / cov[:, 0, 0]
-    cosine, sine = np.cos(epsilon), np.sin(epsilon)
-    r = lines[:, 1]
-    along = _along(lines, cov, epsilon)
-
-    e = np.empty((m, 2))
-    e[:, 0], e[:, 1] = epsilon, r * cosine - t0 * sine - r_predicted
-    if alpha is not None:
-        n = normals(alpha)
-    if position is not None:
-        to_anchor = anchors - position
-    H_pose, H_line, R = np.zeros((m, 2, 3)), np.zeros((m, 2, 2)), np.zeros((m, 2, 2))
-    H_pose[:, 0, 2] = -1.0
-    np.negative(n, out=H_pose[:, 1, :2])
-    H_pose[:, 1, 2] = along
-    H_line[:, 0, 0] = H_line[:, 1, 1] = 1.0
-    H_line[:, 1, 0] = n[:, 0] * to_anchor[:, 1] - n[:, 1] * to_anchor[:, 0] - along
-    R[:, 0, 0] = cov[:, 0, 0]
-    R[:, 1, 1] = (cov[:, 1, 1] - cov[:, 0, 1] * t0) * (cosine - t0 * sine / r) ** 2
-    return Innovations(e, H_pose, H_line, R)
+    at, along = pose_world[:2] if position is None else position, means[:, 0] if alpha is None else alpha
+    return Innovations(*innovation_rows(pose_world, anchors, means, lines, cov, at, np.ascontiguousarray(along)))
 
 
 def halfway(
@@ -122,18 +100,9 @@ def halfway(
     How far off a line lies is bent in the heading: after an odometry error of 5 degrees a wall 2 m away lies 7 mm
     off the tangent at the estimate, and 0.1 mm off this one.
     """
-    less = _along(lines, cov, model.e[:, 0] - 0.5 * turn) - model.H_pose[:, 1, 2]
     H_pose, H_line = model.H_pose.copy(), model.H_line.copy()
-    H_pose[:, 1, 2] += less
-    H_line[:, 1, 0] -= less
+    turn_halfway(model.e, H_pose, H_line, lines, cov, turn)
     return Innovations(model.e, H_pose, H_line, model.R)
-
-
-def _along(
-    lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], epsilon: Float[np.ndarray, " m"]
-) -> Float[np.ndarray, " m"]:
-    """Return where the centres of seen pieces lie along lines turned by `epsilon` from them."""
-    return lines[:, 1] * np.sin(epsilon) + cov[:, 0, 1] / cov[:, 0, 0] * np.cos(epsilon)
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,11 @@ OPTIONS = (
     "filterwarnings=ignore::pytest.PytestAssertRewriteWarning",
 )
 NEAR = {
-    "matching": "gate matching hypotheses joint_compatibility",
-    "hypotheses": "gate hypotheses matching",
-    "joint_compatibility": "gate joint_compatibility matching hypotheses",
+    "candidate_kernels": "gate matching",
+    "joint_kernels": "gate matching",
+    "matching_kernels": "gate matching hypotheses joint_compatibility",
+    "hypothesis_kernels": "gate hypotheses matching",
+    "rest_kernels": "gate hypotheses matching joint_compatibility",
     "mapper": "mapper matching bend vertices change_points candidates merge reliability",
     "vertices": "bend vertices change_points mapper",
     "change_points": "change_points",

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numba import config
 
 MARKS = "«»"
 """Around the expression that is the rule."""
@@ -147,4 +148,6 @@ def install(switches: Iterable[Switch]) -> None:
     if early:
         raise RuntimeError(f"expected no module with switches to be loaded yet, found {sorted(early)}")
     builtins.rule_switch = STATE.value  # type: ignore[attr-defined]
+    # A rule within a compiled loop is switched in the loop that it is made of.
+    config.DISABLE_JIT = True  # type: ignore[attr-defined]
     sys.meta_path.insert(0, _Finder(chosen))

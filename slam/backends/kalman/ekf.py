@@ -202,7 +202,7 @@ class Ekf(Generic[M]):
         m, query = self._map, partial(self._query, self._version)
         if self._frame is None:
             return Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, query)
-        pose = self._frame.joint_world(m.joint(np.zeros(0, dtype=np.int64)))
+        pose = self._frame.joint_world(Joint(m.pose_world, m.pose_cov, m.anchors[:0]))
         anchors, means = self._frame.anchors_world(m.anchors), self._frame.means_world(m.means)
         return Belief(pose.mean, pose.cov, m.ids, anchors, means, query)
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from slam.association.hypotheses import agree
-from slam.association.joint_compatibility import JointObservations, compatible
+from slam.association.kernels.hypothesis_kernels import agree
+from slam.association.kernels.rest_kernels import compatible
 from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
+from slam.estimation.gates import gate_level, pair_levels
 from slam.extraction.segments import Segments
 
 SURE = np.zeros(1, bool)
@@ -46,11 +47,11 @@ def test_a_segment_beyond_the_level_of_two_degrees_of_freedom_is_refused(share, 
 @pytest.mark.parametrize(("share", "kept"), [(0.98, 2), (1.02, 1), (1.2, 1)])
 def test_of_two_observations_the_one_beyond_that_level_is_dropped(share, kept):
     e = np.array([0.0, 0.0, np.sqrt(share * LEVEL), 0.0])
-    both = JointObservations(e, np.zeros((3, 4)), np.eye(4))
-    assert len(compatible(both, 0.99, 0.999999)) == kept
+    two, level = np.array([0, 1]), gate_level(0.99, 2)
+    assert len(compatible(two, e, np.eye(4), level, pair_levels(0.999999, 2))) == kept
     begins = np.array([True, False])
-    agreed = agree(np.array([0, 1]), np.array([0, 1]), both, begins, 0.99, 0.999999, 0.1)
-    assert len(agreed.pairs) == kept
+    pairs, _ = agree(two, two, e, np.eye(4), begins, level, gate_level(0.999999, 2), 0.1)
+    assert len(pairs) == kept
 
 
 def test_what_pose_and_wall_share_makes_no_gate_wider():
@@ -130,5 +131,6 @@ def test_observations_of_which_each_passes_are_dropped_until_all_together_do(squ
     count = 16
     e = np.tile([np.sqrt(squared), 0.0], count)
     within = [k for k in range(2, count + 1) if k * squared <= chi2.ppf(0.999999, 2 * k)]
-    kept = compatible(JointObservations(e, np.zeros((3, 2 * count)), np.eye(2 * count)), 0.99, 0.999999)
+    levels = gate_level(0.99, 2), pair_levels(0.999999, count)
+    kept = compatible(np.arange(count), e, np.eye(2 * count), *levels)
     assert len(kept) == max(within)

@@ -1,17 +1,30 @@
 """Which pairs agree: against brute force, and where the wheels slip by as much as a wall bends."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 import shapely
 from scipy.stats import multivariate_normal
 
-from slam.association.hypotheses import agree, nearest_alone
-from slam.association.joint_compatibility import JointObservations
+from slam.association.kernels.hypothesis_kernels import agree
+from slam.association.kernels.rest_kernels import compatible, nearest_alone
 from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
 from slam.estimation.gates import gate_level
 from slam.robot import Odometry
 from tests.slam.association.test_matching import Walker, faces_of, straight_pieces
+
+
+class Together(NamedTuple):
+    """What m observations differ by from what is predicted of them, and its covariance."""
+
+    e: np.ndarray
+    S: np.ndarray
+
+    def take(self, rows):
+        at = (2 * rows[:, None] + np.arange(2)).ravel()
+        return Together(self.e[at], self.S[at[:, None], at])
 
 
 def observations(rng, segment, noise=0.3):
@@ -20,7 +33,7 @@ def observations(rng, segment, noise=0.3):
     H = rng.standard_normal((2 * count, 3))
     S = H @ np.diag([1.0, 0.5, 0.2]) @ H.T + noise * np.eye(2 * count)
     e = np.linalg.cholesky(S) @ rng.standard_normal(2 * count) + rng.choice([0.0, 3.0], 2 * count)
-    return JointObservations(e, np.zeros((3, 2 * count)), S)
+    return Together(e, S)
 
 
 def conditioned(seen, c, seed):
@@ -76,14 +89,15 @@ def test_the_cheapest_hypothesis_of_all_is_found_and_its_margin(seed):
     segment = np.sort(rng.integers(0, 5, rng.integers(1, 12)))
     line = np.concatenate([rng.permutation(12)[: np.count_nonzero(segment == s)] for s in np.unique(segment)])
     seen, may_seed = observations(rng, segment), rng.uniform(size=len(segment)) < 0.8
-    agreed = agree(segment, line, seen, may_seed, 0.99, 0.999999, 1e-3)
-    found = hypotheses(segment, seen, np.flatnonzero(may_seed), gate_level(0.99, 2), gate_level(0.999999, 2), 1e-3)
+    levels = gate_level(0.99, 2), gate_level(0.999999, 2)
+    pairs, margins = agree(segment, line, *seen, may_seed, *levels, 1e-3)
+    found = hypotheses(segment, seen, np.flatnonzero(may_seed), *levels, 1e-3)
     if not found:
-        assert not len(agreed.pairs)
+        assert not len(pairs)
         return
     least, choice = min(found, key=lambda one: one[0])
-    assert agreed.pairs.tolist() == [choice[s] for s in sorted(choice)]
-    for pair, margin in zip(agreed.pairs, agreed.margin, strict=True):
+    assert pairs.tolist() == [choice[s] for s in sorted(choice)]
+    for pair, margin in zip(pairs, margins, strict=True):
         s = segment[pair]
         others = [cost for cost, other in found if s in other and line[other[s]] != line[pair]]
         np.testing.assert_allclose(margin, min(others, default=np.inf) - least, atol=1e-9)
@@ -126,9 +140,9 @@ def test_a_robot_that_is_lost_takes_no_wall_beyond_the_gate():
     far = np.sqrt(12.0)
     for sigmas, kept in (((0.026, 0.005), 1), ((0.12, 0.3), 0)):
         S = np.diag(np.square(sigmas))
-        seen = JointObservations(np.array([far * sigmas[0], 0.0]), np.zeros((3, 2)), S)
-        agreed = agree(np.array([0]), np.array([0]), seen, np.array([True]), 0.99, 0.999999, 0.1)
-        assert len(agreed.pairs) == kept
+        e, one, levels = np.array([far * sigmas[0], 0.0]), np.array([0]), (gate_level(0.99, 2), gate_level(0.999999, 2))
+        pairs, _ = agree(one, one, e, S, np.array([True]), *levels, 0.1)
+        assert len(pairs) == kept
 
 
 def alone(d2, between, cov_between):
@@ -136,9 +150,8 @@ def alone(d2, between, cov_between):
     e = np.array([0.0, 0.0, between, 0.0])
     S = np.kron(np.array([[1.0, 1.0], [1.0, 1.0]]), np.eye(2)) + 0.1 * np.eye(4)
     S[2:, 2:] += cov_between * np.eye(2)
-    R = np.broadcast_to(0.05 * np.eye(2), (2, 2, 2))
-    seen = JointObservations(e, np.zeros((3, 4)), S)
-    return nearest_alone(np.zeros(2, dtype=np.int64), np.array(d2), seen, R, 0.99, 9.0).tolist()
+    R = np.tile(0.05 * np.eye(2), (2, 1, 1))
+    return nearest_alone(np.zeros(2, dtype=np.int64), np.array(d2), e, S, R, gate_level(0.99, 2), 9.0).tolist()
 
 
 def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_of_two_entries_of_one():
@@ -147,6 +160,50 @@ def test_a_lone_segment_between_two_walls_belongs_to_neither_but_to_the_nearer_o
     assert alone([1.0, 2.0], between=0.01, cov_between=1e-2) == [0]
     assert alone([2.0, 1.0], between=0.01, cov_between=1e-2) == [1]
     assert alone([1.0, 12.0], between=1.0, cov_between=1e-4) == [0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_each_segment_has_its_nearest_wall_unless_another_is_nearly_as_near(seed):
+    """Of some pairs the covariance leaves no doubt in one direction or in both: there they do not differ."""
+    rng = np.random.default_rng(seed)
+    segment = np.sort(rng.integers(0, 5, rng.integers(1, 14)))
+    count = len(segment)
+    root = rng.standard_normal((2 * count, 4))
+    S, R = root @ root.T + 0.2 * np.eye(2 * count), np.tile(0.125 * np.eye(2), (count, 1, 1))
+    if seed % 2:
+        own = np.diag([0.125, 0.125 + 0.5 * (seed % 4 == 3)])
+        S = np.tile(np.round(64.0 * S[:2, :2]) / 64.0, (count, count)) + np.kron(np.eye(count), own)
+    e, d2 = rng.standard_normal(2 * count), rng.uniform(0.0, 12.0, count)
+    chosen, expected = nearest_alone(segment, d2, e, S, R, 1.0, 5.0), []
+    for s in np.unique(segment):
+        rows = np.flatnonzero(segment == s)
+        best = rows[np.argmin(d2[rows])]
+        rivals = []
+        for c in rows[rows != best]:
+            D = np.zeros((2, 2 * count))
+            D[:, 2 * c : 2 * c + 2], D[:, 2 * best : 2 * best + 2] = np.eye(2), -np.eye(2)
+            apart = (D @ e) @ np.linalg.pinv(D @ S @ D.T - 2.0 * R[c], hermitian=True, rcond=1e-12) @ (D @ e)
+            if apart > 1.0 and d2[c] < d2[best] + 5.0:
+                rivals.append(c)
+        if not rivals:
+            expected.append(best)
+    assert chosen.tolist() == expected
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_worst_are_dropped_until_each_agrees_with_the_rest_and_all_together(seed):
+    rng = np.random.default_rng(seed)
+    seen = observations(rng, np.arange(rng.integers(1, 9)))
+    rows = np.flatnonzero(rng.uniform(size=len(seen.e) // 2) < 0.8)
+    levels = np.array([0.0, *(gate_level(0.99, 2 * pairs) for pairs in range(1, 9))])
+    kept = rows.tolist()
+    while len(kept) > 1:
+        all_of_them = together(seen, kept)
+        losses = [all_of_them - together(seen, [k for k in kept if k != one]) for one in kept]
+        if all_of_them <= levels[len(kept)] and max(losses) <= gate_level(0.9, 2):
+            break
+        del kept[int(np.argmax(losses))]
+    assert compatible(rows, *seen, gate_level(0.9, 2), levels).tolist() == kept
 
 
 def test_the_only_wall_in_sight_is_found_where_it_stands_in_the_map_as_two_that_would_be_merged():

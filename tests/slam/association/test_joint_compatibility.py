@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from slam.association.joint_compatibility import JointObservations, compatible, relocate
+from slam.association.joint_compatibility import relocate
+from slam.association.kernels.rest_kernels import compatible
 from slam.estimation.backend import Joint, Observations
+from slam.estimation.gates import gate_level, pair_levels
 from slam.estimation.models import innovations, lines_robot
 from slam.geometry.poses import wrap
 
@@ -75,8 +77,8 @@ def test_the_observation_that_the_others_contradict_is_dropped_though_alone_it_w
     S = shared**2 * np.kron(np.ones((4, 4)), np.eye(2)) + own**2 * np.eye(8)
     e = np.tile([0.03, 0.0], 4)
     e[4] += 0.008
-    seen = JointObservations(e, np.zeros((3, 8)), S)
-    alone = [part.e @ np.linalg.solve(part.S, part.e) for part in (seen.take(np.array([k])) for k in range(4))]
+    alone = [e[k : k + 2] @ np.linalg.solve(S[k : k + 2, k : k + 2], e[k : k + 2]) for k in range(0, 8, 2)]
     assert max(alone) < 9.2
-    assert compatible(seen, 0.99, 0.99).tolist() == [0, 1, 3]
-    assert compatible(seen.take(np.array([0, 1, 3])), 0.99, 0.99).tolist() == [0, 1, 2]
+    levels = gate_level(0.99, 2), pair_levels(0.99, 4)
+    assert compatible(np.arange(4), e, S, *levels).tolist() == [0, 1, 3]
+    assert compatible(np.array([0, 1, 3]), e, S, *levels).tolist() == [0, 1, 3]

@@ -54,8 +54,8 @@ def test_the_gain_in_likelihood_is_that_of_the_dense_gaussians(seed):
     joint, G = belief(rng)
     seen_lines = observed(joint, rng, G, 3.0)
     innovation = surprise(joint, IDS, seen_lines, G)[1]
-    seen, model = seen_halfway(joint, IDS, seen_lines)
-    HG = model.H_pose.reshape(-1, 3) @ G
+    seen = seen_halfway(joint, IDS, seen_lines)
+    HG = seen.H_pose.reshape(-1, 3) @ G
     stated = multivariate_normal.logpdf(seen.e, cov=seen.S)
     wider = [multivariate_normal.logpdf(seen.e, cov=seen.S + (f**2 - 1.0) * HG @ HG.T) for f in FACTORS]
     np.testing.assert_allclose(gains_of(innovation.a[None], innovation.w[None]), np.array(wider) - stated, rtol=1e-6)

@@ -1,0 +1,1 @@
+"""Association in compiled loops: from segments and walls to pairs."""
