@@ -23,7 +23,7 @@ from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map.vertices import VerticesConfig, laid_across, mistaken, vertices_within
+from .map.vertices import VerticesConfig, mistaken, vertices_within
 from .map_keeper import MapKeeper
 from .robot import Odometry, RobotError, Scan
 
@@ -228,7 +228,7 @@ class Mapper:
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
-        """Forget a wall that all scans together show to bend, and others laid across it: its sides take their place.
+        """Forget a wall that all scans together show to bend: its sides take its place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside the bend; all as it was, and none, while the scan shows a side too poorly.
@@ -245,6 +245,5 @@ class Mapper:
         sides = change_points.sides_of(change_point, segments, pieces.take(clear), scan)
         if sides is None:
             return segments, matches, NONE
-        across = laid_across(walls, change_point.wall, change_point.along_m, vertices)
-        view = self._view(scan, pieces, self._keeper.without(np.union1d(across, change_point.wall), walls))
+        view = self._view(scan, pieces, self._keeper.without(np.array([change_point.wall]), walls))
         return pieces, view.match_all(), clear[list(sides)]

@@ -36,9 +36,8 @@ class RecoveryConfig:
     least_segments: int = 3
     """So many segments more must belong to known walls than without the motion, ..."""
     least_share: float = 0.5
-    """... and so large a share of all."""
-    contradicted: float = 0.5
-    """The robot is lost if so large a share of the beams towards known walls goes through them, ..."""
+    """... and so large a share of all. The robot is lost if more than this share of the beams towards known walls goes
+    through them, ..."""
     least_beams: int = 20
     """... of so many at least, ..."""
     inside_m: float = 0.2
@@ -116,7 +115,7 @@ def is_contradicted(scan: Scan, walls: StochasticMap, config: RecoveryConfig) ->
     )
     through, met = np.any(evidence.passes & inside, axis=0), np.any(evidence.hits & inside, axis=0)
     towards = np.count_nonzero(through | met)
-    return bool(towards >= config.least_beams and np.count_nonzero(through) > config.contradicted * towards)
+    return bool(towards >= config.least_beams and np.count_nonzero(through) > config.least_share * towards)
 
 
 def _widened(joint: Joint, motion_cov: Float[np.ndarray, "3 3"]) -> Joint:

@@ -81,7 +81,7 @@ class LandmarkCandidates:
     def see(self, pose_world: Float[np.ndarray, "3"], segments: Segments) -> Int[np.ndarray, " m"]:
         """Take in one scan's segments of few beams, none of which lies on a wall; return those to be believed now.
 
-        A line keeps the observation whose direction is known best, so that it does not wander off step by step.
+        A line keeps its first observation, so that it does not wander off step by step.
         """
         seen = _lines_of(pose_world, segments)
         short = np.flatnonzero(2.0 * seen.half_m <= self._config.longest_m)
@@ -101,9 +101,6 @@ class LandmarkCandidates:
         self._places[rows[moved]] = pose_world[:2]
         due = (self._looks >= self._config.looks) & (self._spare_beams >= self._config.spare_beams)
         believed = again[due[rows]]
-        better = again[seen.var_alpha[again] < self._lines.var_alpha[rows]]
-        for kept, found in zip(vars(self._lines).values(), vars(seen).values(), strict=True):
-            kept[line_of[better]] = found[better]
         self._keep(~due & (self._unseen <= self._config.patience_steps))
         fresh = line_of < 0
         self._append(seen.take(fresh), spare_beams[fresh], pose_world[:2])

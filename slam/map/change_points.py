@@ -19,6 +19,7 @@ from ..geometry.lines import directions, normals
 from ..geometry.poses import to_world
 from ..robot import Scan
 from .records import Merger, Records
+from .vertices import LEAST_RAD
 
 Sums = Float[np.ndarray, "2 p"]
 """At each place, information about by how much more the wall leads away beyond it, and that times so much."""
@@ -34,8 +35,6 @@ class ChangePointsConfig:
     sigmas: float = 6.0
     """The turn differs from zero by so many of its own: hundreds of walls, each at dozens of places, are asked
     thousands of times."""
-    least_rad: float = float(np.deg2rad(0.2))
-    """Smaller turns are none: over thousands of beams every real wall shows one."""
     gate_sigmas: float = 4.0
     """Beams farther off the line belong to something else; so may the last one on either end."""
     least_beams: int = 4
@@ -102,7 +101,7 @@ class ChangePoints:
         turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of, self._config.least_beams)
         information, sums = self._add(pairs[:, 1], place, place_of, turns)
         turn = -sums / np.maximum(information, 1e-9)
-        is_bend = np.abs(turn) > self._config.least_rad
+        is_bend = np.abs(turn) > LEAST_RAD
         sure = turn**2 * information * is_bend * (turns[0] > 0.0)
         best = int(np.argmax(sure))
         if sure[best] <= self._config.sigmas**2:

@@ -36,8 +36,6 @@ class MergingConfig:
     by the gate alone: an landmark across a step of 2 cm from wall to wall lies near both."""
     hidden_overlap_m: float = 1.0
     """They overlap by at least this."""
-    hidden_share: float = 0.5
-    """And along at least this share of the shorter one."""
 
 
 def duplicate_of(
@@ -98,7 +96,7 @@ def lying_along(
     overlap = np.minimum(length[longer] - along[:, 0], along[:, 1])
     found = (across <= config.across_m) & (overlap >= config.across_m)
     hidden = (across <= config.hidden_m) & (length[shorter] >= config.hidden_overlap_m)
-    hidden &= overlap >= np.maximum(config.hidden_overlap_m, config.hidden_share * length[shorter])
+    hidden &= overlap >= config.hidden_overlap_m
     return walls.ids[np.stack([older, younger], axis=-1)[found]], hidden[found]
 
 

@@ -24,12 +24,10 @@ class OpeningsConfig:
     """A beam passes a gap if it goes on this far beyond it, ... Narrower gaps are not watched, since ends are known no
     better; nor are those that no chain would join."""
     margin_m: float = 0.04
-    """... this far from the two ends."""
+    """... this far from the two ends. Beams cut a corner off that cross what is supposed of either wall, so far from
+    its ends, and reach as far behind it, across the wall: four sigmas of a beam."""
     beams: int = 2
     """So many beams of one scan are needed."""
-    across_m: float = 0.05
-    """Beams cut a corner off that cross what is supposed of either wall, away from its ends as above, and reach so far
-    behind it, across the wall: five sigmas of a beam."""
 
 
 class Openings:
@@ -75,7 +73,7 @@ class Openings:
         pairs, corners = pairs[supposed], corners[supposed]
         if len(pairs):
             ends = ((heads[pairs[:, 0]], corners), (corners, tails[pairs[:, 1]]))
-            beams = [passing(*piece, pose, scan, 0.0, config.margin_m, config.across_m) for piece in ends]
+            beams = [passing(*piece, pose, scan, 0.0, config.margin_m, config.margin_m) for piece in ends]
             self.cut_off.update(self._pairs(walls.ids[rows], pairs, beams[0] | beams[1]))
 
     def _pairs(

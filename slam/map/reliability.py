@@ -2,8 +2,7 @@
 
 Around a corner of short faces a line fits six beams of each scan well enough, and another line from every place. What
 makes the direction clear is then that it took in a beam of the next face: the observations that are let through are the
-wrong ones. One scan cannot tell such a line from a wall; all scans together can. So they can where the robot, far
-from a wall that bends by a few degrees, sees of it now one side and then the other: each observation is straight.
+wrong ones. One scan cannot tell such a line from a wall; all scans together can.
 """
 
 from dataclasses import dataclass, field
@@ -14,8 +13,7 @@ from scipy.special import gammaincc
 
 from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
-from ..geometry.lines import directions
-from ..geometry.poses import to_world, wrap
+from ..geometry.poses import wrap
 from .records import Merger, Records
 
 
@@ -33,10 +31,8 @@ class ReliabilityConfig:
     excess: float = 1.2
     """Chi-square over degrees of freedom of all fits: misfits of 0.45 times the noise. Smaller ones any real wall shows
     over thousands of beams."""
-    bend_rad: float = float(np.deg2rad(0.5))
-    """Directions that differ along the wall by less, root mean square, may be the robot's own turn on its way there."""
     chance: float = 1e-5
-    """Straight walls are taken for crooked this rarely by each of the three tests."""
+    """Straight walls are taken for crooked this rarely by either test."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
     """How far a face may be from its line."""
 
@@ -72,10 +68,8 @@ class Reliability:
         self._records.declare(
             self._merge,
             fits=np.zeros(2),
-            first=np.full(3, np.nan),
+            first=np.nan,
             directions=np.zeros((2, 2)),
-            # Of the clear ones: information times how far along the wall, that times the same, and times direction.
-            along=np.zeros(3),
             crooked=False,
             # Squared residuals beyond those of the noise, m^2, and of how many beams.
             residue=np.zeros(2),
@@ -86,52 +80,39 @@ class Reliability:
         used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
         ids, seen = owners[used], segments.take(used)
         alpha, information = wrap(seen.lines[:, 0] + pose_world[2]), 1.0 / seen.cov[:, 0, 0]
-        middle = to_world(seen.ends.mean(axis=1), pose_world)
         rows = self._records.rows(ids)
         columns = self._records.columns
         first = columns["first"]
-        new = np.isnan(first[rows, 0])
-        first[rows[new]] = np.column_stack([alpha, middle])[new]
+        new = np.isnan(first[rows])
+        first[rows[new]] = alpha[new]
         np.add.at(columns["fits"], rows, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
         # Across the line a beam has the variance of the whole fit, times as many beams.
         across = seen.cov[:, 1, 1] - seen.cov[:, 0, 1] ** 2 / seen.cov[:, 0, 0]
         dof = seen.beam_counts - 2.0
         excess = (seen.chi2 - dof) * across * seen.beam_counts
         np.add.at(columns["residue"], rows, np.stack([excess, seen.beam_counts], axis=-1))
-        off = wrap(alpha - first[rows, 0])
-        along = np.vecdot(middle - first[rows, 1:], directions(first[rows, 0]))
+        off = wrap(alpha - first[rows])
         clear = are_clear(seen, self._config)
         np.add.at(columns["directions"], (rows, clear.astype(int)), np.stack([information, information * off], axis=-1))
-        np.add.at(columns["along"], rows, (information * clear * along * np.stack([np.ones_like(off), along, off])).T)
         self._judge(rows)
 
     def _judge(self, rows: Int[np.ndarray, " n"]) -> None:
         """Take note of which walls are surely not straight."""
-        crooked = self._misfit(rows) | self._in_conflict(rows) | self._bends(rows)
+        crooked = self._misfit(rows) | self._in_conflict(rows)
         self._records.columns["crooked"][rows] = crooked
 
     def _merge(self, merger: Merger) -> None:
         """Add the sums of the dropped wall, taken about its own first observation, to those about the kept one's."""
         columns, keep, drop = self._records.columns, merger.keep, merger.drop
-        first, fits, sums, along = (columns[name] for name in ("first", "fits", "directions", "along"))
+        first, fits, sums = (columns[name] for name in ("first", "fits", "directions"))
         fits[keep] += fits[drop]
         columns["residue"][keep] += columns["residue"][drop]
-        if np.isnan(first[drop, 0]):
+        if np.isnan(first[drop]):
             return
-        if np.isnan(first[keep, 0]):
+        if np.isnan(first[keep]):
             first[keep] = first[drop]
-        turn = wrap(first[drop, 0] - first[keep, 0])
-        shift = (first[drop, 1:] - first[keep, 1:]) @ directions(first[keep, 0])
         information, off = sums[drop].T
-        off = off + turn * information
-        x, xx, x_off = along[drop]
-        sums[keep] += np.column_stack([information, off])
-        # With x + shift in place of x, and off + turn in place of off.
-        along[keep] += [
-            x + shift * information[1],
-            xx + 2.0 * shift * x + shift**2 * information[1],
-            x_off + turn * x + shift * off[1],
-        ]
+        sums[keep] += np.column_stack([information, off + wrap(first[drop] - first[keep]) * information])
         self._judge(np.array([keep]))
 
     def may_move(self, segments: Segments, ids: Int[np.ndarray, " s"]) -> Bool[np.ndarray, " s"]:
@@ -188,14 +169,3 @@ class Reliability:
     def _in_conflict(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         apart, variance = self._apart(rows)
         return gammaincc(0.5, 0.5 * np.square(apart) / variance) < self._config.chance
-
-    def _bends(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        """Return where the clear directions change along the wall: by a line through them, weighted."""
-        information, sums = self._records.columns["directions"][rows, 1].T
-        first, second, mixed = self._records.columns["along"][rows].T
-        middle = first / np.maximum(information, 1e-9)
-        spread, trend = second - middle * first, mixed - middle * sums
-        gain = trend**2 / np.maximum(spread, 1e-9)
-        bends = gain > self._config.bend_rad**2 * information
-        bends[bends] = gammaincc(0.5, 0.5 * gain[bends]) < self._config.chance
-        return bends

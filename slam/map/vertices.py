@@ -18,6 +18,10 @@ from ..geometry.poses import to_robot, to_world, wrap
 from .merging import same_line
 from .stochastic_map import StochasticMap
 
+LEAST_RAD = float(np.deg2rad(0.2))
+"""Smaller turns are no bends: over thousands of beams every real wall shows one, and walls that overlap may be one that
+was entered twice."""
+
 
 @dataclass(frozen=True)
 class VerticesConfig:
@@ -28,20 +32,17 @@ class VerticesConfig:
     given to one of them, which then reaches past the bend."""
     largest_rad: float = float(np.deg2rad(10.0))
     """A sharper bend is seen in every scan."""
-    least_rad: float = float(np.deg2rad(0.2))
-    """Walls that overlap and turn less are not ended where their lines cross: they may be one wall entered twice ..."""
     slight_rad: float = float(np.deg2rad(2.0))
-    """... nor those that turn more: which of them a beam met is plain, and one of them may be a line laid across a
-    step."""
+    """Walls that overlap and turn more are not ended where their lines cross: which of them a beam met is plain, and
+    one of them may be a line laid across a step."""
     beside_m: float = 0.08
     """Distance across a segment within which a bend lies on it."""
     cut_reach_m: float = 0.5
     """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
     met either of them near the bend."""
-    across_m: float = 0.25
-    """A wall that reaches so far beyond a bend on both sides was laid across it."""
     past_shown_m: float = 0.15
-    """The same for a bend that a scan shows: a beam of the other side was taken in, at 4 m one in 0.13 m."""
+    """A wall that reaches so far beyond a bend that a scan shows, on both sides, was laid across it: a beam of the
+    other side may have been taken in, at 4 m one in 0.13 m."""
     sharpest_rad: float = float(np.deg2rad(30.0))
     """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
     past_m: float = 0.05
@@ -89,7 +90,7 @@ def meetings(
     Within `range_m` of the robot; `one_wall` and `cut` as above.
     """
     bends = _bends(walls, range_m, config, cut)
-    slight = (bends.turn_rad > config.least_rad) & (bends.turn_rad < config.slight_rad)
+    slight = (bends.turn_rad > LEAST_RAD) & (bends.turn_rad < config.slight_rad)
     asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
     known = _are_known(bends, asked, walls, one_wall)
     rows = bends.rows[known]
@@ -98,16 +99,6 @@ def meetings(
     # Where the lines cross a little outside the overlap, its end is near enough.
     short, far = walls.extents[rows[:, 1], 0] - along[:, 1], along[:, 0] - walls.extents[rows[:, 0], 1]
     return walls.ids[rows], along + (np.maximum(short, 0.0) - np.maximum(far, 0.0))[:, None]
-
-
-def laid_across(
-    walls: StochasticMap, wall: int, along_m: float, config: VerticesConfig = VerticesConfig()
-) -> Int[np.ndarray, " n"]:
-    """Return the ids of the walls laid, like `wall`, across the bend that lies so far along it from its anchor."""
-    (row,) = walls.belief.rows([wall])
-    (alpha, d), anchor = walls.belief.means[row], walls.belief.anchors[row]
-    bend = anchor + d * normals(alpha) + along_m * directions(alpha)
-    return walls.ids[_across(walls, bend[None], np.array([alpha]), config.across_m, config)[0]]
 
 
 def mistaken(
@@ -130,24 +121,13 @@ def mistaken(
     pose = walls.belief.pose_world
     points = to_world(segments.ends[before, 1] + 0.5 * between[before], pose)
     alpha = segments.lines[before, 0] + pose[2] + 0.5 * turn[before]
-    laid = _across(walls, points, alpha, config.past_shown_m, config).any(axis=0)
-    return walls.ids[laid & ~walls.established]
-
-
-def _across(
-    walls: StochasticMap,
-    bends_world: Float[np.ndarray, "b 2"],
-    alpha: Float[np.ndarray, " b"],
-    past_m: float,
-    config: VerticesConfig,
-) -> Bool[np.ndarray, "b n"]:
-    """Return which walls reach so far past each of the bends, about which the normals are `alpha`, on both sides."""
     means = walls.belief.means[:, 0]
-    offset = bends_world[:, None, None] - walls.ends_world
+    offset = points[:, None, None] - walls.ends_world
     along, across = (np.vecdot(offset, axis[:, None]) for axis in (directions(means), normals(means)))
-    laid = (along[..., 0] > past_m) & (along[..., 1] < -past_m)
+    laid = (along[..., 0] > config.past_shown_m) & (along[..., 1] < -config.past_shown_m)
     laid &= np.abs(across[..., 0]) < config.beside_m
-    return laid & (np.abs(wrap(means - alpha[:, None])) < config.largest_rad)
+    laid &= np.abs(wrap(means - alpha[:, None])) < config.largest_rad
+    return walls.ids[laid.any(axis=0) & ~walls.established]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from slam.backends import BACKENDS
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.extraction.straightness import StraightnessConfig, edge_cov
-from slam.geometry.poses import compose, inverse, to_world
+from slam.geometry.poses import compose, inverse
 from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -269,37 +269,3 @@ def test_a_line_over_two_faces_turns_nobody_beside_a_clear_wall():
         update = mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.1 * k))
     assert 3 in update.segments.beam_counts[update.matches.pairs[:, 0]], "the line over two faces is matched"
     assert abs(update.map.belief.pose_world[2] - 1.0) < np.deg2rad(0.15)
-
-
-def seen_along(turn_rad, rng, drift_rad=0.0, sigma_rad=0.009):
-    """Return whether a wall is crooked that turns by so much at its middle and is seen piece by piece from 4 m.
-
-    The robot's heading drifts by so much on its way along it.
-    """
-    reliability = Reliability()
-    for share in np.linspace(0.0, 1.0, 40):
-        alpha = turn_rad * (share > 0.5) + drift_rad * share + sigma_rad * rng.standard_normal()
-        heading = rng.uniform(-np.pi, np.pi)
-        piece = observation(alpha - heading, sigma_rad)
-        middle = np.array([1.0, 3.0 * share])  # the wall x = 1, walked along upwards
-        place = middle - to_world(piece.ends.mean(axis=1), np.array([0.0, 0.0, heading]))[0]
-        reliability.see(piece, OWNER, np.append(place, heading))
-    return bool(reliability.are_crooked(OWNER)[0])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_sides_of_a_bend_seen_one_after_the_other_give_it_away(seed):
-    rng = np.random.default_rng(seed)
-    assert seen_along(np.deg2rad(2.4), rng)
-    assert seen_along(np.deg2rad(-2.4), rng)
-    assert not seen_along(0.0, rng)
-    assert not seen_along(0.0, rng, drift_rad=np.deg2rad(1.0), sigma_rad=np.deg2rad(0.05)), "so much the robot may turn"
-
-
-def test_a_wall_seen_turned_from_one_place_does_not_bend():
-    """Along the wall nothing changes: what differs is the robot's heading."""
-    reliability, rng = Reliability(), np.random.default_rng(7)
-    for k in range(200):
-        off = np.deg2rad(3.0) * (k > 100) + 0.01 * rng.standard_normal()
-        reliability.see(observation(off, 0.01), OWNER, POSE)
-    assert not reliability.are_crooked(OWNER)[0]

@@ -11,7 +11,6 @@ from slam.geometry.lines import directions, through
 from slam.geometry.poses import to_robot, to_world
 from slam.map import vertices
 from slam.map.stochastic_map import StochasticMap
-from slam.map.vertices import laid_across
 
 POSE = np.array([1.0, 2.0, 0.7])
 vertices_within = partial(vertices.vertices_within, one_wall=0.9999)
@@ -115,17 +114,6 @@ def test_a_bend_that_may_be_a_straight_wall_is_not_known(sigma, is_known):
     assert len(vertices_within(segment_of([1.0, 0.0], [3.0, -0.03]), map_of(bent(), sigma))) == is_known
 
 
-def test_walls_laid_across_a_bend_are_those_that_reach_past_it_on_both_sides():
-    """Not one that begins near it, lies aside, looks the other way or turns by more."""
-    ends = [
-        *([[0.0, 0.0], [4.0, -0.02]], [[1.0, 0.01], [2.5, -0.01]], [[1.9, 0.0], [4.0, 0.0]], [[0.0, 0.2], [4.0, 0.2]]),
-        *([[4.0, 0.0], [0.0, 0.0]], [[1.0, 0.5], [3.0, -0.5]]),
-    ]
-    walls = map_of(ends)
-    assert laid_across(walls, 0, 0.0).tolist() == [0, 1]
-    assert laid_across(walls, 0, 1.2).tolist() == [0, 2]
-
-
 @pytest.mark.parametrize("turned_rad", [0.0, 2.0, -2.0])
 @pytest.mark.parametrize("is_first", [True, False])
 def test_the_sides_of_a_bend_that_overlap_meet_where_their_lines_cross(turned_rad, is_first):
@@ -182,7 +170,7 @@ def test_a_wall_laid_across_a_bend_that_the_scan_shows_was_none(shift):
     """Whichever segment comes first; not one that ends at the bend, lies aside, or was seen often."""
     ends = [
         *([[1.0, 0.0], [3.0, -0.05]], [[0.0, 0.0], [2.2, 0.0]], [[2.0, 0.0], [4.0, -0.1]], [[0.0, 0.2], [4.0, 0.2]]),
-        [[0.0, 0.0], [4.0, -0.02]],
+        *([[0.0, 0.0], [4.0, -0.02]], [[4.0, 0.0], [0.0, 0.0]], [[1.0, 0.5], [3.0, -0.5]]),
     ]
     walls = map_of(ends)
     walls.observations[4] = 50
