@@ -48,7 +48,7 @@ class ApartmentsStudy:
     """Number of processes."""
     any_code: bool = False
     """Whether rows of other versions of the code count, too."""
-    out: Path = Path("studies/results/rows/scanner-apartments.jsonl")
+    out: Path = Path("studies/results/rows/in_text/scanner-apartments.jsonl")
     """A line of JSON for each run, as it ends. What it holds is not run again."""
 
     def trials(self) -> list[TrialConfig]:
