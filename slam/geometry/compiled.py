@@ -15,6 +15,7 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+import numpy as np
 from numba import config, njit
 from numba.core.dispatcher import Dispatcher
 
@@ -34,6 +35,13 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     plain = inspect.unwrap(function)
     config.CACHE_DIR = str(cache() / _fingerprint(plain))  # type: ignore[attr-defined]
     return njit(cache=True, error_model="numpy")(plain)
+
+
+def plain(array: np.ndarray) -> np.ndarray:
+    """Return an array as kernels take it, so that each is compiled once: writable rows of doubles, without gaps."""
+    if array.dtype == np.float64 and array.flags.carray:
+        return array
+    return np.require(array, np.float64, ("C", "A", "W"))
 
 
 def is_compiled() -> bool:

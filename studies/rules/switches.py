@@ -5,6 +5,7 @@ changed a value.
 """
 
 import builtins
+import os
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 from numba import config
 
@@ -142,7 +144,12 @@ class _Finder(MetaPathFinder):
 
 
 def install(switches: Iterable[Switch]) -> None:
-    """Put the switches into modules that are loaded from now on; raises RuntimeError where one is loaded already."""
+    """Put the switches into modules that are loaded from now on; raises RuntimeError where one is loaded already.
+
+    Kernels run as the plain Python that they are: machine code could not ask what is off.
+    """
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    numba.config.DISABLE_JIT = True  # type: ignore[attr-defined]
     chosen = list(switches)
     early = {switch.module for switch in chosen} & sys.modules.keys()
     if early:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.estimation.models import halfway, initialise, innovations, lines_robot, move, stack
-from slam.extraction.line_fit import Beams, fit_runs, polar, prefix_sums
+from slam.extraction.line_kernels import fit_run, polar, prefix_sums
 from slam.geometry.lines import lines_to_world
 from slam.geometry.poses import to_robot, to_world, wrap
 
@@ -138,9 +138,9 @@ def test_the_noise_of_the_innovation_is_that_of_fits_to_noisy_beams(middle, epsi
     lines, covs = np.zeros((3000, 2)), np.zeros((3000, 2, 2))
     for k in range(3000):
         ranges = true_ranges + sigma * rng.standard_normal(40)
-        sums = prefix_sums(Beams(np.cos(bearings), np.sin(bearings), ranges), np.full(len(ranges), sigma))
-        fit, _ = fit_runs(sums, np.array([0]), np.array([40]))
-        lines[k : k + 1], covs[k : k + 1] = polar(fit)
+        sums = prefix_sums(np.cos(bearings), np.sin(bearings), ranges, np.full(len(ranges), sigma))
+        alpha, r, alphas, both, rs = polar(fit_run(sums, 0, 40)[0])
+        lines[k], covs[k] = (alpha, r), ((alphas, both), (both, rs))
     many = innovations(np.zeros(3), np.repeat(anchors, 3000, 0), np.repeat(means, 3000, 0), lines, covs)
     stated, seen = many.R.mean(axis=0), np.cov(many.e.T)
     scale = np.sqrt(np.diag(stated))

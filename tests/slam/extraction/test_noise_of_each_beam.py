@@ -6,9 +6,9 @@ from scipy.stats import chi2
 
 from sim.lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
+from slam.extraction.extract import beams_of_scan, extract, rules_of
+from slam.extraction.returns_kernels import returns_of, rolled
 from slam.extraction.segments import EndKind
-from slam.extraction.splitting import returns_of, rolled
 from slam.map.change_points import ChangePoints, ChangePointsConfig
 from slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
@@ -125,7 +125,7 @@ def test_a_step_is_a_break_only_beyond_the_noise_of_both_beams_beside_it(before_
     ranges = np.where(np.arange(41) < 20, 2.0, 3.0) / np.cos(bearings)
     sigmas = np.full(41, 0.005)
     sigmas[19], sigmas[20] = 0.5 if before_noisy else 0.005, 0.5 if after_noisy else 0.005
-    breaks = returns_of(Scan(bearings, ranges, sigmas, 4.0, 0.0), ExtractionConfig()).breaks
+    breaks = returns_of(*beams_of_scan(Scan(bearings, ranges, sigmas, 4.0, 0.0)), rules_of(ExtractionConfig())).breaks
     assert (20 in breaks) != (before_noisy or after_noisy)
 
 
@@ -135,10 +135,11 @@ def test_the_returns_of_a_ring_keep_the_noise_of_their_beams_wherever_it_begins(
     finder = RangeFinder(CLOSED, LidarConfig())
     sigmas = rng.uniform(0.004, 0.02, 180)
     ranges = finder.cast(np.array([1.0, 1.0, 0.3]))[0]
-    returns = returns_of(Scan(finder.bearings_rad, ranges, sigmas, 4.0, 0.0), ExtractionConfig())
+    scan = Scan(finder.bearings_rad, ranges, sigmas, 4.0, 0.0)
+    returns = returns_of(*beams_of_scan(scan), rules_of(ExtractionConfig()))
     assert returns.is_ring
     for one in (returns, rolled(returns, by)):
-        np.testing.assert_array_equal(one.sigma_m, sigmas[one.beam])
+        np.testing.assert_array_equal(one.sigmas_m, sigmas[one.beam])
 
 
 def test_beams_that_fell_short_by_chance_draw_no_wall_nearer():

@@ -1,0 +1,123 @@
+"""From a scan to straight segments: break, choose cuts by dynamic programming, sharpen the joints, fit, find ends."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..geometry.compiled import compiled
+from .fit_kernels import Fitted, fitted
+from .joint_kernels import sharpened
+from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
+from .returns_kernels import Returns, Rules, positions_of, returns_of, rolled, run_of, turn_of, turned
+from .segments import EndKind
+from .split_kernels import candidates, cut_at, settled, split, split_gains, surest
+
+_OPEN, _OCCLUDED, _CORNER = int(EndKind.OPEN), int(EndKind.OCCLUDED), int(EndKind.CORNER)
+
+
+class Found(NamedTuple):
+    """The segments of a scan as `Segments` holds them."""
+
+    lines: Float[np.ndarray, "n 2"]
+    cov: Float[np.ndarray, "n 2 2"]
+    ends: Float[np.ndarray, "n 2 2"]
+    beams: Int[np.ndarray, "n 2"]
+    beam_counts: Int[np.ndarray, " n"]
+    end_kinds: Int[np.ndarray, "n 2"]
+    chi2: Float[np.ndarray, " n"]
+    is_tentative: Bool[np.ndarray, " n"]
+
+
+@compiled
+def segments_of(
+    bearings_rad: Float[np.ndarray, " k"],
+    ranges_m: Float[np.ndarray, " k"],
+    sigmas_m: Float[np.ndarray, " k"],
+    sigma_share: float,
+    farthest_m: float,
+    is_full_turn: bool,
+    vertices_rad: Float[np.ndarray, " b"],
+    rules: Rules,
+) -> Found:
+    """Return the straight segments of a scan; at the bearings `vertices_rad` the wall is known to bend."""
+    returns = returns_of(bearings_rad, ranges_m, sigmas_m, sigma_share, farthest_m, is_full_turn, rules)
+    sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
+    gains = split_gains(sums, returns.breaks, rules)
+    if returns.is_ring and len(returns.beam) >= rules.least_beams:
+        # The seam must lie at a corner, else it cuts a wall in two; the surest cut is one.
+        returns = rolled(returns, surest(gains))
+        sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
+        gains = split_gains(sums, returns.breaks, rules)
+    pieces = split(sums, candidates(gains, returns.breaks, rules), returns.breaks, rules)
+    if len(vertices_rad):
+        pieces = cut_at(pieces, positions_of(vertices_rad, bearings_rad[0], returns), rules)
+    pieces = settled(pieces, sums, returns.breaks, rules)
+    return _described(fitted(sharpened(pieces, sums, returns, rules), returns, rules), returns, rules)
+
+
+@compiled
+def _described(pieces: Fitted, returns: Returns, rules: Rules) -> Found:
+    """Return the fitted lines with their ends: where the last beam meets its line, or where two lines meet."""
+    n, m = len(pieces.counts), len(returns.beam)
+    lines, cov, ends = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
+    beams, kinds, good = np.empty((n, 2), np.int64), np.empty((n, 2), np.int64), np.ones(n, np.bool_)
+    for k in range(n):
+        line = line_of(pieces.lines, k)
+        lines[k, 0], lines[k, 1], cov[k, 0, 0], cov[k, 0, 1], cov[k, 1, 1] = polar(line)
+        cov[k, 1, 0] = cov[k, 0, 1]
+        for end in range(2):
+            at = pieces.place[k, end] % m
+            range_m = met_at(line, returns.cos[at], returns.sin[at])
+            ends[k, end, 0], ends[k, end, 1] = range_m * returns.cos[at], range_m * returns.sin[at]
+            beams[k, end] = returns.beam[at]
+            kinds[k, end] = _OCCLUDED if _is_hidden(pieces, k, end, returns, rules) else _OPEN
+            good[k] &= range_m > 0.0
+    for k in range(n if returns.is_ring and n > 1 else n - 1):
+        after = (k + 1) % n
+        is_corner, x, y = _corner(pieces, k, after, returns, rules)
+        if is_corner:
+            ends[k, 1, 0], ends[k, 1, 1] = x, y
+            ends[after, 0, 0], ends[after, 0, 1] = x, y
+            kinds[k, 1] = kinds[after, 0] = _CORNER
+    for k in range(n):
+        good[k] &= np.isfinite(cov[k].sum() + ends[k].sum())
+    is_tentative = pieces.counts < rules.sure_beams
+    return Found(
+        lines[good], cov[good], ends[good], beams[good], pieces.counts[good], kinds[good], pieces.chi2[good],
+        is_tentative[good],
+    )  # fmt: skip
+
+
+@compiled
+def _is_hidden(pieces: Fitted, k: int, end: int, returns: Returns, rules: Rules) -> bool:
+    """Return whether one of the next beams past an end met something nearer than the line would be."""
+    m, line, last = len(returns.beam), line_of(pieces.lines, k), pieces.place[k, end]
+    for step in range(1, rules.gap_beams + 1):
+        beyond = last + (step if end else -step)
+        at = beyond % m
+        turn = returns.turn[at] + returns.period * (beyond // m)
+        if abs(turn - turn_of(last, returns)) > rules.gap_beams:
+            continue
+        inverse = line.a * returns.cos[at] + line.b * returns.sin[at]
+        if inverse * (returns.ranges_m[at] + rules.noise_sigmas * returns.sigmas_m[at]) < 1.0:
+            return True
+    return False
+
+
+@compiled
+def _corner(pieces: Fitted, k: int, after: int, returns: Returns, rules: Rules) -> tuple[bool, float, float]:
+    """Return whether a segment meets its successor, and the point m where their lines cross."""
+    m, last, first = len(returns.beam), pieces.place[k, 1], pieces.place[after, 0]
+    if run_of(last % m, returns) != run_of(first % m, returns):
+        return False, 0.0, 0.0
+    one, other = line_of(pieces.lines, k), line_of(pieces.lines, after)
+    begins = turn_of(first, returns) + (returns.period if after < k else 0)
+    half = 0.5 * (begins - turn_of(last, returns))
+    cm, sm = turned(returns, last % m, half * returns.step_rad)
+    past = crossing(one, other, cm, sm)
+    if not (abs(past) <= (half + 1.0) * returns.step_rad and 2.0 * half <= rules.gap_beams + 1):
+        return False, 0.0, 0.0
+    c, s = cm * np.cos(past) - sm * np.sin(past), sm * np.cos(past) + cm * np.sin(past)
+    range_m = 2.0 / ((one.a + other.a) * c + (one.b + other.b) * s)
+    return True, range_m * c, range_m * s
