@@ -4,14 +4,15 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from slam.geometry.lines import distance_to_segments, normals
-from slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
+from slam.geometry.lines import distance_to_segments
+from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
 from slam.map.stochastic_map import StochasticMap
 from slam.robot import Odometry, RobotSpec, Scan, of_robot
 
 from .free_space import FreeSpace
+from .kept_scans import NO_PLACES, KeptScan, beside, told
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,9 @@ class FloorMemoryConfig:
     """So many steps at least, and a tenth of the scans kept, lie between two looks at how far the walls have moved."""
     faith_m: float = 0.01
     """Where no wall nearby tells, a scan moves as the one kept before it did: worth this many metres of wall."""
+    redrawn: int = 500
+    """So many kept scans are drawn anew in one step, in 30 to 50 ms; where there are more, the old grid stays in use
+    for as long."""
     last_m: float = 15.0
     """The last scans, of the steps that so long a way takes, are enough to begin the grid anew."""
 
@@ -50,36 +54,15 @@ class FloorMemoryConfig:
         return 2.0 * self.robot.step_m
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """A scan with the nearest walls as they stood around it; `ids` is padded with -1."""
+@dataclass
+class _Redrawing:
+    """A grid that is drawn anew beside the one in use, some scans a step."""
 
-    pose_world: Float[np.ndarray, "3"]
-    scan: Scan
-    ids: Int[np.ndarray, " w"]
-    alphas: Float[np.ndarray, " w"]
-    offsets: Float[np.ndarray, " w"]
-    """From the pose to each line along its normal, m."""
-    way_robot: Float[np.ndarray, "d 2"]
-    """Where the robot drove while the scans of this place were taken, in the frame of this one, m."""
-    touched_robot: Float[np.ndarray, "t 2"]
-    """What its body touched then."""
-
-
-@dataclass(frozen=True)
-class _Told:
-    """What the walls tell of the motion of each of k scans, as sums by length of wall."""
-
-    length_m: Float[np.ndarray, " k"]
-    turn: Float[np.ndarray, " k"]
-    normal: Float[np.ndarray, "k 2 2"]
-    shift: Float[np.ndarray, "k 2"]
-
-    def motions(self, faith_m: float) -> Float[np.ndarray, "k 3"]:
-        """Return (x, y, turn) of each scan by itself, world frame: none where no wall tells."""
-        turn = self.turn / (self.length_m + faith_m)
-        shift = np.linalg.solve(self.normal + faith_m * np.eye(2), self.shift[..., None])[..., 0]
-        return np.column_stack([shift, turn])
+    grid: FreeSpace
+    left: list[KeptScan]
+    """What was not drawn yet, the first at the end."""
+    late: list[tuple[Float[np.ndarray, "3"], Scan, Float[np.ndarray, "n 2"]]]
+    """Scans taken since it began, each with its pose and the way there, world frame."""
 
 
 class FloorMemory:
@@ -91,7 +74,8 @@ class FloorMemory:
 
     def __init__(self, free_space: FreeSpace, config: FloorMemoryConfig = FloorMemoryConfig()) -> None:
         self.free_space, self._config = free_space, config
-        self._kept: dict[tuple[int, ...], _Kept] = {}
+        self._kept: dict[tuple[int, ...], KeptScan] = {}
+        self._redrawing: _Redrawing | None = None
         self._rested = 0
         self._last: deque[tuple[Float[np.ndarray, 3], Scan]] = deque(maxlen=config.last_scans)
         self._odometry = np.zeros(3)
@@ -122,7 +106,9 @@ class FloorMemory:
         self._rested += 1
         jumped = self._has_jumped(pose)
         self._expected_world = pose.copy()
-        if jumped or self._rested >= max(self._config.rest_steps, len(self._kept) // 10):
+        self._go_on(self._config.redrawn)
+        is_due = self._redrawing is None and self._rested >= max(self._config.rest_steps, len(self._kept) // 10)
+        if jumped or is_due:
             self._rested = 0
             self._follow(walls)
         self._take_in(walls, walls.distances_m, pose, scan)
@@ -137,6 +123,7 @@ class FloorMemory:
 
     def note_touched(self, pose_world: Float[np.ndarray, "3"], places_robot: Float[np.ndarray, "t 2"]) -> None:
         """Remember that the body, at the pose of the last scan, touched something, and that it does not fit there."""
+        self._go_on(len(self._kept))
         for place in to_world(places_robot, pose_world):
             self.free_space.note_touched(place)
         self.free_space.note_too_tight(pose_world[:2])
@@ -151,7 +138,8 @@ class FloorMemory:
 
     def begin_anew(self, walls: StochasticMap) -> None:
         """Forget all but the last scans, and draw those where the odometry says that they were taken, seen from now."""
-        self.free_space.clear()
+        self.free_space.become(self.free_space.blank())
+        self._redrawing = None
         self._kept.clear()
         self._before_world, self._rested = None, 0
         here = walls.belief.pose_world
@@ -172,50 +160,52 @@ class FloorMemory:
         if not scan.is_full_turn:
             key = *key, int(pose[2] // (0.25 * np.pi))
         old = self._kept.pop(key, None)  # the newest stands last
-        touched_world = np.zeros((0, 2))
+        driven_world, touched_world = way_world, NO_PLACES
         if old is not None:
             touched_world = to_world(old.touched_robot, old.pose_world)
-            way_world = np.unique(np.round(np.vstack([to_world(old.way_robot, old.pose_world), way_world]), 2), axis=0)
-        view = self._beside(walls, distances_m, pose, scan)
+            driven_world = np.vstack([to_world(old.way_robot, old.pose_world), way_world])
+            driven_world = np.unique(np.round(driven_world, 2), axis=0)
+        if self._redrawing is not None:
+            self._redrawing.late.append((pose, scan, way_world))
+        view = beside(walls, pose[None], [scan], self._config.walls, distances_m[None])[0]
         self._kept[key] = replace(
-            view, way_robot=to_robot(way_world, pose), touched_robot=to_robot(touched_world, pose)
-        )
-
-    def _beside(
-        self, walls: StochasticMap, distances_m: Float[np.ndarray, " n"], pose_world: Float[np.ndarray, "3"], scan: Scan
-    ) -> _Kept:
-        """Return a scan to keep, with the walls nearest to its pose."""
-        rows = np.argsort(np.where(walls.tentative, np.inf, distances_m), kind="stable")[: self._config.walls]
-        rows = rows[~walls.tentative[rows]]
-        ids, lines = np.full(self._config.walls, -1), np.zeros((self._config.walls, 2))
-        ids[: len(rows)], lines[: len(rows)] = walls.ids[rows], walls.belief.lines_world[rows]
-        return _Kept(
-            pose_world,
-            scan,
-            ids,
-            lines[:, 0],
-            lines[:, 1] - normals(lines[:, 0]) @ pose_world[:2],
-            *np.zeros((2, 0, 2)),
+            view, way_robot=to_robot(driven_world, pose), touched_robot=to_robot(touched_world, pose)
         )
 
     def _follow(self, walls: StochasticMap) -> None:
-        """Draw the grid anew if the walls have carried a kept scan away from where it was drawn."""
+        """Begin to draw the grid anew if the walls have carried a kept scan away from where it was drawn."""
         kept = list(self._kept.values())
-        told = _told(walls, kept)
-        motions = told.motions(self._config.faith_m)
+        what = told(walls, kept)
+        motions = what.motions(self._config.faith_m)
         moved = np.hypot(motions[:, 0], motions[:, 1]) + self._config.arm_m * np.abs(motions[:, 2])
         if not np.any(moved > self._config.moved_m):
             return
-        poses = _carried(np.array([view.pose_world for view in kept]), told, self._config.faith_m)
-        distances = distance_to_segments(poses[:, :2], walls.ends_world)
-        self.free_space.clear()
-        for key, view, pose, away in zip(list(self._kept), kept, poses, distances, strict=True):
-            self.free_space.integrate(pose, view.scan)
-            self.free_space.note_driven(to_world(view.way_robot, pose))
-            for place in to_world(view.touched_robot, pose):
-                self.free_space.note_touched(place)
-            moved = self._beside(walls, away, pose, view.scan)
-            self._kept[key] = replace(moved, way_robot=view.way_robot, touched_robot=view.touched_robot)
+        poses = what.carried(np.array([view.pose_world for view in kept]), self._config.faith_m)
+        now = beside(walls, poses, [view.scan for view in kept], self._config.walls)
+        for key, view, new in zip(list(self._kept), kept, now, strict=True):
+            self._kept[key] = replace(new, way_robot=view.way_robot, touched_robot=view.touched_robot)
+        self._redrawing = _Redrawing(self.free_space.blank(), list(self._kept.values())[::-1], [])
+        self._go_on(self._config.redrawn)
+
+    def _go_on(self, scans: int) -> None:
+        """Draw some more of the kept scans into the new grid, and take it into use once it has them all."""
+        new = self._redrawing
+        if new is None:
+            return
+        views = new.left[-scans:][::-1]
+        del new.left[-scans:]
+        for view in views:
+            new.grid.integrate(view.pose_world, view.scan)
+        new.grid.note_driven(np.concatenate([to_world(view.way_robot, view.pose_world) for view in views]))
+        for view in views:
+            for place in to_world(view.touched_robot, view.pose_world):
+                new.grid.note_touched(place)
+        if not new.left:
+            for pose, scan, way_world in new.late:
+                new.grid.integrate(pose, scan)
+                new.grid.note_driven(way_world)
+            self.free_space.become(new.grid)
+            self._redrawing = None
 
 
 def _between(
@@ -227,39 +217,3 @@ def _between(
         return now_world[None].copy()
     share = np.linspace(0.0, 1.0, int(np.ceil(length_m / every_m)) + 1)[:, None]
     return before_world + share * (now_world - before_world)
-
-
-def _told(walls: StochasticMap, kept: list[_Kept]) -> _Told:
-    """Return what the walls, as they stand now, tell of the motion of scans that were kept beside them."""
-    ids = np.array([view.ids for view in kept])
-    places = np.array([view.pose_world[:2] for view in kept])
-    rows = np.minimum(np.searchsorted(walls.ids, ids), max(len(walls) - 1, 0))
-    if not len(walls):
-        nothing = np.zeros(len(kept))
-        return _Told(nothing, nothing, np.zeros((len(kept), 2, 2)), np.zeros((len(kept), 2)))
-    lines, extents = walls.belief.lines_world[rows], walls.extents[rows]
-    length = np.where(walls.ids[rows] == ids, extents[..., 1] - extents[..., 0], 0.0)
-    n = normals(lines[..., 0])
-    offsets = lines[..., 1] - np.vecdot(n, places[:, None])
-    turns = wrap(lines[..., 0] - np.array([view.alphas for view in kept]))
-    away = offsets - np.array([view.offsets for view in kept])
-    return _Told(
-        length.sum(axis=1),
-        np.vecdot(length, turns),
-        np.einsum("kw,kwi,kwj->kij", length, n, n),
-        np.einsum("kw,kwi,kw->ki", length, n, away),
-    )
-
-
-def _carried(poses_world: Float[np.ndarray, "k 3"], told: _Told, faith_m: float) -> Float[np.ndarray, "k 3"]:
-    """Return where the walls carried scans; where they do not tell, a scan moved as one with that before it."""
-    motion, there = np.zeros(3), poses_world[0, :2]
-    carried = np.empty_like(poses_world)
-    for k, pose in enumerate(poses_world):
-        arm = pose[:2] - there
-        shift = motion[:2] + rotation(motion[2]) @ arm - arm
-        turn = (told.turn[k] + faith_m * motion[2]) / (told.length_m[k] + faith_m)
-        shift = np.linalg.solve(told.normal[k] + faith_m * np.eye(2), told.shift[k] + faith_m * shift)
-        motion, there = np.array([*shift, turn]), pose[:2]
-        carried[k] = *(pose[:2] + shift), wrap(pose[2] + turn)
-    return carried

@@ -175,15 +175,16 @@ class FreeSpace:
             self._dirty = None
         return self._clearance
 
-    def clear(self) -> None:
-        """Forget every scan, where the robot drove, what it touched, and where the body did not fit."""
-        self._evidence[:] = 0
-        self._driven[:] = False
-        self._touched[:] = False
-        if self._fence is not None:
-            self._evidence[self._beyond] = self.config.limit
-        self._too_tight = np.zeros((0, 2))
-        self._mark(0, self.shape[0], 0, self.shape[1])
+    def blank(self) -> "FreeSpace":
+        """Return a grid of the same size without any scan, way or touch in it."""
+        new = FreeSpace(self.config)
+        new.range_m, new._first = self.range_m, self._first
+        new._lay(self.shape)
+        return new
+
+    def become(self, other: "FreeSpace") -> None:
+        """Take over all that another grid holds, which is not used any more."""
+        self.__dict__.update(other.__dict__)
 
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
         """Take in one scan at an estimated pose of the body; raises FloorTooLargeError for one too far from others."""
@@ -235,21 +236,25 @@ class FreeSpace:
         shape = tuple((end - first)[::-1].tolist())
         if shape[0] * shape[1] > self.config.cells_max:
             raise self._too_large(centre_world)
-        evidence, driven, touched = (np.zeros(shape, dtype=kind) for kind in (np.int8, bool, bool))
-        clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
-        if self._evidence.size:
-            c, r = (self._first - first).tolist()
-            place = (slice(r, r + self._evidence.shape[0]), slice(c, c + self._evidence.shape[1]))
-            evidence[place], clearance[place] = self._evidence, self._clearance
-            driven[place], touched[place] = self._driven, self._touched
-            if self._dirty is not None:
-                r0, r1, c0, c1 = self._dirty
-                self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
-        self._evidence, self._clearance, self._first = evidence, clearance, first
-        self._driven, self._touched = driven, touched
-        self._beyond = np.zeros(shape, dtype=bool)
+        old = self._evidence, self._driven, self._touched, self._clearance
+        c, r = (self._first - first).tolist()
+        self._first = first
+        if old[0].size and self._dirty is not None:
+            r0, r1, c0, c1 = self._dirty
+            self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
+        self._lay(shape)
+        place = (slice(r, r + old[0].shape[0]), slice(c, c + old[0].shape[1]))
+        self._evidence[place], self._driven[place], self._touched[place], self._clearance[place] = old
+
+    def _lay(self, shape: tuple[int, ...]) -> None:
+        """Make a grid of which nothing is known but what lies beyond the fence."""
+        self._evidence = np.zeros(shape, dtype=np.int8)
+        self._driven, self._touched, self._beyond = np.zeros((3, *shape), dtype=bool)
+        self._clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
         if self._fence is not None:
-            columns, rows = ((first[k] + np.arange(n) + 0.5) * self.config.cell_m for k, n in enumerate(shape[::-1]))
+            columns, rows = (
+                (self._first[k] + np.arange(n) + 0.5) * self.config.cell_m for k, n in enumerate(shape[::-1])
+            )
             self._beyond = ~np.asarray(shapely.contains_xy(self._fence, *np.meshgrid(columns, rows)))
             self._evidence[self._beyond] = self.config.limit
             self._mark(0, shape[0], 0, shape[1])

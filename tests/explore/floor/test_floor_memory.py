@@ -144,3 +144,30 @@ def test_the_floor_follows_at_once_where_robot_and_map_jump_together(scene, way)
     memory.see(moved_scene(scene, jump).walls(compose(jump, poses[-1])), scan_at(poses[-1]))
     follows = np.argwhere(memory.free_space.driven((slice(None), slice(None))))
     np.testing.assert_allclose(0.05 * (follows.mean(axis=0) - drawn.mean(axis=0))[::-1], jump[:2], atol=0.07)
+
+
+def test_a_grid_that_is_drawn_anew_in_pieces_comes_to_be_that_drawn_at_once(scene, way):
+    """The old one stays in use for some steps; scans and ways of these steps are in the new one, too."""
+    there, rest = way
+    motion = np.array([0.3, -0.2, 0.05])
+    at_once, slowly = FloorMemory(FreeSpace()), FloorMemory(FreeSpace(), FloorMemoryConfig(redrawn=3))
+    for memory in (at_once, slowly):
+        drive(memory, scene, there, np.zeros(3))
+        drive(memory, scene, rest[:1], motion)
+    before = np.count_nonzero(slowly.free_space.evidence)
+    assert not np.array_equal(at_once.free_space.evidence, slowly.free_space.evidence)
+    pieces = len(there) // 3 + 1
+    for k, pose in enumerate(rest[1 : pieces + 1]):
+        for memory in (at_once, slowly):
+            drive(memory, scene, [pose], motion)
+        if k < pieces // 2:
+            assert np.count_nonzero(slowly.free_space.evidence) >= before, "the old grid is in use"
+    one, other = at_once.free_space, slowly.free_space
+    cells = np.argwhere(one.evidence != 0)
+    assert len(cells) > 1000
+    same = tuple(other.cells(one.points(cells)).T)
+    np.testing.assert_array_equal(other.evidence[same], one.evidence[tuple(cells.T)])
+    np.testing.assert_allclose(slowly.way_world(), at_once.way_world())
+    whole = (slice(None), slice(None))
+    assert other.driven(whole).sum() == one.driven(whole).sum()
+    np.testing.assert_allclose(other.clearance()[same], one.clearance()[tuple(cells.T)])
