@@ -8,11 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares
 
 from ..geometry.lines import normals
 from ..geometry.poses import J, to_robot, wrap
 from .consistency import pose_errors
+
+
+DAMPING_MAX = 1e6
+"""With so much damping, in units of the squared columns, no step is long enough to make the error less: it is least."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +49,12 @@ def own_gauge(
     `cov` (s = 2 m) is that of plain errors. The frame is the motion g that makes e(g)' P^-1 e(g) least, as if nothing
     were known of it beforehand. Raises numpy.linalg.LinAlgError where P is not positive definite.
     """
-    root = np.linalg.cholesky(cov)
-    walls = (means, anchors_world, true_lines_world, root)
+    walls = (means, anchors_world, true_lines_world, np.linalg.inv(np.linalg.cholesky(cov)))
     turn = float(np.angle(np.mean(np.exp(1j * (means[:, 0] - true_lines_world[:, 0])))))
     start = np.array([0.0, 0.0, turn])
     start[:2] = np.linalg.lstsq(_by_frame(start, *walls)[:, :2], _off(start, *walls), rcond=None)[0]
     if len(means) > 1:
-        start = least_squares(
-            _off, start, lambda *at: -_by_frame(*at), method="lm", args=walls, ftol=1e-14, xtol=1e-14, gtol=1e-14
-        ).x
+        start = _nearest_frame(start, *walls)
     frame = np.array([start[0], start[1], wrap(start[2])])
     error, by_frame = _off(frame, *walls), _by_frame(frame, *walls)
     about_origin = by_frame.copy()
@@ -66,19 +66,44 @@ def own_gauge(
     return OwnGauge(float(error @ error), len(error) - rank, frame, shift_m, float(xi @ xi))
 
 
+def _nearest_frame(
+    start: Float[np.ndarray, "3"],
+    means: Float[np.ndarray, "m 2"],
+    anchors_world: Float[np.ndarray, "m 2"],
+    true_lines_world: Float[np.ndarray, "m 2"],
+    white: Float[np.ndarray, "s s"],
+) -> Float[np.ndarray, "3"]:
+    """Return the frame of least squared error: Levenberg and Marquardt, damped by the size of each column.
+
+    `white` is the inverse of the Cholesky factor of the covariance. scipy.optimize takes 0.2 s to import.
+    """
+    walls = (means, anchors_world, true_lines_world, white)
+    at, error, damping = start, _off(start, *walls), 1e-3
+    while damping < DAMPING_MAX:
+        by_frame = _by_frame(at, *walls)
+        damped = np.vstack([by_frame, np.diag(np.sqrt(damping) * np.linalg.norm(by_frame, axis=0))])
+        step = np.linalg.lstsq(damped, np.append(error, np.zeros(3)), rcond=None)[0]
+        new = _off(at + step, *walls)
+        if new @ new >= error @ error:
+            damping *= 10.0
+            continue
+        at, error, damping = at + step, new, 0.1 * damping
+    return at
+
+
 def _off(
     frame_world: Float[np.ndarray, "3"],
     means: Float[np.ndarray, "m 2"],
     anchors_world: Float[np.ndarray, "m 2"],
     true_lines_world: Float[np.ndarray, "m 2"],
-    root: Float[np.ndarray, "s s"],
+    white: Float[np.ndarray, "s s"],
 ) -> Float[np.ndarray, " s"]:
     """Return the whitened errors (s,) once the truth is moved by the frame."""
     alpha = true_lines_world[:, 0] + frame_world[2]
     n = normals(alpha)
     d = true_lines_world[:, 1] + n @ frame_world[:2] - np.vecdot(n, anchors_world)
     error = np.stack([wrap(means[:, 0] - alpha), means[:, 1] - d], axis=-1).ravel()
-    return np.asarray(np.linalg.solve(root, error))
+    return white @ error
 
 
 def _by_frame(
@@ -86,7 +111,7 @@ def _by_frame(
     means: Float[np.ndarray, "m 2"],
     anchors_world: Float[np.ndarray, "m 2"],
     true_lines_world: Float[np.ndarray, "m 2"],
-    root: Float[np.ndarray, "s s"],
+    white: Float[np.ndarray, "s s"],
 ) -> Float[np.ndarray, "s 3"]:
     """Return how the truth moves, whitened, as a coordinate (x, y, turn) of the frame grows."""
     n = normals(true_lines_world[:, 0] + frame_world[2])
@@ -94,4 +119,4 @@ def _by_frame(
     by_frame[0::2, 2] = 1.0
     by_frame[1::2, :2] = n
     by_frame[1::2, 2] = np.vecdot(n, (anchors_world - frame_world[:2]) @ J.T)
-    return np.asarray(np.linalg.solve(root, by_frame))
+    return white @ by_frame
