@@ -120,7 +120,8 @@ class SimulatedRobot:
             ranges = noisy(ranges, beam_sigmas(ranges, lidar), draws, lidar.range_max_m)
         ranges = with_dropouts(ranges, faults, self._seed, step)
         self._record.poses_world.append(self._pose.copy())
-        self._record.faces_of_beams.append(np.where(np.isfinite(ranges) & ~mixed, faces, -1))
+        told = np.where(np.isfinite(ranges) & ~mixed, faces, -1)
+        self._record.faces_of_beams.append(told.astype(np.min_scalar_type(-len(self._faces) - 1)))
         start_s, self._time_s = self._time_s, self._time_s + self.config.scan_s
         return Scan(
             self._finder.bearings_rad,

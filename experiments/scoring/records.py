@@ -1,5 +1,6 @@
 """What a trial keeps of every step, as arrays; truth and estimate side by side."""
 
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from slam.estimation.backend import Joint
 
 from ..scenario import WitnessedRobot
 from .association import Votes
+from .columns import Columns
 
 EVERY_M = 1.0
 """Metres driven between two sketches of the map."""
@@ -84,17 +86,18 @@ class Recorder:
     """Pose and all lines at the last step; None where the back end could no longer tell."""
     sketches: list[Sketch] = field(default_factory=list)
     """Of the map, every `EVERY_M` metres and at the last step."""
-    _rows: list[dict[str, object]] = field(default_factory=list)
+    _columns: Columns = field(default_factory=Columns)
+    _reasons: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self._columns)
 
     def add(self, step: Step) -> None:
         """Keep one step and the truth of the same moment; raises ValueError if scans and steps have parted."""
         record = self.robot.record
-        if len(record.poses_world) != len(self._rows) + 1:
+        if len(record.poses_world) != len(self) + 1:
             raise ValueError(
-                f"expected one scan for each step, found {len(record.poses_world)} scans at step {len(self._rows) + 1}:"
+                f"expected one scan for each step, found {len(record.poses_world)} scans at step {len(self) + 1}:"
                 " a mission yields a step after each sense()"
             )
         belief = step.map.belief
@@ -104,7 +107,8 @@ class Recorder:
         for keep, drop in step.merged:
             self.votes.merge(keep, drop)
         self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1])
-        self._rows.append(
+        self._reasons.append(sys.intern(step.decision.words))
+        self._columns.append(
             {
                 "time_s": step.time_s,
                 "scan_start_s": step.scan.start_s,
@@ -112,8 +116,8 @@ class Recorder:
                 "odometry": step.odometry.motion,
                 "odometry_cov": step.odometry.cov,
                 "touched": step.odometry.touched,
-                "estimated_world": belief.pose_world.copy(),
-                "estimated_cov": belief.pose_cov.copy(),
+                "estimated_world": belief.pose_world,
+                "estimated_cov": belief.pose_cov,
                 "true_world": record.poses_world[-1],
                 "face_of_beam": record.faces_of_beams[-1],
                 "path_length_m": step.path_length_m,
@@ -129,7 +133,6 @@ class Recorder:
                 "unstated_motion": step.localisation.unstated_motion is not None,
                 "is_lost": step.localisation.is_lost,
                 "wheel_noise_factor": step.localisation.noise_factor,
-                "reasons": step.decision.words,
             }
         )
 
@@ -148,13 +151,14 @@ class Recorder:
         if self.last is None:
             raise ValueError("expected at least one step, found none: the run failed before its first scan was mapped")
         scan = self.last.scan
-        columns = {name: np.array([row[name] for row in self._rows]) for name in self._rows[0] if name != "reasons"}
+        columns = self._columns.arrays()
+        columns["face_of_beam"] = columns["face_of_beam"].astype(np.int64)
         return Log(
             bearings_rad=scan.bearings_rad,
             sigma_m=np.broadcast_to(np.asarray(scan.sigma_m, dtype=np.float64), scan.bearings_rad.shape),
             sigma_share=scan.sigma_share,
             range_max_m=float(scan.range_max_m),
-            reasons=tuple(str(row["reasons"]) for row in self._rows),
+            reasons=tuple(self._reasons),
             **columns,
         )
 
