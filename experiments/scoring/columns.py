@@ -12,7 +12,7 @@ class Columns:
     """Grows by a row at a time; every row has the names, the kinds and the shapes of the first."""
 
     def __init__(self) -> None:
-        self._rows: IO[bytes] = tempfile.TemporaryFile(buffering=0)
+        self._rows: IO[bytes] = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115, closed when the columns are gone
         self._row: np.ndarray = np.zeros(0)
         self._count = 0
 

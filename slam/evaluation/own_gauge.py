@@ -13,7 +13,6 @@ from ..geometry.lines import normals
 from ..geometry.poses import J, to_robot, wrap
 from .consistency import pose_errors
 
-
 DAMPING_MAX = 1e6
 """With so much damping, in units of the squared columns, no step is long enough to make the error less: it is least."""
 
