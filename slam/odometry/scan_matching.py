@@ -17,6 +17,13 @@ from .surface_kernels import NEAREST, NOTHING_SIGMAS, sorted_into_buckets
 DEFAULTS = ScanMatchingConfig()
 
 
+def returns_within(scan: Scan, reach_m: float) -> Float[np.ndarray, "n 2"]:
+    """Return the returns of a scan that are nearer than this, robot frame, in the order of their beams."""
+    near = np.flatnonzero(scan.ranges_m < reach_m)
+    ranges, bearings = scan.ranges_m[near], scan.bearings_rad[near]
+    return ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+
+
 class ScanMatcher:
     """Keeps the points of the last scans in a frame of its own, and the pose of the last one there."""
 
@@ -29,7 +36,7 @@ class ScanMatcher:
 
     def begin(self, scan: Scan) -> None:
         """Take in the first scan, to which no motion led."""
-        self._keep(self._returns(scan))
+        self._keep(returns_within(scan, self._config.reach_m))
 
     def match(self, scan: Scan, wheels: Odometry) -> Odometry:
         """Return the motion that led to a scan, with its covariance.
@@ -39,7 +46,7 @@ class ScanMatcher:
         errors are common to neighbours, and since the same scan goes on to tell the map its lines.
         """
         c = self._config
-        returns = self._returns(scan)
+        returns = returns_within(scan, self._config.reach_m)
         points = thinned(returns, self._config.cell_m)
         guess = compose(self._pose, wheels.motion)
         odometry = wheels
@@ -53,11 +60,6 @@ class ScanMatcher:
         c = self._config
         surface = thinned(joined(returns, c.cell_m, c.gap_m), 0.5 * c.cell_m)
         self._points.append(to_world(surface, self._pose))
-
-    def _returns(self, scan: Scan) -> Float[np.ndarray, "n 2"]:
-        near = np.flatnonzero(scan.ranges_m < self._config.reach_m)
-        ranges, bearings = scan.ranges_m[near], scan.bearings_rad[near]
-        return ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
 
     def _matched(self, points: Float[np.ndarray, "n 2"], guess: Float[np.ndarray, "3"], wheels: Odometry) -> Odometry:
         c = self._config

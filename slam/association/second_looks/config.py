@@ -1,8 +1,84 @@
 """The settings of second looks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+
+@dataclass(frozen=True)
+class ClosuresConfig:
+    """Where a place is sought that the robot has been to before, and what proves that it is the same; for all logs."""
+
+    every_m: float = 0.5
+    """A search begins wherever the robot has gone so far since the last one."""
+    query_m: float = 4.0
+    """The scans of so many last metres are laid onto ..."""
+    beside_m: float = 5.0
+    """... an old scan and those that were taken no farther from it along the path."""
+    way_m: float = 6.0
+    """Old scans that are nearer than this, by the way over motions and closures, need no closure."""
+    recent: int = 20
+    """So many last scans are not old: odometry was matched to them."""
+    radius_m: float = 1.0
+    """A place is sought so far around where it is believed, ..."""
+    radius_share: float = 0.04
+    """... and farther by this share of the way since, ..."""
+    most_m: float = 6.0
+    """... where that makes no more than this in all; ..."""
+    view_m: float = 1.0
+    """Old scans count that were taken farther away by so much: they see the same walls."""
+    turn_rad: float = float(np.deg2rad(10.0))
+    """... and turned by so much, ..."""
+    turn_a_metre: float = float(np.deg2rad(0.3))
+    """... and more by so much for each metre of the way, ..."""
+    most_rad: float = float(np.deg2rad(45.0))
+    """... where that makes no more than this in all."""
+    slip_fit: float = 0.4
+    """A scan of which a smaller share of points lies near those before it was taken after a slip: the turn between may
+    have been any."""
+    fit_scans: int = 8
+    """So many scans before it are looked at, ..."""
+    fits_m: float = 0.2
+    """... and points that are nearer than this lie near."""
+    places: int = 3
+    """So many stretches of the old path are tried, the nearest first."""
+    cell_m: float = 0.1
+    """Size of a cell of the search."""
+    kernel_m: float = 0.1
+    """How fast the likelihood falls with the distance from an old point, as a standard deviation."""
+    gap_m: float = 0.3
+    """Neighbouring returns that are nearer to each other are of one surface."""
+    step_rad: float = float(np.deg2rad(1.0))
+    """Between two turns that are tried."""
+    least: float = 0.5
+    """A place must have so large a mean likelihood, ..."""
+    rival: float = 0.9
+    """... and no other place more than this share of it, ..."""
+    apart_m: float = 0.5
+    """... where places farther apart than this, or than ..."""
+    apart_rad: float = float(np.deg2rad(10.0))
+    """... this, are others."""
+    least_points: int = 100
+    """With fewer points no place is sought."""
+    pair_m: tuple[float, float] = (1.0, 4.0)
+    """A closure is believed with another one, so far from it along the path, ..."""
+    agree_m: float = 0.15
+    """... if both put the robot at the same place, to this, ..."""
+    agree_rad: float = float(np.deg2rad(2.5))
+    """... and turned alike, to this."""
+    sigma_m: float = 0.05
+    """Standard deviation of a closure, across both axes ..."""
+    sigma_rad: float = float(np.deg2rad(0.7))
+    """... and of its turn."""
+    slip_m: float = 0.1
+    """Standard deviation of a motion in which the robot slipped, across both axes ..."""
+    slip_rad: float = float(np.deg2rad(10.0))
+    """... and of its turn."""
+    doubts: tuple[float, ...] = (1000.0, 30.0, 10.0, 3.0)
+    """Closures count less and less from so many standard deviations on, one round after the other: first all of them
+    count, at last only those that agree with each other."""
+    taken_back: float = 6.0
+    """A closure that is off by more standard deviations than this in the end is taken back."""
 
 
 @dataclass(frozen=True)
@@ -35,3 +111,5 @@ class SecondLooksConfig:
     """From so many standard deviations on an observation counts less and less (Cauchy's weight)."""
     iterations: int = 6
     """Of Gauss and Newton's method in each round."""
+    closures: ClosuresConfig = field(default_factory=ClosuresConfig)
+    """Where the path comes back to a place."""

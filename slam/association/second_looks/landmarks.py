@@ -35,6 +35,9 @@ class Sightings:
         return np.asarray(self.ends.mean(axis=1))
 
 
+NO_SIGHTINGS = Sightings(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
+
+
 def firm(scan: int, segments: Segments, config: SecondLooksConfig) -> Sightings:
     """Return the segments of one scan that are long enough and known well enough."""
     length = np.hypot(*(segments.ends[:, 1] - segments.ends[:, 0]).T)

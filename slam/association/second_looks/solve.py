@@ -1,5 +1,6 @@
 """Poses and lines that agree best with all motions and all sightings: Gauss and Newton's method on a sparse system."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,21 +51,35 @@ def begun(poses: Float[np.ndarray, "s 3"], sightings: Sightings, owner: Int[np.n
     return Unknowns(poses, np.column_stack([direction, np.zeros(count)]), np.column_stack(mean[:2]))
 
 
+@dataclass(frozen=True)
+class Links:
+    """Where some poses are as seen from others: motions between two scans, or closures."""
+
+    first: Int[np.ndarray, " k"]
+    second: Int[np.ndarray, " k"]
+    motions: Float[np.ndarray, "k 3"]
+    """The second pose in the frame of the first, m m rad."""
+    sigmas: Float[np.ndarray, "k 3"]
+    doubt: float
+    """From so many standard deviations on a link counts less and less (Cauchy's weight)."""
+
+
 def solved(
     start: Unknowns,
-    motions: Float[np.ndarray, "t 3"],
+    links: Sequence[Links],
     sightings: Sightings,
     owner: Int[np.ndarray, " n"],
     config: SecondLooksConfig,
 ) -> Unknowns:
-    """Return the unknowns that agree best; `motions` lead from each pose to the next, robot frame.
+    """Return the unknowns that agree best with links between poses and sightings of lines.
 
-    The first pose stays. Motions and sightings that disagree with all others count little (Cauchy's weight).
+    The first pose stays. What disagrees with all else counts little (Cauchy's weight).
     """
     found = start
     for _ in range(config.iterations):
-        parts = [_of_motions(found.poses, motions, config), _of_sightings(found, sightings, owner, config)]
-        change = _step(parts, found, config.doubt)
+        parts = [(of_links(found.poses, each), each.doubt) for each in links]
+        parts.append((of_sightings(found, sightings, owner, config), config.doubt))
+        change = _step(parts, found)
         found = found.plus(change)
         if np.abs(change).max() < STILL:
             break
@@ -72,7 +87,7 @@ def solved(
 
 
 @dataclass(frozen=True)
-class _Terms:
+class Terms:
     """Whitened errors of groups of k, and their derivatives by the v variables of each group."""
 
     errors: Float[np.ndarray, "g k"]
@@ -80,28 +95,25 @@ class _Terms:
     columns: Int[np.ndarray, "g v"]
 
 
-def _of_motions(
-    poses: Float[np.ndarray, "s 3"], motions: Float[np.ndarray, "t 3"], config: SecondLooksConfig
-) -> _Terms:
-    first, second = poses[:-1], poses[1:]
+def of_links(poses: Float[np.ndarray, "s 3"], links: Links) -> Terms:
+    """Return how far poses are from their links."""
+    first, second = poses[links.first], poses[links.second]
     c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
     dx, dy = (second - first)[:, :2].T
     ahead, left = c * dx + s * dy, c * dy - s * dx
-    errors = np.column_stack([ahead, left, second[:, 2] - first[:, 2]]) - motions
+    errors = np.column_stack([ahead, left, second[:, 2] - first[:, 2]]) - links.motions
     errors[:, 2] = wrap(errors[:, 2])
     J = np.zeros((len(first), 3, 6))
     J[:, 0, 0], J[:, 0, 1], J[:, 0, 2] = -c, -s, left
     J[:, 1, 0], J[:, 1, 1], J[:, 1, 2] = s, -c, -ahead
     J[:, 0, 3], J[:, 0, 4], J[:, 1, 3], J[:, 1, 4] = c, s, -s, c
     J[:, 2, 2], J[:, 2, 5] = -1.0, 1.0
-    sigmas = np.array([config.odometry_m, config.odometry_m, config.odometry_rad])
-    columns = 3 * np.arange(len(first))[:, None] + np.arange(6)
-    return _Terms(errors / sigmas, J / sigmas[:, None], columns)
+    columns = np.concatenate([3 * at[:, None] + np.arange(3) for at in (links.first, links.second)], axis=1)
+    return Terms(errors / links.sigmas, J / links.sigmas[:, :, None], columns)
 
 
-def _of_sightings(
-    at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"], config: SecondLooksConfig
-) -> _Terms:
+def of_sightings(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"], config: SecondLooksConfig) -> Terms:
+    """Return how far lines are from their sightings."""
     pose, line, anchor = at.poses[sightings.scan], at.lines[owner], at.anchors[owner]
     n, t = normals(line[:, 0]), directions(line[:, 0])
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
@@ -120,14 +132,14 @@ def _of_sightings(
     columns = np.column_stack(
         [*(3 * sightings.scan + k for k in range(3)), *(at.poses.size + 2 * owner + k for k in range(2))]
     )
-    return _Terms(errors / sigmas, J / sigmas[:, :, None], columns)
+    return Terms(errors / sigmas, J / sigmas[:, :, None], columns)
 
 
-def _step(parts: list[_Terms], at: Unknowns, doubt: float) -> Float[np.ndarray, " u"]:
+def _step(parts: list[tuple[Terms, float]], at: Unknowns) -> Float[np.ndarray, " u"]:
     """Return the change of all unknowns that the weighted errors ask for."""
     size = at.poses.size + at.lines.size
     H, g = csc_array((size, size)), np.zeros(size)
-    for part in parts:
+    for part, doubt in parts:
         if not len(part.errors):
             continue
         weights = 1.0 / (1.0 + np.sum(part.errors**2, axis=1) / doubt**2)

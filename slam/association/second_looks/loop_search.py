@@ -1,0 +1,156 @@
+"""The search for places that the robot came back to, along the whole drive.
+
+A submap of the last metres is laid onto old ones, as far around as the path may have drifted since. A place is believed
+where two searches agree. Where a scan does not fit those before it, the robot has slipped: all turns about that place
+are tried then, from either side of it and whenever the robot comes by again.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from ...geometry.poses import compose, inverse, wrap
+from .closures import Closure, Drive, settled
+from .config import SecondLooksConfig
+from .submap_match import Place, Window, apart, place_on
+from .submaps import Returns
+
+SLIP_M = 1e4
+"""The way over a slip: longer than any other, so that the shortest way tells how many slips are on it."""
+NEAR_M = 0.1
+"""The way over a closure."""
+
+
+class LoopSearch:
+    """Follows a drive scan by scan, closes its loops, and keeps the poses that agree with them so far."""
+
+    def __init__(
+        self,
+        start_world: Float[np.ndarray, "3"],
+        motions: Float[np.ndarray, "t 3"],
+        returns: Returns,
+        config: SecondLooksConfig,
+    ) -> None:
+        self.poses = np.tile(start_world, (len(motions) + 1, 1))
+        self.closures: list[Closure] = []
+        self._motions, self._returns, self._config = motions.copy(), returns, config
+        self._slipped: list[int] = []
+        self._found: list[Closure] = []
+        """What the searches found, believed or not."""
+        self._ways = np.append(0.0, np.cumsum(np.hypot(*motions[:, :2].T)))
+        asked = 0.0
+        for k in range(1, len(self.poses)):
+            self._go_to(k)
+            if self._ways[k] - asked >= config.closures.every_m:
+                asked = self._ways[k]
+                self._look(k)
+
+    @property
+    def drive(self) -> Drive:
+        """The motions, those of slips as closures tell them."""
+        return Drive(self._motions, self._slipped)
+
+    def _go_to(self, scan: int) -> None:
+        c = self._config.closures
+        self.poses[scan] = compose(self.poses[scan - 1], self._motions[scan - 1])
+        before = range(max([scan - c.fit_scans, 0, *self._slipped[-1:]]), scan)
+        if self._returns.fit(scan, before, self.poses) < c.slip_fit:
+            self._slipped.append(scan)
+
+    def _look(self, new: int) -> None:
+        """Seek the place of a scan among old ones; take it in if it agrees with one found before."""
+        found = self._place(new)
+        if found is None:
+            return
+        partner = next((each for each in reversed(self._found) if self._agree(each, found)), None)
+        self._found.append(found)
+        if partner is not None:
+            self.closures += [each for each in (partner, found) if each not in self.closures]
+            self._settle(found)
+
+    def _place(self, new: int) -> Closure | None:
+        """Return where a scan was taken, as seen from the old scans on which it lies best; None if there are rivals."""
+        c = self._config.closures
+        first = int(np.searchsorted(self._ways, self._ways[new] - c.query_m))
+        points = self._returns.seen_from(range(max([first, *self._slipped[-1:]]), new + 1), self.poses, new)
+        if len(points) < c.least_points:
+            return None
+        found: list[tuple[Place, int]] = []
+        for old, window in self._windows(new):
+            place = place_on(self._returns.surface(self._around(old, new), self.poses), points, window, c)
+            if place is not None:
+                found.append((place, old))
+        if not found:
+            return None
+        best, old = max(found, key=lambda each: each[0].score)
+        others = [each.score for each, _ in found if apart(each.pose[None], best.pose, c)[0]]
+        if best.score < c.least or max([best.rival, *others]) > c.rival * best.score:
+            return None
+        return Closure(old, new, compose(inverse(self.poses[old]), best.pose))
+
+    def _around(self, old: int, new: int) -> range:
+        """Return the scans about an old one, up to the next slip on either side."""
+        c = self._config.closures
+        first, last = np.searchsorted(self._ways, self._ways[old] + np.array([-c.beside_m, c.beside_m]))
+        low = max([int(first), *(k for k in self._slipped if k <= old)])
+        high = min([int(last), new - c.recent // 2, *(k for k in self._slipped if k > old)])
+        return range(low, max(high, old + 1))
+
+    def _windows(self, new: int) -> list[tuple[int, Window]]:
+        """Return the old scans to which this one may have come back, and where to seek it."""
+        c = self._config.closures
+        slips, ways = np.divmod(self._shortest_ways(new), SLIP_M)
+        scans = np.arange(new)
+        radius = c.radius_m + c.radius_share * ways
+        turn = np.where(slips > 0, np.pi, np.minimum(c.turn_rad + c.turn_a_metre * ways, c.most_rad))
+        lever = 0.0
+        for count, slip in enumerate(reversed(self._slipped), 1):
+            # Each slip turns all that came after it about where it happened.
+            lever = 2.0 * lever + 2.0 * float(np.hypot(*(self.poses[new] - self.poses[slip])[:2]))
+            radius[(slips == count) & (scans < slip)] += lever
+        away = np.hypot(*(self.poses[new, :2] - self.poses[:new, :2]).T)
+        may = (scans < new - c.recent) & (ways > c.way_m) | (slips > 0)
+        rows = np.flatnonzero(may & (away < radius + c.view_m) & (radius < c.most_m))
+        stretches = np.split(rows, np.flatnonzero(np.diff(self._ways[rows]) > c.beside_m) + 1)
+        nearest = sorted((int(s[np.argmin(away[s])]) for s in stretches if len(s)), key=lambda row: away[row])
+        return [(k, Window(self.poses[new].copy(), float(radius[k]), float(turn[k]))) for k in nearest[: c.places]]
+
+    def _shortest_ways(self, new: int) -> Float[np.ndarray, " n"]:
+        """Return the way from each earlier scan to one, over motions and closures."""
+        lengths = np.maximum(np.diff(self._ways[: new + 1]), 1e-6)
+        lengths[np.array(self._slipped, dtype=np.int64) - 1] += SLIP_M
+        closed = np.array([(each.old, each.new) for each in self.closures], dtype=np.int64).reshape(-1, 2)
+        rows, columns = (np.concatenate([np.arange(new) + k, closed[:, k]]) for k in range(2))
+        values = np.concatenate([lengths, np.full(len(closed), NEAR_M)])
+        graph = coo_array((values, (rows, columns)), shape=(new + 1, new + 1)).tocsr()
+        ways: np.ndarray = dijkstra(graph, directed=False, indices=np.array([new]))
+        return ways[0, :new]
+
+    def _agree(self, one: Closure, other: Closure) -> bool:
+        """Return whether two closures put the robot at the same place, by its motion between them."""
+        c = self._config.closures
+        low, high = c.pair_m
+        if not low <= self._ways[other.new] - self._ways[one.new] <= high:
+            return False
+        if any(one.new < k <= other.new for k in self._slipped):
+            return False
+        between = compose(inverse(self.poses[one.new]), self.poses[other.new])
+        off = compose(compose(self.poses[one.old], one.motion), between)
+        off -= compose(self.poses[other.old], other.motion)
+        return bool(np.hypot(*off[:2]) < c.agree_m and abs(wrap(off[2])) < c.agree_rad)
+
+    def _settle(self, last: Closure) -> None:
+        """Bring the poses so far into agreement with all closures, if the last one is not what they say already."""
+        c, new = self._config.closures, last.new
+        put = compose(self.poses[last.old], last.motion)
+        off = compose(inverse(self.poses[new]), put)
+        if np.hypot(*off[:2]) < 0.5 * c.agree_m and abs(off[2]) < 0.5 * c.agree_rad:
+            return
+        between = [k for k in self._slipped if last.old < k <= new]
+        if between:
+            slip, moved = between[-1], compose(put, inverse(self.poses[new]))
+            self.poses[slip : new + 1] = [compose(moved, pose) for pose in self.poses[slip : new + 1]]
+            self._motions[slip - 1] = compose(inverse(self.poses[slip - 1]), self.poses[slip])
+        so_far = Drive(self._motions[:new], self._slipped)
+        self.poses[: new + 1] = settled(self.poses[: new + 1], so_far, self.closures, self._config)
