@@ -25,6 +25,7 @@ from ..runner.trials import one
 HEAD = (
     "scanner; fault", "complete", "coverage, least", "contours", "steps, median", "steps over those without",
     "pose ANEES, median", "map ANEES, median", "collisions", "motions found", "lost", "wheel noise",
+    "noticed, most steps",
 )  # fmt: skip
 NAMES = ("case", "world", "backend", "seed", "max_steps")
 SCANNERS = {
@@ -123,9 +124,15 @@ def table(rows: Sequence[Row]) -> Table:
             f"{min(row['coverage'] for row in own):.3f}", closed, f"{np.median([row['steps'] for row in own]):.0f}",
             f"{np.exp(np.mean(np.log(ratios))):.2f}" if ratios and ";" in case else "", *anees,
             str(sum(row["collisions"] for row in own)), str(sum(row["unstated_motions"] for row in own)),
-            str(sum(row["lost_steps"] > 0 for row in own)), _median(own, "wheel_noise_factor"),
+            str(sum(row["lost_steps"] > 0 for row in own)), _median(own, "wheel_noise_factor"), _noticed(own),
         )  # fmt: skip
     return shown
+
+
+def _noticed(rows: Sequence[Row]) -> str:
+    """Return after how many steps at most the wheels' noise was taken to be larger, where it was in all runs."""
+    found = [int(row["wheel_noise_step"]) for row in rows if row.get("wheel_noise_step") is not None]
+    return str(max(found)) if found and len(found) == len(rows) else ""
 
 
 def _median(rows: Sequence[Row], name: str) -> str:

@@ -64,6 +64,8 @@ def one(config: TrialConfig) -> Row:
     row["reachable_way"] = summary.get("certificate", {}).get("reachable_way")
     if result.log is not None:
         parts = np.array_split(1e3 * result.log.seconds, PARTS)
+        larger = np.flatnonzero(result.log.wheel_noise_factor > 1.0)
+        row["wheel_noise_step"] = int(larger[0]) if len(larger) else None
         row["step_ms_along"] = [float(part.mean()) if len(part) else None for part in parts]
     return row | {"processor_s": time.process_time() - began, "peak_mib": _peak_mib()}
 

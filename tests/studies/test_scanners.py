@@ -32,3 +32,11 @@ def test_a_case_is_the_robot_that_its_name_tells():
         assert (robot.lidar.sigma_share > 0) == ("noise of" in name)
         assert f"{robot.lidar.beams:,} beams" in name
         assert ScannersStudy().trial(name, 3).robot == robot
+
+
+def test_the_step_at_which_worse_wheels_were_noticed_is_told_where_all_runs_did():
+    slip = "541 beams; slip of three times"
+    rows = [row(slip, 1, 100, wheel_noise_step=4), row(slip, 2, 100, wheel_noise_step=9), row("541 beams", 1, 100)]
+    cells = [list(column.cells) for column in table(rows).columns]
+    assert cells[12] == ["9", ""]
+    assert list(table([*rows, row(slip, 3, 100, wheel_noise_step=None)]).columns[12].cells) == ["", ""]
