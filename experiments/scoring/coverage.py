@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from slam.evaluation.trajectories import alignment_of_paths
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import compose, inverse, to_world
+from slam.geometry.segment_kernels import lie_beside
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
@@ -87,15 +88,8 @@ def _with_headings(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "
 
 def covered(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> Bool[np.ndarray, " p"]:
     """Return which points lie within `near_m` of a wall whose normal agrees within 45 degrees."""
-    result = np.zeros(len(samples.points_world), dtype=bool)
-    if not len(walls_world):
-        return result
-    tree = shapely.STRtree([shapely.LineString(wall) for wall in walls_world])
-    point, wall = tree.query(shapely.points(samples.points_world), predicate="dwithin", distance=near_m)
     mapped = normals(through(walls_world)[:, 0])
-    agrees = np.sum(samples.normals_world[point] * mapped[wall], axis=-1) >= np.cos(np.pi / 4)
-    result[point[agrees]] = True
-    return result
+    return lie_beside(samples.points_world, samples.normals_world, walls_world, mapped, near_m, np.cos(np.pi / 4))
 
 
 def coverage(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: float) -> float:
