@@ -49,15 +49,16 @@ def picture_of(result: TrialResult) -> bytes:
 def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> Picture:
     """Return the picture of a recorded drive: no truth lies under it, but the path that the wheels tell."""
     summary, config = result.summary, result.scenario.config
+    looked = summary.get("second_looks", summary)
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
-        f"{summary['lines']} walls, {summary['chains_closed']} closed chains",
+        f"{looked['lines']} walls, {looked['chains_closed']} closed chains",
     ]
     return Picture(
         map=last.map,
         chains=last.chains,
-        path_world=log.estimated_world,
-        title=f"{result.scenario.world.name}   {config.backend}",
+        path_world=log.estimated_world if result.smoothed is None else result.smoothed.poses_world,
+        title=f"{result.scenario.world.name}   {config.backend if looked is summary else 'second looks'}",
         subtitle=";  ".join(words),
         odometry_path_world=odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)]),
         radius_m=config.robot.radius_m,

@@ -3,6 +3,7 @@
 import platform
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -92,7 +93,9 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         files["trajectory_true.tum"] = lambda: trajectory(result, log, log.true_world)
     else:
         files["trajectory_odometry.tum"] = lambda: trajectory(result, log, wheels_alone(log, recorded))
-    drawn = cache(lambda: map_geojson(last, result.joint, certificate, log))
+    # A recorded drive was looked at again: its map goes with the smoothed path.
+    shown = log if recorded is None or smoothed is None else replace(log, estimated_world=smoothed.poses_world)
+    drawn = cache(lambda: map_geojson(last, result.joint, certificate, shown))
     told = cache(lambda: _dimensions(result, drawn()["features"]))
     title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
     files |= {
@@ -101,7 +104,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "map.geojson": lambda: json_bytes(drawn()),
         "steps.csv": lambda: steps_csv(log),
         "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
-        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, log.estimated_world, title, told()),
+        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
         "map.dxf": lambda: _drawing(drawn()["features"], told(), title),
         "map.png": lambda: _picture(result),
     }

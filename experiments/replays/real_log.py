@@ -14,18 +14,14 @@ from explore.step import Step
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordedRobot, RecordingError
-from slam.association.second_looks.second_looks import second_looks
-from slam.extraction.extract import extract
-from slam.extraction.visible_extent import sure_pieces
 from slam.mapper import Mapper
-from slam.odometry.scan_matching import returns_within
 
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
 from ..scoring.summary import odometry_poses
-from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
 from ..usage import UsageError
+from .looked_again import looked_again
 from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
 from .unwitnessed import run_unwitnessed, unwitnessed
 
@@ -92,21 +88,3 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
 
     result = run_unwitnessed(scenario, watch, mission, run.log)
     return looked_again(result) if run.options.second_looks or result.smoothed is not None else result
-
-
-def looked_again(result: TrialResult) -> TrialResult:
-    """Return a result whose smoothed path is that of second looks at all scans; walls stay those of the back end.
-
-    The path is the same whichever back end ran: scans and odometry alone tell it.
-    """
-    log, last, joint, recorded = result.log, result.last, result.joint, result.recorded
-    if log is None or last is None or joint is None or recorded is None:
-        return result
-    smoothed = result.smoothed or Smoothed(log.estimated_world, last.map, joint)
-    mission = result.scenario.config.mission
-    scans = [recorded.recording.scan(k) for k in range(len(log))]
-    rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
-    segments = [sure_pieces(extract(scan, rules), scan, rules) for scan in scans]
-    returns = [returns_within(scan, reach_m) for scan in scans]
-    poses = second_looks(log.estimated_world[0], log.odometry[1:], segments, returns, mission.second_looks)
-    return replace(result, smoothed=replace(smoothed, poses_world=poses))

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from .config import ClosuresConfig, SecondLooksConfig
 from .landmarks import NO_SIGHTINGS
-from .solve import Links, Unknowns, of_links, solved
+from .solve import Links, of_links, solved, without_lines
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def settled(
     poses: Float[np.ndarray, "s 3"], drive: Drive, closures: Sequence[Closure], config: SecondLooksConfig
 ) -> Float[np.ndarray, "s 3"]:
     """Return the poses that agree best with motions and closures; a closure that the others contradict gives way."""
-    found = Unknowns(poses, np.zeros((0, 2)), np.zeros((0, 2)))
+    found = without_lines(poses)
     for doubt in config.closures.doubts:
         links = (drive.links(doubt, config), closure_links(closures, doubt, config.closures))
         found = solved(found, links, NO_SIGHTINGS, np.zeros(0, dtype=np.int64), config)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ...extraction.segments import Segments
 from ...geometry.lines import directions, normals
@@ -28,6 +28,10 @@ class Sightings:
 
     def __len__(self) -> int:
         return len(self.scan)
+
+    def take(self, rows: Bool[np.ndarray, " n"]) -> "Sightings":
+        """Return the chosen ones."""
+        return Sightings(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
     @property
     def middles(self) -> Float[np.ndarray, "n 2"]:

@@ -5,19 +5,35 @@ that all scans agree on, as often as there are rounds. Nothing of it asks which 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from ...estimation.backend import Joint
 from ...extraction.segments import Segments
+from ...map.stochastic_map import StochasticMap
 from .closures import closure_links, held, settled
 from .config import SecondLooksConfig
 from .landmarks import Sightings, associated, firm, joined
 from .loop_search import LoopSearch
-from .solve import Unknowns, begun, solved
+from .solve import begun, normal_equations, solved, without_lines
 from .submaps import Returns
+from .walls import merged, spans, surveyed
 
 DEFAULTS = SecondLooksConfig()
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What all scans of a drive say together, world frame."""
+
+    poses: Float[np.ndarray, "s 3"]
+    walls: StochasticMap
+    joint: Joint
+    """The last pose and all walls."""
+    closures: int
+    """So many places that the robot came back to hold the path together."""
 
 
 def second_looks(
@@ -26,26 +42,32 @@ def second_looks(
     segments: Sequence[Segments],
     returns: Sequence[Float[np.ndarray, "_ 2"]],
     config: SecondLooksConfig = DEFAULTS,
-) -> Float[np.ndarray, "s 3"]:
-    """Return the poses that agree best with all motions between scans and the segments of all scans.
+) -> Survey:
+    """Return the poses and walls that agree best with all motions between scans and the segments of all scans.
 
     `motions` lead from each pose to the next (robot frame, m m rad), one less than poses; `segments` and `returns` are
     those of each scan, robot frame. The first pose stays where it is.
     """
     search = LoopSearch(start_world, motions, Returns(returns, config.closures), config)
     sightings = joined([firm(k, each, config) for k, each in enumerate(segments)])
-    return _with_lines(search, sightings, config).poses
+    return _with_walls(search, sightings, config)
 
 
-def _with_lines(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig) -> Unknowns:
-    """Return poses and lines after all rounds of association and solution."""
+def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig) -> Survey:
+    """Return poses and walls after all rounds of association and solution; at last, walls that stand twice are one."""
     c, drive = config.closures, search.drive.links(config.doubt, config)
-    poses = settled(search.poses, search.drive, search.closures, config)
-    unknowns = Unknowns(poses, np.zeros((0, 2)), np.zeros((0, 2)))
-    for gate_m in config.gates_m:
-        owner = associated(sightings, unknowns.poses, gate_m, config)
-        kept = owner >= 0
-        seen = Sightings(*(getattr(sightings, name)[kept] for name in Sightings.__dataclass_fields__))
-        links = (drive, closure_links(held(search.closures, unknowns.poses, c), config.doubt, c))
-        unknowns = solved(begun(unknowns.poses, seen, owner[kept]), links, seen, owner[kept], config)
-    return unknowns
+    unknowns = without_lines(settled(search.poses, search.drive, search.closures, config))
+    seen, of = sightings, np.zeros(0, dtype=np.int64)
+    links, kept = [drive], search.closures
+    for gate_m in [*config.gates_m, None]:
+        if gate_m is None:
+            of = merged(unknowns, spans(unknowns, seen, of), of, config)
+        else:
+            owner = associated(sightings, unknowns.poses, gate_m, config)
+            seen, of = sightings.take(owner >= 0), owner[owner >= 0]
+        kept = held(search.closures, unknowns.poses, c)
+        links = [drive, closure_links(kept, config.doubt, c)]
+        unknowns = solved(begun(unknowns.poses, seen, of), links, seen, of, config)
+    information, _ = normal_equations(unknowns, links, seen, of, config)
+    walls, joint = surveyed(unknowns, information, seen, of, config)
+    return Survey(unknowns.poses, walls, joint, len(kept))

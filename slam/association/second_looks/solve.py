@@ -35,6 +35,11 @@ class Unknowns:
         return Unknowns(poses, lines, self.anchors)
 
 
+def without_lines(poses: Float[np.ndarray, "s 3"]) -> Unknowns:
+    """Return poses alone."""
+    return Unknowns(poses, np.zeros((0, 2)), np.zeros((0, 2)))
+
+
 def begun(poses: Float[np.ndarray, "s 3"], sightings: Sightings, owner: Int[np.ndarray, " n"]) -> Unknowns:
     """Return lines where the mean of their sightings has them."""
     count = int(owner.max(initial=-1)) + 1
@@ -77,9 +82,8 @@ def solved(
     """
     found = start
     for _ in range(config.iterations):
-        parts = [(of_links(found.poses, each), each.doubt) for each in links]
-        parts.append((of_sightings(found, sightings, owner, config), config.doubt))
-        change = _step(parts, found)
+        information, gradient = normal_equations(found, links, sightings, owner, config)
+        change: np.ndarray = splu(information, permc_spec="MMD_AT_PLUS_A").solve(gradient)
         found = found.plus(change)
         if np.abs(change).max() < STILL:
             break
@@ -135,8 +139,16 @@ def of_sightings(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"
     return Terms(errors / sigmas, J / sigmas[:, :, None], columns)
 
 
-def _step(parts: list[tuple[Terms, float]], at: Unknowns) -> Float[np.ndarray, " u"]:
-    """Return the change of all unknowns that the weighted errors ask for."""
+def normal_equations(
+    at: Unknowns,
+    links: Sequence[Links],
+    sightings: Sightings,
+    owner: Int[np.ndarray, " n"],
+    config: SecondLooksConfig,
+) -> tuple[csc_array, Float[np.ndarray, " u"]]:
+    """Return the information about all unknowns, poses first, and where the weighted errors push them."""
+    parts = [(of_links(at.poses, each), each.doubt) for each in links]
+    parts.append((of_sightings(at, sightings, owner, config), config.doubt))
     size = at.poses.size + at.lines.size
     H, g = csc_array((size, size)), np.zeros(size)
     for part, doubt in parts:
@@ -152,5 +164,4 @@ def _step(parts: list[tuple[Terms, float]], at: Unknowns) -> Float[np.ndarray, "
         g -= J.T @ (W @ part.errors.ravel())
     fixed = np.full(size, 1e-9)
     fixed[:3] = START_SIGMA**-2
-    change: np.ndarray = splu(csc_array(H + diags_array(fixed)), permc_spec="MMD_AT_PLUS_A").solve(g)
-    return change
+    return csc_array(H + diags_array(fixed)), g

@@ -76,11 +76,25 @@ def test_a_smoothed_path_is_scored_beside_the_one_of_each_step(scored):
     assert (scored / "out" / "graph-batch" / "trajectory_smoothed.tum").is_file()
 
 
-def test_second_looks_smooth_the_path_of_any_back_end(scored, tmp_path):
+def test_path_and_map_of_second_looks_are_the_same_whichever_back_end_ran(scored, tmp_path):
     words = ["replay", str(scored / "a.log"), "--relations", str(scored / "a.relations"), "--out", str(tmp_path)]
-    assert main([*words, "--second-looks"]) == 0
-    assert json.loads((tmp_path / "summary.json").read_text())["relations_smoothed"]["at_scans"]["all"]["count"] == 2
-    assert len(np.loadtxt(tmp_path / "trajectory_smoothed.tum")) == 12
+    assert main([*words, "--second-looks", "--backend", "full-ekf", "block-ekf"]) == 0
+    one, other = tmp_path / "full-ekf", tmp_path / "block-ekf"
+    for name in ("trajectory_smoothed.tum", "map.npz", "map.geojson"):
+        assert (one / name).read_bytes() == (other / name).read_bytes()
+    assert (one / "steps.csv").read_bytes() != (other / "steps.csv").read_bytes()
+    summary = json.loads((one / "summary.json").read_text())
+    assert summary["relations_smoothed"]["at_scans"]["all"]["count"] == 2
+    assert summary["second_looks"] == {"lines": 1, "duplicate_lines": 0, "chains_closed": 0, "closures": 0}
+    path = np.loadtxt(one / "trajectory_smoothed.tum")
+    assert len(path) == 12
+    walls, [way] = (
+        [each["geometry"]["coordinates"] for each in json.loads((one / "map.geojson").read_text())["features"]
+         if each["properties"]["kind"] == kind]
+        for kind in ("wall", "trajectory")
+    )  # fmt: skip
+    np.testing.assert_allclose(way, path[:, 1:3], atol=1e-6)
+    np.testing.assert_allclose(np.array(walls)[0, :, 1], 2.0, atol=0.02)
 
 
 def test_scores_are_printed(scored, capsys):

@@ -1,5 +1,6 @@
 """Second looks: segments of a whole drive are associated anew, and poses and lines solved for together."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,8 @@ from slam.association.second_looks.closures import Drive
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.landmarks import associated, firm, joined
 from slam.association.second_looks.second_looks import second_looks
-from slam.association.second_looks.solve import begun, of_links, of_sightings, solved
+from slam.association.second_looks.solve import begun, normal_equations, of_links, of_sightings, solved
+from slam.association.second_looks.walls import merged, spans, surveyed
 from slam.extraction.segments import Segments
 from slam.geometry.lines import lines_to_world, through
 from slam.geometry.poses import compose, inverse, to_robot, wrap
@@ -48,7 +50,7 @@ def drive(count=60, seed=1, walls=WALLS):
 
 def looked(poses, motions, segments):
     """Poses by lines alone: without returns no place is sought."""
-    return second_looks(poses[0], motions, segments, [np.zeros((0, 2))] * len(poses))
+    return second_looks(poses[0], motions, segments, [np.zeros((0, 2))] * len(poses)).poses
 
 
 def test_a_drift_goes_that_no_filter_had_a_say_in():
@@ -152,6 +154,57 @@ def test_the_solution_is_a_least_of_the_weighted_errors():
         change = 1e-3 * rng.standard_normal(found.poses.size + found.lines.size)
         change[:3] = 0.0
         assert cost(found.plus(change)) > least
+
+
+def test_walls_stand_where_the_room_has_them_and_reach_as_far():
+    _, drifted, motions, segments = drive()
+    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(drifted))
+    assert len(survey.walls) == len(WALLS)
+    ends = survey.walls.ends_world
+    for wall in WALLS:
+        assert np.abs(ends - wall).max(axis=(1, 2)).min() < 0.03
+    np.testing.assert_array_equal(survey.walls.observations, 60)
+    np.testing.assert_allclose(survey.walls.belief.pose_world, survey.poses[-1])
+    cov = survey.joint.cov
+    np.testing.assert_allclose(survey.walls.belief.joint([1]).cov, cov[np.ix_([0, 1, 2, 5, 6], [0, 1, 2, 5, 6])])
+    assert np.linalg.eigvalsh(cov).min() > 0.0
+    assert np.all(np.diag(cov)[4::2] >= CONFIG.floor_m**2)
+
+
+def test_the_covariance_is_that_of_the_whole_information_and_the_floor():
+    true, _, motions, sightings, owner = problem()
+    links = [Drive(motions).links(CONFIG.doubt, CONFIG)]
+    found = solved(begun(true, sightings, owner), links, sightings, owner, CONFIG)
+    information, _ = normal_equations(found, links, sightings, owner, CONFIG)
+    walls, joint = surveyed(found, information, sightings, owner, CONFIG)
+    rows = np.arange(found.poses.size - 3, found.poses.size + found.lines.size)
+    dense = np.linalg.inv(information.toarray())[np.ix_(rows, rows)]
+    half = 0.5 * np.diff(walls.extents, axis=1)[:, 0]
+    floor = np.column_stack([(CONFIG.floor_m / half) ** 2, np.full(len(walls), CONFIG.floor_m**2)]).ravel()
+    np.testing.assert_allclose(joint.cov, dense + np.diag([0.0, 0.0, 0.0, *floor]), rtol=1e-5, atol=1e-10)
+
+
+def test_walls_that_stand_twice_become_one_and_the_other_side_stays():
+    true, _, _, sightings, owner = problem()
+    twice = np.where((owner == 0) & (sightings.scan > 3), owner.max() + 1, owner)
+    start = begun(true, sightings, twice)
+    once = merged(start, spans(start, sightings, twice), twice, CONFIG)
+    assert len(np.unique(once)) == len(np.unique(owner))
+    for line in np.unique(owner):
+        assert len(np.unique(once[owner == line])) == 1
+    apart = begun(true, sightings, owner)
+    np.testing.assert_array_equal(merged(apart, spans(apart, sightings, owner), owner, CONFIG), owner)
+
+
+def test_one_segment_that_runs_on_makes_no_wall_longer():
+    true, _, _, sightings, owner = problem()
+    start = begun(true, sightings, owner)
+    before = spans(start, sightings, owner)
+    long = sightings.ends.copy()
+    row = int(np.flatnonzero(owner == 1)[3])
+    long[row, 1] += 2.0 * (long[row, 1] - long[row, 0])
+    after = spans(start, replace(sightings, ends=long), owner)
+    np.testing.assert_allclose(after, before, atol=0.03)
 
 
 def test_a_drive_without_a_wall_follows_its_motions():

@@ -1,0 +1,58 @@
+"""A real robot's log looked at again once its drive has ended: path and map are what all scans say together."""
+
+from dataclasses import replace
+from typing import Any
+
+from explore.certificate import certify
+from explore.step import Step
+from slam.association.second_looks.second_looks import Survey, second_looks
+from slam.evaluation.doubles import doubles
+from slam.extraction.extract import extract
+from slam.extraction.visible_extent import sure_pieces
+from slam.map.chains import connect
+from slam.odometry.scan_matching import returns_within
+
+from ..scoring.records import Log
+from ..scoring.without_truth.certificate import certificate_record
+from ..scoring.without_truth.smoothing import Smoothed
+from ..trial import TrialResult
+
+
+def looked_again(result: TrialResult) -> TrialResult:
+    """Return a result whose smoothed path and whose map are those of second looks.
+
+    They are the same whichever back end ran: scans and odometry alone tell them.
+    """
+    log, last, recorded = result.log, result.last, result.recorded
+    if log is None or last is None or recorded is None:
+        return result
+    mission = result.scenario.config.mission
+    scans = [recorded.recording.scan(k) for k in range(len(log))]
+    rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
+    segments = [sure_pieces(extract(scan, rules), scan, rules) for scan in scans]
+    returns = [returns_within(scan, reach_m) for scan in scans]
+    survey = second_looks(log.estimated_world[0], log.odometry[1:], segments, returns, mission.second_looks)
+    return _mapped(result, log, last, survey)
+
+
+def _mapped(result: TrialResult, log: Log, last: Step, survey: Survey) -> TrialResult:
+    """Return a result with a survey's path and walls, and what these can vouch for."""
+    mission = result.scenario.config.mission
+    walls = survey.walls
+    step = replace(last, map=walls, chains=connect(walls, config=mission.mapper.chains))
+    paths, sweep = mission.explorer.following.paths, mission.explorer.sweep
+    certificate = certify(step, result.ending.outcome, paths, sweep, survey.poses[:, :2])
+    told: dict[str, Any] = {
+        "lines": len(walls),
+        "duplicate_lines": len(doubles(walls.ends_world)),
+        "chains_closed": sum(chain.is_closed for chain in step.chains),
+        "closures": survey.closures,
+    }
+    return replace(
+        result,
+        last=step,
+        joint=survey.joint,
+        certificate=certificate,
+        smoothed=Smoothed(survey.poses, walls, survey.joint),
+        summary=result.summary | {"certificate": certificate_record(certificate), "second_looks": told},
+    )
