@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.lines import directions
 from .segments import Segments
+from .straightness_kernels import faces_cov
 
 
 @dataclass(frozen=True)
@@ -25,34 +25,6 @@ class StraightnessConfig:
     """A face of this length is half as far off, a longer one falls with the fourth power: two thicknesses of a wall."""
 
 
-def edge_variances(
-    lengths_m: Float[np.ndarray, " n"], config: StraightnessConfig = StraightnessConfig()
-) -> Float[np.ndarray, " n"]:
-    """Return the variance of faces of these lengths across their lines, m^2."""
-    return np.square(config.edge_m / (1.0 + np.square(np.square(lengths_m / config.face_m))))
-
-
-def edge_cov(
-    across_m2: Float[np.ndarray, " n"],
-    lengths_m: Float[np.ndarray, " n"],
-    middles_m: Float[np.ndarray, " n"],
-    least_rad2: Float[np.ndarray, " n"] | float = 0.0,
-) -> Float[np.ndarray, "n 2 2"]:
-    """Return the covariance of (direction rad, distance m) of lines that are off across themselves by so much.
-
-    It is that of a line through one point of this variance, which may lie anywhere along the wall: 12 / L^2 times as
-    much in direction, or `least_rad2`. `middles_m` says how far along the line the wall's middle lies from the point at
-    which the distance is taken.
-    """
-    turn = np.maximum(12.0 * across_m2 / np.square(np.maximum(lengths_m, 1e-3)), least_rad2)
-    cov = np.empty((len(turn), 2, 2))
-    cov[:, 0, 0], cov[:, 1, 1] = turn, across_m2 + turn * middles_m**2
-    cov[:, 0, 1] = cov[:, 1, 0] = turn * middles_m
-    return cov
-
-
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    middles = np.vecdot(segments.ends.mean(axis=1), directions(segments.lines[:, 0]))
-    lengths = segments.lengths_m
-    return edge_cov(edge_variances(lengths, config), lengths, middles)
+    return faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.face_m))

@@ -7,12 +7,12 @@ from jaxtyping import Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
-from ..extraction.straightness import edge_cov, edge_variances
 from ..geometry.lines import directions
 from ..robot import Scan
 from .chains import ChainConfig
 from .change_points import ChangePoints, ChangePointsConfig
 from .extents import Extents, WallsConfig
+from .kernels.reliability_kernels import off_line_cov
 from .openings import Openings, OpeningsConfig
 from .records import Records
 from .reliability import Reliability
@@ -45,10 +45,9 @@ class Landmarks:
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
         walls = self.extents.map(belief, self.reliability.are_crooked(self.records.ids))
-        lengths, middles = walls.extents[:, 1] - walls.extents[:, 0], walls.extents.mean(axis=1)
         across, turned = self.reliability.misfits(self.records.ids)
-        across = across + edge_variances(lengths, self._straightness)
-        return replace(walls, off_line_cov=edge_cov(across, lengths, middles, turned))
+        straightness = float(self._straightness.edge_m), float(self._straightness.face_m)
+        return replace(walls, off_line_cov=off_line_cov(walls.extents, across, turned, *straightness))
 
     def observe(
         self,

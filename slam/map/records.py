@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from .kernels.record_kernels import rows_of
+
 Pair = tuple[int, int]
 
 
@@ -53,10 +55,10 @@ class Records:
 
     def rows(self, ids: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
         """Return the rows of walls; those that have none yet begin theirs."""
-        rows = np.searchsorted(self.ids, ids)
-        if len(ids) and (rows.max() == len(self) or np.any(self.ids[rows] != ids)):
+        rows, all_known = rows_of(self.ids, ids)
+        if not all_known:
             self._begin(np.setdiff1d(ids, self.ids))
-            rows = np.searchsorted(self.ids, ids)
+            rows, _ = rows_of(self.ids, ids)
         return rows
 
     def _begin(self, ids: Int[np.ndarray, " m"]) -> None:

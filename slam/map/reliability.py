@@ -11,9 +11,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaincc
 
+from ..estimation.gates import gate_level
 from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
 from ..geometry.poses import wrap
+from .kernels import reliability_kernels
+from .kernels.reliability_kernels import add_directions, add_fits, in_conflict
 from .records import Merger, Records
 
 
@@ -52,11 +55,8 @@ def as_told(
     corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
-    few, cov = segments.is_tentative, cov + cov_of_faces(segments, config.straightness)
-    if few.all():
-        return cov
-    turn = np.where(few, config.heading_rad, 0.0)[:, None] * cov[:, :, 0] / cov[:, :1, 0]
-    return cov + turn[:, :, None] * turn[:, None]
+    cov = cov + cov_of_faces(segments, config.straightness)
+    return reliability_kernels.as_told(cov, segments.is_tentative, float(config.heading_rad))
 
 
 class Reliability:
@@ -79,21 +79,10 @@ class Reliability:
         """Add one scan, taken at a pose in the world; `owners` holds the wall of each segment, -1 for none."""
         used = (owners >= 0) & (segments.cov[:, 0, 0] > 0.0)
         ids, seen = owners[used], segments.take(used)
-        alpha, information = wrap(seen.lines[:, 0] + pose_world[2]), 1.0 / seen.cov[:, 0, 0]
-        rows = self._records.rows(ids)
-        columns = self._records.columns
-        first = columns["first"]
-        new = np.isnan(first[rows])
-        first[rows[new]] = alpha[new]
-        np.add.at(columns["fits"], rows, np.stack([seen.chi2, seen.beam_counts - 2.0], axis=-1))
-        # Across the line a beam has the variance of the whole fit, times as many beams.
-        across = seen.cov[:, 1, 1] - seen.cov[:, 0, 1] ** 2 / seen.cov[:, 0, 0]
-        dof = seen.beam_counts - 2.0
-        excess = (seen.chi2 - dof) * across * seen.beam_counts
-        np.add.at(columns["residue"], rows, np.stack([excess, seen.beam_counts], axis=-1))
-        off = wrap(alpha - first[rows])
-        clear = are_clear(seen, self._config)
-        np.add.at(columns["directions"], (rows, clear.astype(int)), np.stack([information, information * off], axis=-1))
+        rows, columns = self._records.rows(ids), self._records.columns
+        add_fits(rows, seen.cov, seen.chi2, seen.beam_counts, columns["fits"], columns["residue"])
+        alpha, clear = seen.lines[:, 0] + pose_world[2], are_clear(seen, self._config)
+        add_directions(rows, alpha, seen.cov, clear, columns["first"], columns["directions"])
         self._judge(rows)
 
     def _judge(self, rows: Int[np.ndarray, " n"]) -> None:
@@ -124,13 +113,10 @@ class Reliability:
         direction better. Three beams from one wall's corner over the next to a third are a line, known to 0.1 degrees
         and 90 off, within the gate of a wall of vague direction.
         """
-        few = segments.is_tentative & (segments.cov[:, 0, 0] < self._config.few_heading_rad**2)
-        crooked = self.are_crooked(ids)
-        rows = self._records.rows(ids)
-        few &= self._records.columns["directions"][rows, 1, 0] * segments.cov[:, 0, 0] > 1.0
-        clear = are_clear(segments, self._config)
-        straight = (clear | few) & ~crooked
-        return straight if straight.any() else clear
+        rows, columns = self._records.rows(ids), self._records.columns
+        clear, few_rad = are_clear(segments, self._config), float(self._config.few_heading_rad)
+        told = segments.is_tentative, segments.cov, clear, rows
+        return reliability_kernels.may_move(*told, columns["crooked"], columns["directions"], few_rad)
 
     def are_crooked(self, ids: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         """Return which walls are surely not straight: by their fits, or by what vague and clear observations say."""
@@ -144,28 +130,21 @@ class Reliability:
         Of two faces that meet in a corner each is off the line through both by twice what their residuals show; where
         what is vague and what is clear disagree, the clear ones have moved the line to where the others are not.
         """
-        rows = self._records.rows(ids)
-        crooked = self._records.columns["crooked"][rows]
-        residue, beams = self._records.columns["residue"][rows].T
-        across = np.where(crooked, 4.0 * np.maximum(residue, 0.0) / np.maximum(beams, 1.0), 0.0)
-        apart, _ = self._apart(rows)
-        return across, np.where(crooked & self._in_conflict(rows), np.square(apart), 0.0)
+        rows, columns = self._records.rows(ids), self._records.columns
+        told = columns["crooked"][rows], columns["residue"][rows], columns["directions"][rows]
+        return reliability_kernels.misfits(*told, self._level)
 
-    def _apart(self, rows: Int[np.ndarray, " n"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Return by how much vague and clear directions of walls differ, and its variance; 0 and inf without either."""
-        information, sums = np.moveaxis(self._records.columns["directions"][rows], -1, 0)
-        both = (information > 0.0).all(axis=1)
-        apart, variance = np.zeros(len(rows)), np.full(len(rows), np.inf)
-        apart[both] = np.diff(sums[both] / information[both], axis=1)[:, 0]
-        variance[both] = np.sum(1.0 / information[both], axis=1)
-        return apart, variance
+    @property
+    def _level(self) -> float:
+        """The squared difference of two directions, in its own variances, that chance leaves straight walls below."""
+        return gate_level(1.0 - self._config.chance, 1)
 
     def _misfit(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
         chi2, dof = self._records.columns["fits"][rows].T
         misfit = chi2 > self._config.excess * dof
-        misfit[misfit] = gammaincc(0.5 * dof[misfit], 0.5 * chi2[misfit]) < self._config.chance
+        if misfit.any():
+            misfit[misfit] = gammaincc(0.5 * dof[misfit], 0.5 * chi2[misfit]) < self._config.chance
         return misfit
 
     def _in_conflict(self, rows: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-        apart, variance = self._apart(rows)
-        return gammaincc(0.5, 0.5 * np.square(apart) / variance) < self._config.chance
+        return in_conflict(self._records.columns["directions"][rows], self._level)

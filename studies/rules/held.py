@@ -34,6 +34,8 @@ NEAR = {
     "vertices": "bend vertices change_points mapper",
     "change_points": "change_points",
     "reliability": "reliability",
+    "reliability_kernels": "reliability straightness",
+    "straightness_kernels": "straightness reliability",
     "walls": "walls extents mapper merge",
     "merging": "merge same_line change_points",
     "candidates": "candidates mapper",

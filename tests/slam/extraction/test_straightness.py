@@ -9,7 +9,8 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
-from slam.extraction.straightness import StraightnessConfig, cov_of_faces, edge_cov, edge_variances
+from slam.extraction.straightness import cov_of_faces
+from slam.extraction.straightness_kernels import edge_cov, edge_variance
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import wrap
 from slam.map.reliability import ReliabilityConfig, are_clear, as_told
@@ -23,7 +24,7 @@ def test_the_covariance_of_an_edge_is_that_of_one_point_spread_along_it(length, 
     x = middle + length * (np.arange(20_000) + 0.5) / 20_000 - 0.5 * length
     rows = np.column_stack([-x, np.ones_like(x)])  # turning the wall moves the point at x off by -x
     expected = np.linalg.inv(rows.T @ rows / (len(x) * 0.01**2))
-    (found,) = edge_cov(np.array([0.01**2]), np.array([length]), np.array([middle]))
+    (found,) = edge_cov(np.array([0.01**2]), np.array([length]), np.array([middle]), np.zeros(1))
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
 
 
@@ -33,12 +34,12 @@ def test_the_least_variance_of_the_direction_turns_the_wall_about_its_middle():
 
 
 def test_long_faces_are_on_their_lines():
-    sigmas = np.sqrt(edge_variances(np.array([0.0, 0.1, 0.2, 0.4, 1.0, 4.0])))
+    sigmas = np.sqrt([edge_variance(length, 0.01, 0.2) for length in (0.0, 0.1, 0.2, 0.4, 1.0, 4.0)])
     assert sigmas[0] == 0.01
     assert sigmas[2] == 0.005
     assert (np.diff(sigmas) < 0.0).all()
     assert sigmas[4] < 2e-5, "far below what a hundred beams tell"
-    assert not edge_variances(np.array([0.05, 1.0]), StraightnessConfig(edge_m=0.0)).any()
+    assert edge_variance(0.05, 0.0, 0.2) == edge_variance(1.0, 0.0, 0.2) == 0.0
 
 
 def room_of_pilasters(rng):
@@ -104,7 +105,10 @@ def test_a_map_tells_how_far_walls_are_off_in_whatever_order_it_is_asked():
     ids = np.array([4, 7, 9])
     belief = Belief(whole.mean[:3], whole.cov[:3, :3], ids, whole.anchors, whole.mean[3:].reshape(-1, 2),
                     lambda asked: whole.take(np.searchsorted(ids, asked)))  # fmt: skip
-    no, blocks = np.zeros(3, dtype=bool), edge_cov(np.array([1.0, 2.0, 3.0]), np.ones(3), np.array([0.5, 0.0, -1.0]))
+    no, blocks = (
+        np.zeros(3, dtype=bool),
+        edge_cov(np.array([1.0, 2.0, 3.0]), np.ones(3), np.array([0.5, 0.0, -1.0]), np.zeros(3)),
+    )
     walls = StochasticMap(belief, np.tile([-1.0, 1.0], (3, 1)), np.full(3, 5), no, no, off_line_cov=blocks)
     for asked in ([4, 7, 9], [9, 4], [7], []):
         rows = np.searchsorted(ids, np.array(asked, dtype=np.int64))

@@ -10,7 +10,8 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig, edge_cov
+from slam.extraction.straightness import StraightnessConfig
+from slam.extraction.straightness_kernels import edge_cov
 from slam.geometry.poses import compose, inverse
 from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
 from slam.mapper import Mapper

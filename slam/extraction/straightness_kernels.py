@@ -1,0 +1,49 @@
+"""How far short faces may be from their lines: the loops of `straightness`."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from ..geometry.compiled import compiled
+
+
+@compiled
+def edge_variance(length_m: float, edge_m: float, face_m: float) -> float:
+    """Return the variance of a face of this length across its line, m^2."""
+    return (edge_m / (1.0 + (length_m / face_m) ** 4)) ** 2
+
+
+@compiled
+def edge_cov(
+    across_m2: Float[np.ndarray, " n"],
+    lengths_m: Float[np.ndarray, " n"],
+    middles_m: Float[np.ndarray, " n"],
+    least_rad2: Float[np.ndarray, " n"],
+) -> Float[np.ndarray, "n 2 2"]:
+    """Return the covariance of (direction rad, distance m) of lines that are off across themselves by so much.
+
+    It is that of a line through one point of this variance, which may lie anywhere along the wall: 12 / L^2 times as
+    much in direction, or `least_rad2`. `middles_m` says how far along the line the wall's middle lies from the point at
+    which the distance is taken.
+    """
+    cov = np.empty((len(across_m2), 2, 2))
+    for k in range(len(cov)):
+        turn = max(12.0 * across_m2[k] / max(lengths_m[k], 1e-3) ** 2, least_rad2[k])
+        cov[k, 0, 0], cov[k, 1, 1] = turn, across_m2[k] + turn * middles_m[k] ** 2
+        cov[k, 0, 1] = cov[k, 1, 0] = turn * middles_m[k]
+    return cov
+
+
+@compiled
+def faces_cov(
+    lines: Float[np.ndarray, "s 2"], ends: Float[np.ndarray, "s 2 2"], edge_m: float, face_m: float
+) -> Float[np.ndarray, "s 2 2"]:
+    """Return what the covariances of (alpha, r) of seen lines lack, since some are of several faces."""
+    across, lengths, middles = np.empty(len(lines)), np.empty(len(lines)), np.empty(len(lines))
+    for k in range(len(lines)):
+        lengths[k] = math.hypot(ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1])
+        across[k] = edge_variance(lengths[k], edge_m, face_m)
+        x, y = 0.5 * (ends[k, 0, 0] + ends[k, 1, 0]), 0.5 * (ends[k, 0, 1] + ends[k, 1, 1])
+        middles[k] = y * math.cos(lines[k, 0]) - x * math.sin(lines[k, 0])
+    return edge_cov(across, lengths, middles, np.zeros(len(lines)))

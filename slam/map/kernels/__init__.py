@@ -1,0 +1,1 @@
+"""What is known of the walls of a map, in compiled loops."""
