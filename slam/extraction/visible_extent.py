@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from ..robot import Scan
 from .config import ExtractionConfig
@@ -47,10 +47,3 @@ def sure_pieces(segments: Segments, scan: Scan, config: ExtractionConfig) -> Seg
 def beam_step(scan: Scan) -> float:
     """Return the angle between neighbouring beams, rad."""
     return scan.step_rad
-
-
-def beam_spacing(scan: Scan, segments: Segments) -> Float[np.ndarray, "n 2"]:
-    """Return the distance between neighbouring beams on the wall at each end of each segment, m."""
-    distance = np.hypot(segments.ends[..., 0], segments.ends[..., 1])
-    cosine = np.clip(segments.lines[:, 1, None] / np.maximum(distance, 1e-9), 0.05, 1.0)
-    return beam_step(scan) * distance / cosine

@@ -9,10 +9,6 @@ from jaxtyping import Bool, Float
 
 from .poses import wrap
 
-PARALLEL = 0.05
-"""Sine of the angle, 3 degrees, below which two lines are taken for parallel: an error of one in place moves their
-crossing by twenty times as much."""
-
 
 def normals(alpha: Float[np.ndarray, "*n"] | np.floating) -> Float[np.ndarray, "*n 2"]:
     """Return the unit normals n(alpha), pointing into the wall."""
@@ -52,18 +48,6 @@ def project(points: Float[np.ndarray, "*n 2"], lines: Float[np.ndarray, "*n 2"])
     n = normals(lines[..., 0])
     off = np.vecdot(n, points) - lines[..., 1]
     return points - off[..., None] * n
-
-
-def intersect(
-    lines_a: Float[np.ndarray, "*n 2"], lines_b: Float[np.ndarray, "*n 2"]
-) -> tuple[Float[np.ndarray, "*n 2"], Bool[np.ndarray, "*n"]]:
-    """Return the intersections of pairs of lines, and which pairs are too near to parallel (`PARALLEL`)."""
-    det = np.sin(lines_b[..., 0] - lines_a[..., 0])
-    parallel = np.abs(det) < PARALLEL
-    safe = np.where(parallel, 1.0, det)
-    x = (lines_a[..., 1] * np.sin(lines_b[..., 0]) - lines_b[..., 1] * np.sin(lines_a[..., 0])) / safe
-    y = (lines_b[..., 1] * np.cos(lines_a[..., 0]) - lines_a[..., 1] * np.cos(lines_b[..., 0])) / safe
-    return np.stack([x, y], axis=-1), parallel
 
 
 def distance_to_segments(

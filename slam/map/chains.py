@@ -2,20 +2,15 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import cKDTree
 
-from ..geometry.lines import directions, intersect, normals
+from .kernels.chain_kernels import HEAD as HEAD
+from .kernels.chain_kernels import TAIL as TAIL
+from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, successors
 from .stochastic_map import StochasticMap
-
-TAIL, HEAD = 0, 1
-"""The two ends of a wall: walking from tail to head, the free side is on the left."""
-
-
-BESIDE_SHARE = 0.5
-"""Ends of parallel walls that stand apart by this share of the gap across them are a step, not one wall with a hole."""
 
 
 @dataclass(frozen=True)
@@ -88,71 +83,57 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    often = walls.established[rows]
-    successor = _links(ends, lines, ids, often, set_aside, passed, cut_off, config)
+    pairs = near_ends(ends, max(config.reach_m, config.set_aside_reach_m, config.overlap_m))
+    both_aside = _both_aside(pairs, ids, set_aside, passed)
+    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(config))
+    for k in np.flatnonzero(allowed) if cut_off else ():
+        allowed[k] = tuple(ids[pairs[k]].tolist()) not in cut_off
+    successor = successors(pairs, gaps, allowed, len(rows))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
     corners = np.full((len(rows), 2), np.nan)
     corners[before] = corner_points(
-        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], config.corner_reach_m
+        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], float(config.corner_reach_m)
     )
-    return tuple(_chain(run, closed, ends, corners, ids) for run, closed in _runs(successor))
+    runs = _runs(successor)
+    walked = np.array([row for run, _ in runs for row in run])
+    names, corners, starts = ids.tolist(), corners[walked], np.cumsum([0, *(len(run) for run, _ in runs)]).tolist()
+    return tuple(
+        _chain(run, closed, ends, corners[start : start + len(run)], names)
+        for (run, closed), start in zip(runs, starts, strict=False)
+    )
 
 
-def _links(
-    ends: Float[np.ndarray, "n 2 2"],
-    lines: Float[np.ndarray, "n 2"],
+def _both_aside(
+    pairs: Int[np.ndarray, "k 2"],
     ids: Int[np.ndarray, " n"],
-    often: Bool[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
     passed: Collection[tuple[int, int]],
-    cut_off: Collection[tuple[int, int]],
-    config: ChainConfig,
-) -> Int[np.ndarray, " n"]:
-    """Return the row of each wall's successor, -1 for none: greedily, nearest ends first."""
-    reach = max(config.reach_m, config.set_aside_reach_m, config.overlap_m)
-    near = cKDTree(ends[:, HEAD]).sparse_distance_matrix(cKDTree(ends[:, TAIL]), reach, output_type="ndarray")
-    head, tail, gap = near["i"], near["j"], near["v"]
-    aside = np.isin(2 * ids[:, None] + [TAIL, HEAD], [2 * wall + side for wall, side in set_aside])
-    both_aside = aside[head, HEAD] & aside[tail, TAIL]
-    for k in np.flatnonzero(both_aside):
-        both_aside[k] = (ids[head[k]], ids[tail[k]]) not in passed
-    allowed = (head != tail) & (gap <= np.where(both_aside, config.set_aside_reach_m, config.reach_m))
-    straight = np.cos(lines[head, 0] - lines[tail, 0]) > np.cos(config.straight_rad)
-    across = np.abs(np.vecdot(normals(lines[head, 0]), ends[tail, TAIL] - ends[head, HEAD]))
-    allowed &= ~straight | (gap <= config.straight_reach_m) | (across > BESIDE_SHARE * gap)
-    allowed |= (
-        (gap <= config.overlap_m)
-        & (often[head] & often[tail])
-        & _overlap_at_a_bend(ends[head], ends[tail], lines[head, 0], lines[tail, 0], config)
-    )
-    for k in np.flatnonzero(allowed) if cut_off else ():
-        allowed[k] = (ids[head[k]], ids[tail[k]]) not in cut_off
-    order = np.flatnonzero(allowed)[np.lexsort((tail[allowed], head[allowed], gap[allowed]))]
-    successor, taken = [-1] * len(ids), [False] * len(ids)
-    for before, after in zip(head[order].tolist(), tail[order].tolist(), strict=True):
-        if successor[before] < 0 and not taken[after]:
-            successor[before], taken[after] = after, True
-    return np.array(successor)
-
-
-def _overlap_at_a_bend(
-    before: Float[np.ndarray, "k 2 2"],
-    after: Float[np.ndarray, "k 2 2"],
-    alpha_before: Float[np.ndarray, " k"],
-    alpha_after: Float[np.ndarray, " k"],
-    config: ChainConfig,
 ) -> Bool[np.ndarray, " k"]:
-    """Return which walls, given by their ends, are the sides of a bend past which they reach, each along the other."""
-    t_before, t_after = directions(alpha_before), directions(alpha_after)
-    overlap = before[:, HEAD] - after[:, TAIL]
-    goes_on = np.vecdot(t_before, after[:, HEAD] - before[:, HEAD]) > 0.0
-    goes_on &= np.vecdot(t_after, after[:, TAIL] - before[:, TAIL]) > 0.0
-    least, most = np.cos(config.bend_rad)
-    turn = np.cos(alpha_after - alpha_before)
-    bends = goes_on & (np.vecdot(t_before, overlap) > 0.0) & (turn < least) & (turn > most)
-    bends &= np.abs(np.vecdot(normals(alpha_before), overlap)) <= config.beside_m
-    return bends & (np.abs(np.vecdot(normals(alpha_after), overlap)) <= config.beside_m)
+    """Return of which pairs (head, tail) both ends were set aside, and no beam has passed between."""
+    both_aside = np.zeros(len(pairs), dtype=bool)
+    if not set_aside:
+        return both_aside
+    aside = np.isin(2 * ids[:, None] + [TAIL, HEAD], [2 * wall + side for wall, side in set_aside])
+    both_aside |= aside[pairs[:, 0], HEAD] & aside[pairs[:, 1], TAIL]
+    for k in np.flatnonzero(both_aside):
+        both_aside[k] = tuple(ids[pairs[k]].tolist()) not in passed
+    return both_aside
+
+
+@lru_cache
+def _reach(config: ChainConfig) -> Reach:
+    least, most = np.cos(config.bend_rad).tolist()
+    return Reach(
+        float(config.reach_m),
+        float(config.set_aside_reach_m),
+        float(np.cos(config.straight_rad)),
+        float(config.straight_reach_m),
+        float(config.overlap_m),
+        float(config.beside_m),
+        least,
+        most,
+    )
 
 
 def _runs(successor: Int[np.ndarray, " n"]) -> list[tuple[list[int], bool]]:
@@ -178,25 +159,12 @@ def _chain(
     run: list[int],
     closed: bool,
     ends: Float[np.ndarray, "n 2 2"],
-    corners: Float[np.ndarray, "n 2"],
-    ids: Int[np.ndarray, " n"],
+    corners: Float[np.ndarray, "m 2"],
+    ids: list[int],
 ) -> Chain:
-    """Return the chain of these rows; `corners` holds where each wall meets its successor."""
-    walls = tuple(ids[run].tolist())
+    """Return the chain of these rows; `corners` holds where each of its walls meets the next."""
+    walls = tuple(ids[row] for row in run)
     if closed:
-        return Chain(walls, corners[run], ())
+        return Chain(walls, corners, ())
     tail, head = OpenEnd(walls[0], TAIL, ends[run[0], TAIL]), OpenEnd(walls[-1], HEAD, ends[run[-1], HEAD])
-    return Chain(walls, corners[run[:-1]], (tail, head))
-
-
-def corner_points(
-    lines_before: Float[np.ndarray, "n 2"],
-    lines_after: Float[np.ndarray, "n 2"],
-    heads: Float[np.ndarray, "n 2"],
-    tails: Float[np.ndarray, "n 2"],
-    reach_m: float,
-) -> Float[np.ndarray, "n 2"]:
-    """Return where neighbouring walls meet: the intersection of their lines if it lies near both ends."""
-    crossing, parallel = intersect(lines_before, lines_after)
-    far = np.maximum(np.hypot(*(crossing - heads).T), np.hypot(*(crossing - tails).T)) > reach_m
-    return np.where((parallel | far)[:, None], 0.5 * (heads + tails), crossing)
+    return Chain(walls, corners[:-1], (tail, head))

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..geometry.lines import intersect
-from ..geometry.poses import J
 from ..robot import Scan
 from .chains import ChainConfig
+from .kernels import ray_kernels
+from .kernels.chain_kernels import HEAD, TAIL, near_ends, supposed_corners
 from .records import Records
 from .stochastic_map import StochasticMap
 
@@ -53,28 +53,27 @@ class Openings:
         config, pose = self._config, walls.belief.pose_world
         widest_m = self._chains.set_aside_reach_m
         rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + widest_m))
-        tails, heads = walls.ends_world[rows].transpose(1, 0, 2)
-        width = np.hypot(*np.moveaxis(heads[:, None] - tails, -1, 0))
-        is_near = (width <= widest_m) & ~np.eye(len(rows), dtype=bool)
-        is_near &= np.hypot(*(heads - pose[:2]).T)[:, None] < scan.range_max_m
-        pairs = np.argwhere(is_near)
-        gaps = pairs[width[tuple(pairs.T)] > config.beyond_m]
+        ends, ids = walls.ends_world[rows], walls.ids[rows]
+        tails, heads = ends[:, TAIL], ends[:, HEAD]
+        pairs = near_ends(ends, float(widest_m))
+        from_robot, width = heads - pose[:2], tails[pairs[:, 1]] - heads[pairs[:, 0]]
+        is_near = np.hypot(from_robot[:, 0], from_robot[:, 1])[pairs[:, 0]] < scan.range_max_m
+        pairs, width = pairs[is_near], width[is_near]
+        gaps = pairs[np.hypot(width[:, 0], width[:, 1]) > config.beyond_m]
         if len(gaps):
             through = passing(heads[gaps[:, 0]], tails[gaps[:, 1]], pose, scan, config.beyond_m, config.margin_m)
-            self.passed.update(self._pairs(walls.ids[rows], gaps, through))
-        lines = walls.belief.lines_world[rows]
-        corners, parallel = intersect(lines[pairs[:, 0]], lines[pairs[:, 1]])
-        pieces = np.stack([corners - heads[pairs[:, 0]], tails[pairs[:, 1]] - corners])
-        lengths = np.hypot(pieces[..., 0], pieces[..., 1])
-        supposed = ~parallel & np.all(lengths <= self._chains.corner_reach_m, axis=0)
-        supposed &= np.any(lengths > 2.0 * config.margin_m, axis=0)
-        # Ends that have come to meet where the lines cross suppose nothing any more.
-        self.cut_off.difference_update((int(h), int(t)) for h, t in walls.ids[rows][pairs[~supposed]].tolist())
+            self.passed.update(self._pairs(ids, gaps, through))
+        lines, reach = walls.belief.lines_world[rows], float(self._chains.corner_reach_m)
+        corners, supposed = supposed_corners(pairs, ends, lines, reach, 2.0 * config.margin_m)
+        if self.cut_off:
+            # Ends that have come to meet where the lines cross suppose nothing any more.
+            self.cut_off.difference_update((h, t) for h, t in ids[pairs[~supposed]].tolist())
         pairs, corners = pairs[supposed], corners[supposed]
         if len(pairs):
-            ends = ((heads[pairs[:, 0]], corners), (corners, tails[pairs[:, 1]]))
-            beams = [passing(*piece, pose, scan, 0.0, config.margin_m, config.margin_m) for piece in ends]
-            self.cut_off.update(self._pairs(walls.ids[rows], pairs, beams[0] | beams[1]))
+            limits = pose, scan, 0.0, config.margin_m, config.margin_m
+            before = passing(heads[pairs[:, 0]], corners, *limits)
+            after = passing(corners, tails[pairs[:, 1]], *limits)
+            self.cut_off.update(self._pairs(ids, pairs, before | after))
 
     def _pairs(
         self, ids: Int[np.ndarray, " n"], pairs: Int[np.ndarray, "g 2"], beams: Bool[np.ndarray, "g k"]
@@ -97,22 +96,7 @@ def passing(
 
     So far along the beam, and so far across the way.
     """
-    bearing = pose_world[2] + scan.bearings_rad
-    beam = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    gap, start = to_world - from_world, from_world - pose_world[:2]
-    width = np.hypot(gap[:, 0], gap[:, 1])
-    # p + s beam = from + u gap; with J the quarter turn, x·(J y) = 0 for x parallel to y.
-    denominator = gap @ (beam @ J.T).T
-    crossing = np.abs(denominator) > 1e-9
-    safe = np.where(crossing, denominator, 1.0)
-    u = -(start @ (beam @ J.T).T) / safe
-    s = -np.vecdot(start, gap @ J.T)[:, None] / safe
-    sine = np.abs(denominator) / np.maximum(width, 1e-9)[:, None]
-    margin = (margin_m / np.maximum(width, 1e-9))[:, None]
-    return (
-        crossing
-        & (u > margin)
-        & (u < 1.0 - margin)
-        & (s > 0)
-        & (scan.passed_m > s + beyond_m + across_m / np.maximum(sine, 1e-9))
+    beams = scan.bearings_rad, scan.passed_m
+    return ray_kernels.passing(
+        from_world, to_world, pose_world, *beams, float(beyond_m), float(margin_m), float(across_m)
     )

@@ -40,6 +40,8 @@ NEAR = {
     "merging": "merge same_line change_points",
     "candidates": "candidates mapper",
     "chains": "chains gap openings",
+    "chain_kernels": "chains gap openings",
+    "extent_kernels": "walls extents mapper merge",
     "openings": "gap openings",
     "pieces": "ray_evidence mapper",
     "splitting": "extraction bend",

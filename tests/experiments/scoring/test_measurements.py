@@ -10,7 +10,8 @@ from experiments.scenario import TrialConfig
 from experiments.scoring.corners import corners
 from experiments.scoring.measurements import area, corner_jacobian, corner_points, distance, distances, perimeter
 from experiments.trial import run_trial
-from slam.geometry.lines import intersect, normals
+from slam.geometry.line_kernels import intersect
+from slam.geometry.lines import normals
 
 RNG = np.random.default_rng(8)
 

@@ -10,7 +10,7 @@ from experiments.scoring.truth import collinear, truth_of
 from sim.robot import RobotConfig
 from sim.worlds import World
 from slam.extraction.segments import Segments
-from slam.geometry.lines import intersect
+from slam.geometry.line_kernels import intersect
 from slam.geometry.poses import compose, to_world
 
 CONFIG = RobotConfig()

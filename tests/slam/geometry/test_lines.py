@@ -6,7 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.lines import directions, distance_to_segments, intersect, lines_to_world, normals, project, through
+from slam.geometry.line_kernels import intersect
+from slam.geometry.lines import directions, distance_to_segments, lines_to_world, normals, project, through
 from slam.geometry.poses import J, to_world
 
 seeds = st.integers(0, 2**32)

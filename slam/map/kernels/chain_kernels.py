@@ -1,0 +1,151 @@
+"""Which ends of walls may be joined, and where they meet: the loops of `chains` and `openings`."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ...geometry.compiled import compiled
+from ...geometry.line_kernels import intersect
+
+TAIL, HEAD = 0, 1
+"""The two ends of a wall: walking from tail to head, the free side is on the left."""
+BESIDE_SHARE = 0.5
+"""Ends of parallel walls that stand apart by this share of the gap across them are a step, not one wall with a hole."""
+
+
+class Reach(NamedTuple):
+    """The numbers of `ChainConfig` that the loops read."""
+
+    reach_m: float
+    set_aside_reach_m: float
+    straight_cosine: float
+    straight_reach_m: float
+    overlap_m: float
+    beside_m: float
+    least_bend_cosine: float
+    most_bend_cosine: float
+
+
+@compiled
+def near_ends(ends: Float[np.ndarray, "n 2 2"], reach_m: float) -> Int[np.ndarray, "k 2"]:
+    """Return the pairs (head of one, tail of another) that are as near, ascending."""
+    n = len(ends)
+    order = np.argsort(ends[:, TAIL, 0])
+    eastings = ends[:, TAIL, 0][order]
+    pairs, count = np.empty((4 * n, 2), np.int64), 0
+    for head in range(n):
+        x, y = ends[head, HEAD]
+        first = count
+        for at in range(np.searchsorted(eastings, x - reach_m), n):
+            if eastings[at] > x + reach_m:
+                break
+            tail = order[at]
+            if tail == head or math.hypot(ends[tail, TAIL, 0] - x, ends[tail, TAIL, 1] - y) > reach_m:
+                continue
+            if count == len(pairs):
+                pairs = np.concatenate((pairs, np.empty((len(pairs), 2), np.int64)))
+            place = count
+            while place > first and pairs[place - 1, 1] > tail:
+                pairs[place] = pairs[place - 1]
+                place -= 1
+            pairs[place, 0], pairs[place, 1] = head, tail
+            count += 1
+    return pairs[:count].copy()
+
+
+@compiled
+def joinable(
+    pairs: Int[np.ndarray, "k 2"],
+    ends: Float[np.ndarray, "n 2 2"],
+    alpha: Float[np.ndarray, " n"],
+    often: Bool[np.ndarray, " n"],
+    both_aside: Bool[np.ndarray, " k"],
+    reach: Reach,
+) -> tuple[Float[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
+    """Return the gap of each pair, m, and whether the two ends may be joined."""
+    gaps, allowed = np.empty(len(pairs)), np.zeros(len(pairs), np.bool_)
+    for k in range(len(pairs)):
+        head, tail = pairs[k]
+        east, north = ends[tail, TAIL, 0] - ends[head, HEAD, 0], ends[tail, TAIL, 1] - ends[head, HEAD, 1]
+        gap = math.hypot(east, north)
+        across = abs(math.cos(alpha[head]) * east + math.sin(alpha[head]) * north)
+        straight = math.cos(alpha[head] - alpha[tail]) > reach.straight_cosine
+        near = gap <= (reach.set_aside_reach_m if both_aside[k] else reach.reach_m)
+        near = near and (not straight or gap <= reach.straight_reach_m or across > BESIDE_SHARE * gap)
+        overlap = gap <= reach.overlap_m and often[head] and often[tail]
+        overlap = overlap and overlap_at_a_bend(ends[head], ends[tail], alpha[head], alpha[tail], reach)
+        gaps[k], allowed[k] = gap, near or overlap
+    return gaps, allowed
+
+
+@compiled
+def overlap_at_a_bend(
+    before: Float[np.ndarray, "2 2"],
+    after: Float[np.ndarray, "2 2"],
+    alpha_before: float,
+    alpha_after: float,
+    reach: Reach,
+) -> bool:
+    """Return whether walls are the sides of a bend past which they reach, each along the other, by their ends."""
+    tx, ty = -math.sin(alpha_before), math.cos(alpha_before)
+    ux, uy = -math.sin(alpha_after), math.cos(alpha_after)
+    x, y = before[HEAD, 0] - after[TAIL, 0], before[HEAD, 1] - after[TAIL, 1]
+    goes_on = tx * (after[HEAD, 0] - before[HEAD, 0]) + ty * (after[HEAD, 1] - before[HEAD, 1]) > 0.0
+    goes_on = goes_on and ux * (after[TAIL, 0] - before[TAIL, 0]) + uy * (after[TAIL, 1] - before[TAIL, 1]) > 0.0
+    turn = math.cos(alpha_after - alpha_before)
+    bends = turn < reach.least_bend_cosine and turn > reach.most_bend_cosine
+    beside = abs(ty * x - tx * y) <= reach.beside_m and abs(uy * x - ux * y) <= reach.beside_m
+    return goes_on and tx * x + ty * y > 0.0 and bends and beside
+
+
+@compiled
+def successors(
+    pairs: Int[np.ndarray, "k 2"], gaps: Float[np.ndarray, " k"], allowed: Bool[np.ndarray, " k"], count: int
+) -> Int[np.ndarray, " n"]:
+    """Return the row of each wall's successor, -1 for none: greedily, nearest ends first, of equals the first."""
+    successor, taken = np.full(count, -1), np.zeros(count, np.bool_)
+    rows = np.flatnonzero(allowed)
+    for k in rows[np.argsort(gaps[rows], kind="mergesort")]:
+        before, after = pairs[k]
+        if successor[before] < 0 and not taken[after]:
+            successor[before], taken[after] = after, True
+    return successor
+
+
+@compiled
+def corner_points(
+    before: Float[np.ndarray, "k 2"],
+    after: Float[np.ndarray, "k 2"],
+    heads: Float[np.ndarray, "k 2"],
+    tails: Float[np.ndarray, "k 2"],
+    reach_m: float,
+) -> Float[np.ndarray, "k 2"]:
+    """Return where neighbouring walls meet: the intersection of their lines if it lies near both ends."""
+    points, parallel = intersect(before, after)
+    for k in range(len(points)):
+        x, y = points[k]
+        far = max(math.hypot(x - heads[k, 0], y - heads[k, 1]), math.hypot(x - tails[k, 0], y - tails[k, 1])) > reach_m
+        if parallel[k] or far:
+            points[k] = 0.5 * (heads[k] + tails[k])
+    return points
+
+
+@compiled
+def supposed_corners(
+    pairs: Int[np.ndarray, "k 2"],
+    ends: Float[np.ndarray, "n 2 2"],
+    lines: Float[np.ndarray, "n 2"],
+    reach_m: float,
+    least_m: float,
+) -> tuple[Float[np.ndarray, "k 2"], Bool[np.ndarray, " k"]]:
+    """Return where two walls would meet if both went on, and whether that is near to both and away from one's end."""
+    corners, parallel = intersect(lines[pairs[:, 0]], lines[pairs[:, 1]])
+    supposed = np.empty(len(pairs), np.bool_)
+    for k in range(len(pairs)):
+        head, tail = ends[pairs[k, 0], HEAD], ends[pairs[k, 1], TAIL]
+        one = math.hypot(corners[k, 0] - head[0], corners[k, 1] - head[1])
+        other = math.hypot(tail[0] - corners[k, 0], tail[1] - corners[k, 1])
+        supposed[k] = not parallel[k] and max(one, other) <= reach_m and max(one, other) > least_m
+    return corners, supposed

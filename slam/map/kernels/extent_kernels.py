@@ -1,0 +1,191 @@
+"""How far walls were seen, and what beams contradict of them: the loops of `extents`, on the columns of the records."""
+
+import math
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ...extraction.segments import EndKind
+from ...geometry.compiled import compiled
+from .ray_kernels import ray_evidence
+
+CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
+CLAIMED_BEAMS = 4
+"""Fewer beams on a wall say nothing about whose they are."""
+CLAIMED_SHARE = 0.8
+"""A wall is claimed by others in a scan that gives them this share of its beams: a beam or two may lie near both."""
+TRIM_M = 0.5
+"""What is left of a wall that a beam passed through is cut back to its hits by less than this: beams stand apart."""
+
+
+@compiled
+def seen_along(
+    ends: Float[np.ndarray, "m 2 2"],
+    lines: Float[np.ndarray, "m 2"],
+    rows: Int[np.ndarray, " m"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    step_rad: float,
+) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
+    """Return where the ends of segments lie along their walls, m, and how far beams stand apart there."""
+    along, apart = np.empty((len(rows), 2)), np.empty((len(rows), 2))
+    c, s = math.cos(pose_world[2]), math.sin(pose_world[2])
+    for k in range(len(rows)):
+        row = rows[k]
+        tx, ty = -math.sin(means[row, 0]), math.cos(means[row, 0])
+        for side in range(2):
+            x, y = ends[k, side, 0], ends[k, side, 1]
+            east = c * x - s * y + pose_world[0] - anchors[row, 0]
+            north = s * x + c * y + pose_world[1] - anchors[row, 1]
+            along[k, side] = east * tx + north * ty
+            distance = math.hypot(x, y)
+            cosine = min(max(lines[k, 1] / max(distance, 1e-9), 0.05), 1.0)
+            apart[k, side] = step_rad * distance / cosine
+    return along, apart
+
+
+@compiled
+def stretch(
+    rows: Int[np.ndarray, " m"],
+    along: Float[np.ndarray, "m 2"],
+    apart: Float[np.ndarray, "m 2"],
+    end_kinds: Int[np.ndarray, "m 2"],
+    extents: Float[np.ndarray, "n 2"],
+    spacing: Float[np.ndarray, "n 2"],
+) -> None:
+    """Move the ends outwards to what was seen, and inwards where a corner was seen more sharply than before."""
+    for side in range(2):
+        outward = -1.0 if side == 0 else 1.0
+        for k in range(len(rows)):
+            row = rows[k]
+            beyond = outward * (along[k, side] - extents[row, side])
+            sharper = end_kinds[k, side] == CORNER and apart[k, side] < spacing[row, side]
+            if beyond > 0.0 or (sharper and -beyond < spacing[row, side]):
+                extents[row, side] = along[k, side]
+                spacing[row, side] = apart[k, side]
+
+
+@compiled
+def note_whole(
+    before: Float[np.ndarray, "n 2"],
+    rows: Int[np.ndarray, " m"],
+    end_kinds: Int[np.ndarray, "m 2"],
+    extents: Float[np.ndarray, "n 2"],
+    whole: Int[np.ndarray, " n"],
+    margin_m: float,
+) -> None:
+    """Count in how many scans nothing hid either end of a wall, since it last turned out to be longer."""
+    for k in range(len(rows)):
+        row = rows[k]
+        if abs(extents[row, 0] - before[row, 0]) > margin_m or abs(extents[row, 1] - before[row, 1]) > margin_m:
+            whole[row] = 0
+    for k in range(len(rows)):
+        if end_kinds[k, 0] != OCCLUDED and end_kinds[k, 1] != OCCLUDED:
+            whole[rows[k]] += 1
+
+
+@compiled
+def note_claims(
+    near: Int[np.ndarray, " n"],
+    along: Float[np.ndarray, "n k"],
+    hits: Bool[np.ndarray, "n k"],
+    owners_of_beams: Int[np.ndarray, " k"],
+    ids: Int[np.ndarray, " w"],
+    extents: Float[np.ndarray, "w 2"],
+    seen: Bool[np.ndarray, " w"],
+    claimed: Int[np.ndarray, " w"],
+) -> None:
+    """Count for how many scans in turn every beam on a wall has been some other wall's."""
+    for k in range(len(near)):
+        row, count, others = near[k], 0, 0
+        for beam in range(along.shape[1]):
+            if hits[k, beam] and extents[row, 0] < along[k, beam] < extents[row, 1]:
+                count += 1
+                others += owners_of_beams[beam] >= 0 and owners_of_beams[beam] != ids[row]
+        if seen[row]:
+            claimed[row] = 0
+        elif count >= CLAIMED_BEAMS and others >= CLAIMED_SHARE * count:
+            claimed[row] += 1
+
+
+@compiled
+def cut_back(
+    near: Int[np.ndarray, " n"],
+    along: Float[np.ndarray, "n k"],
+    hits: Bool[np.ndarray, "n k"],
+    passes: Bool[np.ndarray, "n k"],
+    extents: Float[np.ndarray, "w 2"],
+    spacing: Float[np.ndarray, "w 2"],
+    against: Int[np.ndarray, " w"],
+    margin_m: float,
+    contradictions: int,
+) -> None:
+    """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
+    for k in range(len(near)):
+        row = near[k]
+        inside = np.zeros(along.shape[1], np.bool_)
+        for beam in range(len(inside)):
+            inside[beam] = extents[row, 0] + margin_m < along[k, beam] < extents[row, 1] - margin_m
+        passed = np.count_nonzero(passes[k] & inside) >= 2
+        against[row] = against[row] + 1 if passed else 0
+        if against[row] >= contradictions:
+            kept = kept_piece(extents[row], along[k][passes[k] & inside], along[k][hits[k] & inside])
+            for side in range(2):
+                if kept[side] != extents[row, side]:
+                    extents[row, side], spacing[row, side] = kept[side], margin_m
+            against[row] = 0
+
+
+@compiled
+def kept_piece(
+    extent: Float[np.ndarray, "2"], through: Float[np.ndarray, " p"], on: Float[np.ndarray, " h"]
+) -> Float[np.ndarray, "2"]:
+    """Return the piece between passing beams that most beams end on (else the longest), cut back to its hits."""
+    pieces = len(through) + 1
+    bounds = np.empty(pieces + 1)
+    bounds[0], bounds[1:pieces], bounds[pieces] = extent[0], np.sort(through), extent[1]
+    best, most = 0, -1
+    for piece in range(pieces):
+        low, high, count = bounds[piece], bounds[piece + 1], 0
+        for h in range(len(on)):
+            count += low <= on[h] and (on[h] < high or (on[h] == high and piece == pieces - 1))
+        if count > most or (count == most and high - low >= bounds[best + 1] - bounds[best]):
+            best, most = piece, count
+    kept = bounds[best : best + 2].copy()
+    first, last = math.inf, -math.inf
+    for h in range(len(on)):
+        if kept[0] <= on[h] <= kept[1]:
+            first, last = min(first, on[h]), max(last, on[h])
+    if best > 0 and first - kept[0] < TRIM_M:
+        kept[0] = first
+    if best < pieces - 1 and kept[1] - last < TRIM_M:
+        kept[1] = last
+    return kept
+
+
+@compiled
+def weigh(
+    near: Int[np.ndarray, " n"],
+    bearings_rad: Float[np.ndarray, " k"],
+    ranges_m: Float[np.ndarray, " k"],
+    passed_m: Float[np.ndarray, " k"],
+    owners_of_beams: Int[np.ndarray, " k"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "w 2"],
+    means: Float[np.ndarray, "w 2"],
+    ids: Int[np.ndarray, " w"],
+    seen: Bool[np.ndarray, " w"],
+    extents: Float[np.ndarray, "w 2"],
+    spacing: Float[np.ndarray, "w 2"],
+    claimed: Int[np.ndarray, " w"],
+    against: Int[np.ndarray, " w"],
+    margin_m: float,
+    contradictions: int,
+) -> None:
+    """Hold walls against the beams: those that pass through them, and those that other walls account for."""
+    along, hits, passes = ray_evidence(
+        bearings_rad, ranges_m, passed_m, pose_world, anchors[near], means[near], margin_m
+    )
+    note_claims(near, along, hits, owners_of_beams, ids, extents, seen, claimed)
+    cut_back(near, along, hits, passes, extents, spacing, against, margin_m, contradictions)

@@ -1,0 +1,88 @@
+"""What beams say about walls, and about the ways between their ends: the loops of `ray_evidence` and `openings`."""
+
+import math
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ...geometry.compiled import compiled
+
+GRAZING_COSINE = 0.05
+"""Beams within three degrees of a line say nothing about it: its own uncertainty moves the crossing by metres."""
+NEAREST_M = 0.02
+"""Nor do those to a line through the robot itself."""
+
+
+@compiled
+def ray_evidence(
+    bearings_rad: Float[np.ndarray, " k"],
+    ranges_m: Float[np.ndarray, " k"],
+    passed_m: Float[np.ndarray, " k"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    margin_m: float,
+) -> tuple[Float[np.ndarray, "n k"], Bool[np.ndarray, "n k"], Bool[np.ndarray, "n k"]]:
+    """Return where beams cross lines (NaN where they do not), which end on them, and which go on beyond them."""
+    n, k = len(means), len(bearings_rad)
+    along, hits, passes = np.full((n, k), np.nan), np.zeros((n, k), np.bool_), np.zeros((n, k), np.bool_)
+    beams = _directions(bearings_rad, pose_world[2])
+    for line in range(n):
+        nx, ny = math.cos(means[line, 0]), math.sin(means[line, 0])
+        x, y = anchors[line, 0] - pose_world[0], anchors[line, 1] - pose_world[1]
+        r, foot = means[line, 1] + nx * x + ny * y, ny * x - nx * y
+        if r <= NEAREST_M:
+            continue
+        for beam in range(k):
+            cosine = beams[beam, 0] * nx + beams[beam, 1] * ny
+            if cosine <= GRAZING_COSINE:
+                continue
+            distance = r / cosine
+            along[line, beam] = foot + distance * (beams[beam, 1] * nx - beams[beam, 0] * ny)
+            across = (passed_m[beam] - distance) * cosine
+            hits[line, beam] = math.isfinite(ranges_m[beam]) and abs(across) <= margin_m
+            passes[line, beam] = across > margin_m
+    return along, hits, passes
+
+
+@compiled
+def _directions(bearings_rad: Float[np.ndarray, " k"], heading_rad: float) -> Float[np.ndarray, "k 2"]:
+    beams = np.empty((len(bearings_rad), 2))
+    for k in range(len(bearings_rad)):
+        beams[k, 0], beams[k, 1] = math.cos(bearings_rad[k] + heading_rad), math.sin(bearings_rad[k] + heading_rad)
+    return beams
+
+
+@compiled
+def passing(
+    from_world: Float[np.ndarray, "g 2"],
+    to_world: Float[np.ndarray, "g 2"],
+    pose_world: Float[np.ndarray, "3"],
+    bearings_rad: Float[np.ndarray, " k"],
+    passed_m: Float[np.ndarray, " k"],
+    beyond_m: float,
+    margin_m: float,
+    across_m: float,
+) -> Bool[np.ndarray, "g k"]:
+    """Return which beams cross the straight way between two points, away from both, and go on beyond it.
+
+    So far along the beam, and so far across the way.
+    """
+    beams = _directions(bearings_rad, pose_world[2])
+    through = np.zeros((len(from_world), len(bearings_rad)), np.bool_)
+    for g in range(len(from_world)):
+        gap_x, gap_y = to_world[g, 0] - from_world[g, 0], to_world[g, 1] - from_world[g, 1]
+        x, y = from_world[g, 0] - pose_world[0], from_world[g, 1] - pose_world[1]
+        width = max(math.hypot(gap_x, gap_y), 1e-9)
+        for k in range(len(beams)):
+            # p + s beam = from + u gap; with J the quarter turn, x·(J y) = 0 for x parallel to y.
+            denominator = gap_y * beams[k, 0] - gap_x * beams[k, 1]
+            if abs(denominator) <= 1e-9:
+                continue
+            u = -(y * beams[k, 0] - x * beams[k, 1]) / denominator
+            s = -(y * gap_x - x * gap_y) / denominator
+            if not (margin_m / width < u < 1.0 - margin_m / width and s > 0.0):
+                continue
+            sine = max(abs(denominator) / width, 1e-9)
+            through[g, k] = passed_m[k] > s + beyond_m + across_m / sine
+    return through

@@ -1,0 +1,106 @@
+"""Which ends are near and which are joined: against all pairs, one after another."""
+
+import numpy as np
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slam.map.kernels.chain_kernels import (
+    HEAD,
+    TAIL,
+    Reach,
+    joinable,
+    near_ends,
+    overlap_at_a_bend,
+    successors,
+    supposed_corners,
+)
+
+few = settings(max_examples=60, deadline=None, derandomize=True)
+seeds = st.integers(0, 2**32)
+REACH = Reach(0.3, 0.8, np.cos(0.3), 0.1, 0.7, 0.2, np.cos(0.02), np.cos(0.5))
+
+
+def walls(seed, count=14):
+    """Return the ends of walls, many of which are near, and their lines."""
+    rng = np.random.default_rng(seed)
+    n = rng.integers(0, count)
+    alpha = rng.choice([0.0, 0.2, 1.5, 3.0], n) + rng.normal(0.0, 0.05, n)
+    along = np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
+    start = np.round(rng.uniform(-1.0, 1.0, (n, 2)), 1)
+    ends = np.stack([start, start + rng.uniform(0.1, 1.0, (n, 1)) * along], axis=1)
+    return ends, np.column_stack([alpha, np.sum(start * np.stack([np.cos(alpha), np.sin(alpha)], -1), axis=1)])
+
+
+@few
+@given(seed=seeds)
+def test_the_nearest_ends_are_joined_first_among_all_pairs(seed):
+    rng = np.random.default_rng(seed)
+    ends, _ = walls(seed)
+    n = len(ends)
+    gap = np.linalg.norm(ends[:, None, HEAD] - ends[None, :, TAIL], axis=-1)
+    expected = [[h, t] for h in range(n) for t in range(n) if h != t and gap[h, t] <= 0.6]
+    pairs = near_ends(ends, 0.6)
+    assert pairs.tolist() == expected
+    allowed, gaps = rng.random(len(pairs)) < 0.7, np.round(gap[tuple(pairs.T)], 1)
+    joined = {}
+    for k in sorted(np.flatnonzero(allowed), key=lambda k: (gaps[k], *pairs[k])):
+        if pairs[k, 0] not in joined and pairs[k, 1] not in joined.values():
+            joined[int(pairs[k, 0])] = int(pairs[k, 1])
+    assert successors(pairs, gaps, allowed, n).tolist() == [joined.get(row, -1) for row in range(n)]
+
+
+@few
+@given(seed=seeds)
+def test_ends_are_joined_that_are_near_or_overlap_at_a_bend(seed):
+    rng = np.random.default_rng(seed)
+    ends, lines = walls(seed)
+    pairs, often, alpha = near_ends(ends, 0.9), rng.random(len(ends)) < 0.7, lines[:, 0].copy()
+    aside = rng.random(len(pairs)) < 0.5
+    gaps, allowed = joinable(pairs, ends, alpha, often, aside, REACH)
+    for k, (head, tail) in enumerate(pairs):
+        between = ends[tail, TAIL] - ends[head, HEAD]
+        gap = np.linalg.norm(between)
+        across = abs(between @ [np.cos(alpha[head]), np.sin(alpha[head])])
+        near = gap <= (0.8 if aside[k] else 0.3)
+        if np.cos(alpha[head] - alpha[tail]) > np.cos(0.3):
+            near = near and (gap <= 0.1 or across > 0.5 * gap)
+        bend = gap <= 0.7 and often[head] and often[tail]
+        bend = bend and overlap_at_a_bend(ends[head], ends[tail], alpha[head], alpha[tail], REACH)
+        assert allowed[k] == (near or bend)
+        np.testing.assert_allclose(gaps[k], gap)
+
+
+@few
+@given(seed=seeds, turn=st.floats(-0.6, 0.6), past=st.floats(-0.3, 0.6), shift=st.floats(-0.3, 0.3))
+def test_two_sides_overlap_at_a_bend_where_each_reaches_along_the_other(seed, turn, past, shift):
+    """The first wall runs along x to the origin and past it; the second begins before the bend and turns."""
+    u = np.array([np.cos(turn), np.sin(turn)])
+    before = np.array([[-1.0, 0.0], [past, 0.0]])
+    after = np.outer([-0.2, 1.0], u) + np.array([0.0, shift])
+    found = overlap_at_a_bend(before, after, -0.5 * np.pi, turn - 0.5 * np.pi, REACH)
+    head, tail = before[HEAD], after[TAIL]
+    overlaps = (head - tail)[0] > 0.0
+    goes_on = (after[HEAD] - head)[0] > 0.0 and u @ (tail - before[TAIL]) > 0.0
+    near = abs((head - tail)[1]) <= 0.2 and abs(u[0] * (head - tail)[1] - u[1] * (head - tail)[0]) <= 0.2
+    assert found == (overlaps and goes_on and near and 0.02 < abs(turn) < 0.5)
+
+
+@few
+@given(seed=seeds)
+def test_a_corner_is_supposed_where_both_lines_would_meet_nearby(seed):
+    ends, lines = walls(seed)
+    pairs = near_ends(ends, 0.9)
+    corners, supposed = supposed_corners(pairs, ends, lines, 0.5, 0.05)
+    for k, (one, other) in enumerate(pairs):
+        if abs(np.sin(lines[one, 0] - lines[other, 0])) < 0.05:
+            assert not supposed[k]
+            continue
+        far = [shapely.LineString([e[0] - 99.0 * (e[1] - e[0]), e[1] + 99.0 * (e[1] - e[0])]) for e in ends[pairs[k]]]
+        meet = far[0].intersection(far[1])
+        if meet.is_empty:
+            assert not supposed[k]
+            continue
+        np.testing.assert_allclose(corners[k], [meet.x, meet.y], atol=1e-8)
+        reach = max(np.linalg.norm(corners[k] - ends[one, HEAD]), np.linalg.norm(corners[k] - ends[other, TAIL]))
+        assert supposed[k] == (0.05 < reach <= 0.5)
