@@ -5,7 +5,7 @@ PLANS ?= ../shared/data/plans
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
+.PHONY: schools-default setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -58,6 +58,11 @@ random: setup
 # 312 runs of 1,500 noisy steps, about two hours of one core; begun again, it goes on where it was.
 schools: setup
 	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --out results/schools-short.jsonl
+
+# Does full-ekf or invariant-ekf lose fewer maps? Two seeds of 39 schools; begun again, it goes on where it was.
+schools-default: setup
+	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --backends full-ekf invariant-ekf --seeds 1 2 --any-code \
+	    --out studies/results/rows/in_text/schools-default.jsonl
 
 bias: setup
 	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.jsonl

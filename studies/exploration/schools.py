@@ -1,4 +1,4 @@
-"""Every back end in every school: whether any run ends by an exception.
+"""Every back end in every school: whether any run ends by an exception, and which of two loses fewer maps.
 
 .venv/bin/python -m studies.exploration.schools --plans DIR --out results/schools-short.jsonl
 """
@@ -6,18 +6,21 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tyro
 from rich.table import Table
+from scipy.stats import binomtest
 
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
+from ..results.headlines import LOST
 from ..runner.trials import rows_of
 
 
@@ -31,8 +34,8 @@ class SchoolsStudy:
     """Which files of the folder, as the shell would write it."""
     backends: tuple[str, ...] = tuple(reversed(BACKENDS))
     """The estimators, one after the other."""
-    seed: int = 1
-    """Decides all noise."""
+    seeds: tuple[int, ...] = (1,)
+    """Each decides all noise of a run of every plan."""
     max_steps: int = 1500
     """A run is stopped after this many scans."""
     jobs: int = 1
@@ -43,14 +46,15 @@ class SchoolsStudy:
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
     def trials(self) -> list[TrialConfig]:
-        """Return the trials, one back end after the other; raises UsageError for a folder without plans."""
+        """Return the trials, those of a plan beside each other; raises UsageError for a folder without plans."""
         names = sorted(str(path) for path in self.plans.glob(self.named) if path.is_file())
         if not names:
             raise UsageError(f"expected a folder of plans, found no file {self.named} in {self.plans}: check it")
         return [
-            TrialConfig(name, backend, seed=self.seed, max_steps=self.max_steps)
-            for backend in self.backends
+            TrialConfig(name, backend, seed=seed, max_steps=self.max_steps)
+            for seed in self.seeds
             for name in names
+            for backend in self.backends
         ]
 
 
@@ -73,6 +77,25 @@ def table(rows: Sequence[dict[str, Any]], backends: Sequence[str]) -> Table:
     return shown
 
 
+def lost_in_pairs(rows: Sequence[dict[str, Any]], one: str, other: str) -> tuple[int, int, int, float]:
+    """Return the number of pairs of runs, in how many only the one or the other lost its map, and how likely that is.
+
+    A pair has one plan and seed. The likelihood is that of the two-sided sign test: of a difference as large or larger
+    if both lose their maps alike.
+    """
+    lost = {
+        backend: {(row["file"], row["seed"]): row["pose_anees"] > LOST for row in rows if row["backend"] == backend
+                  and row.get("pose_anees") is not None}
+        for backend in (one, other)
+    }  # fmt: skip
+    both = lost[one].keys() & lost[other].keys()
+    only_one = sum(lost[one][pair] and not lost[other][pair] for pair in both)
+    only_other = sum(lost[other][pair] and not lost[one][pair] for pair in both)
+    differ = only_one + only_other
+    p = float(binomtest(only_one, differ).pvalue) if differ else 1.0
+    return len(both), only_one, only_other, p
+
+
 def main() -> int:
     """Run the study that the command line names and return the exit status: 1 where an exception ended a run."""
     study = tyro.cli(SchoolsStudy, prog="studies.exploration.schools")
@@ -87,6 +110,9 @@ def main() -> int:
         print(f"schools_study: {error}", file=sys.stderr)
         return 2
     plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, study.backends))
+    for one, other in combinations(study.backends, 2):
+        pairs, only_one, only_other, p = lost_in_pairs(rows, one, other)
+        print(f"{pairs} pairs: only {one} lost its map in {only_one}, only {other} in {only_other}; p = {p:.3g}")
     for row in rows:
         if row["status"] not in ("complete", "stopped"):
             print(f"{row['file']} {row['backend']}: {row['status']} at step {row.get('steps')}: {row['reason']}")
