@@ -31,7 +31,9 @@ def extract(
     An end is OPEN also where the wall stops in front of something farther. At the bearings `vertices_rad` the wall is
     known to bend.
     """
-    return Segments(*segments_of(*beams_of_scan(scan), plain(vertices_rad), rules_of(config)))
+    found, is_good = segments_of(*beams_of_scan(scan), plain(vertices_rad), rules_of(config))
+    segments = Segments(*found)
+    return segments if is_good.all() else segments.take(is_good)
 
 
 def beams_of_scan(

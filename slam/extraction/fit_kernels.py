@@ -42,7 +42,7 @@ def fitted(joints: Joints, returns: Returns, rules: Rules) -> Fitted:
 def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tuple[Line, int, int, int, float]:
     """Return a piece's line, its first and last return, how many it used, and their chi-square; too few give 0."""
     line = line_of(joints.lines, k)
-    start, stop = joints.pieces[k]
+    start, stop = joints.pieces[k, 0], joints.pieces[k, 1]
     if stop - start < rules.least_beams:
         return line, start, stop, 0, 0.0
     is_long = stop - start - 2 >= rules.least_beams
@@ -50,13 +50,21 @@ def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tup
         start += 1
     if is_long and (joints.in_doubt[k, 1] or not joints.is_corner[k, 1]):
         stop -= 1
-    at = np.arange(start, stop) % len(returns.beam)
-    cos, sin, ranges, sigmas = returns.cos[at], returns.sin[at], returns.ranges_m[at], returns.sigmas_m[at]
+    size, m = stop - start, len(returns.beam)
+    cos, sin, ranges, sigmas = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    for i in range(size):
+        at = (start + i) % m
+        cos[i], sin[i], ranges[i], sigmas[i] = (
+            returns.cos[at],
+            returns.sin[at],
+            returns.ranges_m[at],
+            returns.sigmas_m[at],
+        )
     line = refit(line, cos, sin, ranges, 1.0 / _variances(line, cos, sin, ranges, sigmas, returns.sigma_share))
     sigma2 = _variances(line, cos, sin, ranges, sigmas, returns.sigma_share)
     keep = 1.0 / sigma2
-    for i in range(len(at)):
-        is_free = (i == 0 and not joints.is_corner[k, 0]) or (i == len(at) - 1 and not joints.is_corner[k, 1])
+    for i in range(size):
+        is_free = (i == 0 and not joints.is_corner[k, 0]) or (i == size - 1 and not joints.is_corner[k, 1])
         gate = rules.open_gate_sigmas if is_free else rules.noise_sigmas
         off = met_at(line, cos[i], sin[i]) - ranges[i]
         # A residual varies by sigma^2 less what its own beam lent to the line; a beam that alone holds the line stays.
@@ -64,13 +72,12 @@ def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tup
         if not off * off <= gate * gate * spread:
             keep[i] = 0.0
     line = refit(line, cos, sin, ranges, keep)
-    used = np.flatnonzero(keep)
-    if len(used) == 0:
-        return line, start, stop, 0, 0.0
-    chi2 = 0.0
-    for beam in used:
-        chi2 += (met_at(line, cos[beam], sin[beam]) - ranges[beam]) ** 2 / sigma2[beam]
-    return line, start + used[0], start + used[-1], len(used), chi2
+    first, last, count, chi2 = stop, start, 0, 0.0
+    for i in range(size):
+        if keep[i] > 0.0:
+            first, last, count = min(first, start + i), start + i, count + 1
+            chi2 += (met_at(line, cos[i], sin[i]) - ranges[i]) ** 2 / sigma2[i]
+    return line, first, last, count, chi2
 
 
 @compiled

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from ..geometry.compiled import compiled
 from .line_kernels import Line, crossing, fit_run, line_of, met_at, put, variance_met
-from .returns_kernels import Returns, Rules, run_of, turn_of, turned
+from .returns_kernels import Returns, Rules, count_below, run_of, turn_of, turned
 
 
 class Joints(NamedTuple):
@@ -74,9 +74,9 @@ def _cut_between(last: int, first: int, one: Line, other: Line, returns: Returns
         return -1
     bearing = 0.5 * (left + right) + past
     if not returns.is_ring:
-        return int(np.searchsorted(returns.turn, bearing))
+        return count_below(returns.turn, bearing)
     around = m if bearing > returns.turn[-1] else 0
-    return around + int(np.searchsorted(returns.turn, bearing - (returns.period if around else 0)))
+    return around + count_below(returns.turn, bearing - (returns.period if around else 0))
 
 
 @compiled

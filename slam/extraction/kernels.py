@@ -39,8 +39,8 @@ def segments_of(
     is_full_turn: bool,
     vertices_rad: Float[np.ndarray, " b"],
     rules: Rules,
-) -> Found:
-    """Return the straight segments of a scan; at the bearings `vertices_rad` the wall is known to bend."""
+) -> tuple[Found, Bool[np.ndarray, " n"]]:
+    """Return the straight segments of a scan, and which are good; at `vertices_rad` the wall is known to bend."""
     returns = returns_of(bearings_rad, ranges_m, sigmas_m, sigma_share, farthest_m, is_full_turn, rules)
     sums = prefix_sums(returns.cos, returns.sin, returns.ranges_m, returns.sigmas_m)
     gains = split_gains(sums, returns.breaks, rules)
@@ -57,8 +57,11 @@ def segments_of(
 
 
 @compiled
-def _described(pieces: Fitted, returns: Returns, rules: Rules) -> Found:
-    """Return the fitted lines with their ends: where the last beam meets its line, or where two lines meet."""
+def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, Bool[np.ndarray, " n"]]:
+    """Return the fitted lines with their ends, where the last beam meets its line or two lines do, and which are good.
+
+    A line is none whose last beams do not meet it, or that its beams leave open.
+    """
     n, m = len(pieces.counts), len(returns.beam)
     lines, cov, ends = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
     beams, kinds, good = np.empty((n, 2), np.int64), np.empty((n, 2), np.int64), np.ones(n, np.bool_)
@@ -81,12 +84,11 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> Found:
             ends[after, 0, 0], ends[after, 0, 1] = x, y
             kinds[k, 1] = kinds[after, 0] = _CORNER
     for k in range(n):
-        good[k] &= np.isfinite(cov[k].sum() + ends[k].sum())
-    is_tentative = pieces.counts < rules.sure_beams
-    return Found(
-        lines[good], cov[good], ends[good], beams[good], pieces.counts[good], kinds[good], pieces.chi2[good],
-        is_tentative[good],
-    )  # fmt: skip
+        told = cov[k, 0, 0] + cov[k, 0, 1] + cov[k, 1, 1]
+        for end in range(2):
+            told += ends[k, end, 0] + ends[k, end, 1]
+        good[k] &= np.isfinite(told)
+    return Found(lines, cov, ends, beams, pieces.counts, kinds, pieces.chi2, pieces.counts < rules.sure_beams), good
 
 
 @compiled

@@ -61,51 +61,83 @@ def returns_of(
     rules: Rules,
 ) -> Returns:
     """Return the returns and their breaks, rolled to begin after a break, or at the farthest in a closed room."""
-    beam = np.flatnonzero((ranges_m > rules.noise_sigmas * sigmas_m) & (ranges_m <= farthest_m))
-    m = len(beam)
+    m, beam = 0, np.empty(len(ranges_m), np.int64)
+    for i in range(len(ranges_m)):
+        if rules.noise_sigmas * sigmas_m[i] < ranges_m[i] <= farthest_m:
+            beam[m] = i
+            m += 1
     step = (bearings_rad[-1] - bearings_rad[0]) / (len(bearings_rad) - 1)
     period = len(ranges_m) if is_full_turn else 0
-    # Entry i tells whether the surface breaks off between return i-1 and return i; entry 0 is the seam.
-    is_break, steepest = np.zeros(m + 1, np.bool_), _steepest(step, rules)
+    steepest = _steepest(step, rules)
+    # Break i tells that the surface breaks off between return i-1 and return i; 0 is the seam.
+    count, breaks, farthest = 0, np.empty(m + 2, np.int64), 0
     for i in range(m):
-        gap = beam[i] - beam[i - 1] if i else beam[0] + period - beam[-1] if period else rules.gap_beams + 1
-        one_m, other_m = ranges_m[beam[i]], ranges_m[beam[i - 1]]
+        before = (i - 1) % m
+        gap = beam[i] - beam[before] if i else beam[0] + period - beam[before] if period else rules.gap_beams + 1
+        one_m, other_m = ranges_m[beam[i]], ranges_m[beam[before]]
         leap = max(one_m, other_m) - min(one_m, other_m) * steepest[min(gap, rules.gap_beams + 1)]
-        is_break[i] = leap > rules.noise_sigmas * max(sigmas_m[beam[i]], sigmas_m[beam[i - 1]])
-    found = np.flatnonzero(is_break)
-    is_ring = len(found) == 0
-    first = 0
-    if m > 0:
-        first = int(np.argmax(ranges_m[beam])) if is_ring else found[0]
-    breaks = np.append(np.zeros(1, np.int64) if is_ring else found - first, m)
-    order = np.roll(beam, -first)
-    turn = order.copy()
-    turn[m - first :] += period
-    theta = bearings_rad[order]
-    return Returns(
-        np.cos(theta), np.sin(theta), ranges_m[order], sigmas_m[order], order, turn, breaks, is_ring, period, step,
-        sigma_share,
-    )  # fmt: skip
+        if leap > rules.noise_sigmas * max(sigmas_m[beam[i]], sigmas_m[beam[before]]):
+            breaks[count] = i
+            count += 1
+        if one_m > ranges_m[beam[farthest]]:
+            farthest = i
+    is_ring = count == 0
+    first = farthest if is_ring else breaks[0]
+    for k in range(count):
+        breaks[k] -= first
+    count = max(count, 1)
+    breaks[0], breaks[count] = 0, m
+    cos, sin, ranges, sigmas = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    for i in range(m):
+        cos[i], sin[i] = np.cos(bearings_rad[beam[i]]), np.sin(bearings_rad[beam[i]])
+        ranges[i], sigmas[i] = ranges_m[beam[i]], sigmas_m[beam[i]]
+    returns = Returns(
+        cos, sin, ranges, sigmas, beam[:m], beam[:m], breaks[: count + 1], is_ring, period, step, sigma_share
+    )
+    return rolled(returns, first)
 
 
 @compiled
 def _steepest(step_rad: float, rules: Rules) -> Float[np.ndarray, " g"]:
     """Return the largest ratio of two ranges on one wall by beams between them; 0, that is a break, beyond the gap."""
-    ratios = np.sin(rules.grazing_rad + step_rad * np.arange(rules.gap_beams + 2)) / np.sin(rules.grazing_rad)
-    ratios[-1] = 0.0
+    ratios = np.zeros(rules.gap_beams + 2)
+    for gap in range(rules.gap_beams + 1):
+        ratios[gap] = np.sin(rules.grazing_rad + step_rad * gap) / np.sin(rules.grazing_rad)
     return ratios
 
 
 @compiled
 def rolled(returns: Returns, first: int) -> Returns:
     """Return the returns of a ring, beginning with the one at position `first`."""
-    turn = np.roll(returns.turn, -first)
-    turn[len(turn) - first :] += returns.period
+    m = len(returns.beam)
+    cos, sin, ranges, sigmas = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    beam, turn = np.empty(m, np.int64), np.empty(m, np.int64)
+    for i in range(m):
+        at = (i + first) % m
+        cos[i], sin[i], ranges[i], sigmas[i] = (
+            returns.cos[at],
+            returns.sin[at],
+            returns.ranges_m[at],
+            returns.sigmas_m[at],
+        )
+        beam[i], turn[i] = returns.beam[at], returns.turn[at] + (returns.period if at < first else 0)
     return Returns(
-        np.roll(returns.cos, -first), np.roll(returns.sin, -first), np.roll(returns.ranges_m, -first),
-        np.roll(returns.sigmas_m, -first), np.roll(returns.beam, -first), turn, returns.breaks, returns.is_ring,
-        returns.period, returns.step_rad, returns.sigma_share,
+        cos, sin, ranges, sigmas, beam, turn, returns.breaks, returns.is_ring, returns.period, returns.step_rad,
+        returns.sigma_share,
     )  # fmt: skip
+
+
+@compiled
+def count_below(values: Int[np.ndarray, " m"], limit: float) -> int:
+    """Return how many of some increasing values are below a limit."""
+    low, high = 0, len(values)
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < limit:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @compiled
@@ -116,7 +148,7 @@ def positions_of(bearings_rad: Float[np.ndarray, " b"], first_rad: float, return
         beam = ((bearings_rad[i] - first_rad) % (2.0 * np.pi)) / returns.step_rad
         if returns.period:
             beam = (beam - returns.turn[0]) % returns.period + returns.turn[0]
-        at[i] = np.searchsorted(returns.turn, beam)
+        at[i] = count_below(returns.turn, beam)
     return at
 
 
@@ -130,7 +162,7 @@ def turned(returns: Returns, at: int, angle: float) -> tuple[float, float]:
 @compiled
 def run_of(position: int, returns: Returns) -> int:
     """Return which unbroken run of returns a position is in."""
-    return int(np.searchsorted(returns.breaks, position, side="right"))
+    return count_below(returns.breaks, position + 0.5)
 
 
 @compiled

@@ -90,13 +90,13 @@ def choose(
             cost = least[i] + (chi2_of_run(sums, cuts[i], cuts[j]) + rules.segment_cost)
             if cost < least[j]:
                 least[j], came_from[j] = cost, i
-    pieces, count, j = np.empty((len(cuts), 2), np.int64), 0, len(cuts) - 1
+    pieces, count, j = np.empty((len(cuts), 2), np.int64), len(cuts), len(cuts) - 1
     while j > 0:
         if came_from[j] >= 0:
+            count -= 1
             pieces[count, 0], pieces[count, 1] = cuts[came_from[j]], cuts[j]
-            count += 1
         j = came_from[j] if came_from[j] >= 0 else j - 1
-    return pieces[:count][::-1].copy()
+    return pieces[count:]
 
 
 @compiled
@@ -143,15 +143,18 @@ def bend_within(sums: Float[np.ndarray, "m1 6"], start: int, stop: int, rules: R
 def cut_at(pieces: Int[np.ndarray, "n 2"], at: Int[np.ndarray, " b"], rules: Rules) -> Int[np.ndarray, "k 2"]:
     """Cut the pieces before the returns `at`; a part of fewer than `least_beams` returns is left loose."""
     parts, count = np.empty((len(pieces) + len(at), 2), np.int64), 0
-    ordered = np.sort(at)
     for k in range(len(pieces)):
         start = pieces[k, 0]
-        for stop in np.append(ordered[(ordered > start) & (ordered < pieces[k, 1])], pieces[k, 1]):
+        while start < pieces[k, 1]:
+            stop = pieces[k, 1]
+            for position in at:
+                if start < position < stop:
+                    stop = position
             if stop - start >= rules.least_beams:
                 parts[count, 0], parts[count, 1] = start, stop
                 count += 1
             start = stop
-    return parts[:count].copy()
+    return parts[:count]
 
 
 @compiled
