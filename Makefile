@@ -12,7 +12,8 @@ setup: .venv/made
 .venv/made: requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps -e . && touch $@
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps -e .
+	$(BIN)/python -m experiments.library.compile_kernels && touch $@
 
 demo: setup
 	$(BIN)/chainslam explore paper-fig9 --seed 1

@@ -2,22 +2,22 @@
 
 A kernel is a plain function of arrays and numbers, with `@compiled` above it: it can be read, and stepped through, as
 the loop that it is. What was compiled is kept under the fingerprint of its source, of the kernels that it calls and of
-the numbers that it reads, so that a changed kernel is never run as it was before.
+the numbers that it reads, so that a changed kernel is never run as it was before. numba is imported at the first call:
+a command that runs no kernel does without it.
 """
 
 import inspect
+import logging
 import os
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, update_wrapper
 from hashlib import blake2b
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
-from numba import config, njit
-from numba.core.dispatcher import Dispatcher
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -32,9 +32,43 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     Division by zero gives inf or NaN as in numpy, and sums are taken in the order in which they stand.
     """
-    plain = inspect.unwrap(function)
-    config.CACHE_DIR = str(cache() / _fingerprint(plain))  # type: ignore[attr-defined]
-    return njit(cache=True, error_model="numpy")(plain)
+    return Kernel(inspect.unwrap(function))
+
+
+class Kernel(Generic[_P, _R]):
+    """A function that becomes machine code when it is called, together with the kernels that it calls."""
+
+    def __init__(self, plain: Callable[_P, _R]) -> None:
+        self.plain = plain
+        self._machine: Callable[_P, _R] | None = None
+        update_wrapper(self, plain)
+
+    def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """Run the machine code."""
+        return (self._machine or self.machine())(*args, **kwargs)
+
+    def machine(self) -> Callable[_P, _R]:
+        """Return the function as numba compiles it at a call; what it calls in its module is the same from then on."""
+        if self._machine is None:
+            from numba import config, njit
+
+            fingerprint = _fingerprint(self.plain)
+            if not config.DISABLE_JIT and not any((cache() / fingerprint).rglob("*.nbc")):  # type: ignore[attr-defined]
+                _tell_once()
+            config.CACHE_DIR = str(cache() / fingerprint)  # type: ignore[attr-defined]
+            self._machine = njit(cache=True, error_model="numpy")(self.plain)
+            for name, value in _globals(self.plain):
+                if isinstance(value, Kernel):
+                    self.plain.__globals__[name] = value.machine()
+        assert self._machine is not None
+        return self._machine
+
+
+@lru_cache
+def _tell_once() -> None:
+    logging.getLogger("chainslam").warning(
+        "chainslam: compiling loops, once and for a minute or less; what comes of it is kept in %s", cache()
+    )
 
 
 def plain(array: np.ndarray) -> np.ndarray:
@@ -42,11 +76,6 @@ def plain(array: np.ndarray) -> np.ndarray:
     if array.dtype == np.float64 and array.flags.carray:
         return array
     return np.require(array, np.float64, ("C", "A", "W"))
-
-
-def is_compiled() -> bool:
-    """Return whether each module of kernels that was imported so far has some in the cache."""
-    return all(any((cache() / fingerprint).rglob("*.nbc")) for fingerprint in _FINGERPRINTS.values())
 
 
 @lru_cache
@@ -69,17 +98,24 @@ def _user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
 
 
+def _globals(function: Callable[..., object]) -> list[tuple[str, Any]]:
+    """Return by name what the function's module holds, without what Python puts there."""
+    held: dict[str, Any] = function.__globals__
+    return [(name, value) for name, value in sorted(held.items()) if not name.startswith("__")]
+
+
 def _fingerprint(function: Callable[..., object]) -> str:
-    """Return one name for all that the kernels of the function's module are made of, known once they are defined."""
+    """Return one name for all that the kernels of the function's module are made of."""
     module = function.__module__
     if module not in _FINGERPRINTS:
-        told = blake2b(Path(function.__code__.co_filename).read_bytes(), digest_size=8)
-        for name, value in sorted(function.__globals__.items()):
-            if name.startswith("__"):
-                continue
+        told = blake2b(Path(inspect.getfile(function)).read_bytes(), digest_size=8)
+        for name, value in _globals(function):
             if isinstance(value, _FROZEN):
                 told.update(f"{name}={value!r};".encode())
-            if isinstance(value, Dispatcher):
-                told.update(_FINGERPRINTS[value.py_func.__module__].encode())
+            if isinstance(value, type) and issubclass(value, tuple):
+                told.update(f"{name}{getattr(value, '_fields', ())};".encode())
+            called = value.plain if isinstance(value, Kernel) else getattr(value, "py_func", None)
+            if called is not None and called.__module__ != module:
+                told.update(_fingerprint(called).encode())
         _FINGERPRINTS[module] = f"{module}-{told.hexdigest()}"
     return _FINGERPRINTS[module]

@@ -17,7 +17,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numba
 import numpy as np
 from numba import config
 
@@ -149,12 +148,10 @@ def install(switches: Iterable[Switch]) -> None:
     Kernels run as the plain Python that they are: machine code could not ask what is off.
     """
     os.environ["NUMBA_DISABLE_JIT"] = "1"
-    numba.config.DISABLE_JIT = True  # type: ignore[attr-defined]
+    config.DISABLE_JIT = True  # type: ignore[attr-defined]
     chosen = list(switches)
     early = {switch.module for switch in chosen} & sys.modules.keys()
     if early:
         raise RuntimeError(f"expected no module with switches to be loaded yet, found {sorted(early)}")
     builtins.rule_switch = STATE.value  # type: ignore[attr-defined]
-    # A rule within a compiled loop is switched in the loop that it is made of.
-    config.DISABLE_JIT = True  # type: ignore[attr-defined]
     sys.meta_path.insert(0, _Finder(chosen))

@@ -17,6 +17,7 @@ HEAVY = (
     "joblib",
     "matplotlib",
     "networkx",
+    "numba",
     "pandas",
     "PIL",
     "pyarrow",
@@ -45,6 +46,15 @@ def imported(program):
 def test_the_help_and_the_listings_import_only_what_they_show(words, needed):
     program = f"from experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
     assert imported(program) <= needed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["strategies"], ["explore", "--help"], ["replay", "--help"], ["report", "no-such-folder"], ["compare", "--help"]],
+)
+def test_a_command_that_runs_no_step_loads_no_compiler(words):
+    program = f"from experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    assert "numba" not in imported(f"import os\nos.dup2(os.open(os.devnull, os.O_WRONLY), 1)\n{program}")
 
 
 def test_a_campaigns_worker_imports_nothing_that_draws():

@@ -1,0 +1,29 @@
+"""What `make setup` compiles is all that a run needs."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.long
+def test_once_compiled_no_run_compiles_again_and_every_file_of_kernels_was_called(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(*words):
+        done = subprocess.run(
+            [sys.executable, "-m", *words], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stderr
+
+    assert run("experiments.library.compile_kernels").count("compiling loops") == 1
+    kept = {folder.name.rpartition("-")[0] for folder in (tmp_path / "cache").iterdir()}
+    files = [path for room in ("slam", "explore", "sim") for path in (ROOT / room).rglob("*kernels.py")]
+    assert {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files} == kept
+    out = tmp_path / "run"
+    told = run("experiments.commands.cli", "explore", "rooms", "--seed", "2", "--max-steps", "60", "--out", str(out))
+    assert "compiling" not in told
