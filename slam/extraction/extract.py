@@ -11,8 +11,8 @@ from jaxtyping import Float
 from ..geometry.compiled import plain
 from ..robot import Scan
 from .config import ExtractionConfig
-from .kernels import segments_of
-from .returns_kernels import Rules
+from .kernels.returns_kernels import Rules
+from .kernels.segment_kernels import segments_of
 from .segments import Segments
 
 DEFAULT = ExtractionConfig()

@@ -7,7 +7,7 @@ from jaxtyping import Int
 
 from ..robot import Scan
 from .config import ExtractionConfig
-from .extent_kernels import believed_ends
+from .kernels.extent_kernels import believed_ends
 from .segments import Segments
 
 

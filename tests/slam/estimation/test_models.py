@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.estimation.models import halfway, initialise, innovations, lines_robot, move, stack
-from slam.extraction.line_kernels import fit_run, polar, prefix_sums
+from slam.extraction.kernels.line_kernels import fit_run, polar, prefix_sums
 from slam.geometry.lines import lines_to_world
 from slam.geometry.poses import to_robot, to_world, wrap
 

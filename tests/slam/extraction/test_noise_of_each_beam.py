@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from sim.lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import beams_of_scan, extract, rules_of
-from slam.extraction.returns_kernels import returns_of, rolled
+from slam.extraction.kernels.returns_kernels import returns_of, rolled
 from slam.extraction.segments import EndKind
 from slam.map.change_points import ChangePoints, ChangePointsConfig
 from slam.robot import Scan

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import beams_of_scan, extract, rules_of
-from slam.extraction.line_kernels import prefix_sums
-from slam.extraction.returns_kernels import positions_of, returns_of, rolled
-from slam.extraction.split_kernels import bend_within, candidates, choose, cut_at, settled, split_gains, surest
+from slam.extraction.kernels.line_kernels import prefix_sums
+from slam.extraction.kernels.returns_kernels import positions_of, returns_of, rolled
+from slam.extraction.kernels.split_kernels import bend_within, candidates, choose, cut_at, settled, split_gains, surest
 from slam.robot import Scan
 from tests.slam.extraction.test_extract import room_scan
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
 from .line_kernels import Line, crossing, fit_run, line_of, met_at, put, variance_met
 from .returns_kernels import Returns, Rules, count_below, run_of, turn_of, turned
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
 
 
 class Line(NamedTuple):

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..geometry.compiled import compiled
-from .segments import EndKind
+from ...geometry.compiled import compiled
+from ..segments import EndKind
 
 _OPEN = int(EndKind.OPEN)
 _GRAZING = 0.02

@@ -6,7 +6,7 @@ Pieces are rows (start, stop) of the returns [start, stop).
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
 from .line_kernels import chi2_of_run
 from .returns_kernels import Rules
 

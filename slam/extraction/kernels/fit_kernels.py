@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
 from .joint_kernels import Joints
 from .line_kernels import Line, line_of, met_at, put, refit, variance_met
 from .returns_kernels import Returns, Rules

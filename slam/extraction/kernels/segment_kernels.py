@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
+from ..segments import EndKind
 from .fit_kernels import Fitted, fitted
 from .joint_kernels import sharpened
 from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
 from .returns_kernels import Returns, Rules, positions_of, returns_of, rolled, run_of, turn_of, turned
-from .segments import EndKind
 from .split_kernels import candidates, cut_at, settled, split, split_gains, surest
 
 _OPEN, _OCCLUDED, _CORNER = int(EndKind.OPEN), int(EndKind.OCCLUDED), int(EndKind.CORNER)

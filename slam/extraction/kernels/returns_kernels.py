@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..geometry.compiled import compiled
+from ...geometry.compiled import compiled
 
 
 class Rules(NamedTuple):

@@ -1,0 +1,1 @@
+"""From a scan to straight segments, in compiled loops."""
