@@ -25,6 +25,7 @@ from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
 from .maps.dimensions import dimensions
+from .maps.dxf import map_dxf
 from .maps.geojson import map_geojson
 from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
@@ -105,7 +106,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "steps.csv": lambda: steps_csv(log),
         "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
         "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
-        "map.dxf": lambda: _drawing(drawn()["features"], told(), title),
+        "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _picture(result),
     }
     if last.free_space.evidence.size:
@@ -140,13 +141,6 @@ def _picture(result: TrialResult) -> bytes:
     from .picture import picture_of
 
     return picture_of(result)
-
-
-def _drawing(features: list[dict[str, Any]], told: list[Dimension], title: str) -> bytes:
-    # ezdxf looks through the system's fonts when it is imported: only who writes a run's files waits for that.
-    from .maps.dxf import map_dxf
-
-    return map_dxf(features, told, title)
 
 
 def _commit() -> str | None:

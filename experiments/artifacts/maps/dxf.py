@@ -1,40 +1,25 @@
 """The map as a CAD drawing, `map.dxf`: the walls of `map.geojson` on layers, in metres, in the frame of the map."""
 
-import logging
-import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from io import StringIO
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-import ezdxf
 import numpy as np
-from ezdxf import units
-from ezdxf.document import Drawing
-from ezdxf.enums import TextEntityAlignment
-from ezdxf.layouts import Modelspace
 from jaxtyping import Float
 
 from viz.figures.floor_plan import Dimension
 
-VERSION = "R2000"
-"""The oldest format that states its unit: all that read DXF read it."""
 WALLS, TENTATIVE, DIMENSIONS, PATH = "WALLS", "WALLS-TENTATIVE", "DIMENSIONS", "PATH"
 OPEN_ENDS, NOTES = "OPEN-ENDS", "NOTES"
-LAYERS = {WALLS: (7, 35), TENTATIVE: (8, 18), DIMENSIONS: (5, 13), PATH: (3, 13), OPEN_ENDS: (1, 18), NOTES: (8, 13)}
-"""Of each layer the colour, by AutoCAD's index, and the breadth of its lines on paper, in 0.01 mm."""
-DASHED = "CHAINSLAM-DASHED"
-DASHES_M = [0.3, 0.2, -0.1]
-"""Length of the pattern, the dash and the gap."""
-LETTERS, FONT = "CHAINSLAM", "arial.ttf"
+LETTERS = "CHAINSLAM"
+"""Style of the letters."""
 CAPITALS = 0.72
 """Height of a capital, which a drawing states, as a share of the letters' height, which the floor plan states."""
 RING_M, START_M, NOTE_M = 0.2, 0.12, 0.2
 """Radius of the rings around open ends and around the start, and height of the letters of a note."""
-
-_fixed = threading.Lock()
-# A home without room for its cache of fonts is told on standard error; no letter is measured here.
-logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+SPACE, FIRST_HANDLE = "17", 0x1000
+"""The blank drawing's name for its model space, and the first name that it leaves free."""
 
 
 def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimension], title: str) -> bytes:
@@ -43,52 +28,33 @@ def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimensio
     A chain is a polyline on the layer WALLS, closed where the chain is; each tentative wall is a line on a layer of
     its own. A shape with a coordinate that is not finite is left out. The same input gives the same bytes.
     """
-    with _same_bytes():
-        drawing = ezdxf.new(VERSION, units=units.M)
-        drawing.linetypes.add(DASHED, DASHES_M, description="not seen well enough yet")
-        drawing.styles.add(LETTERS, font=FONT)
-        for name, (colour, breadth) in LAYERS.items():
-            linetype = DASHED if name == TENTATIVE else "Continuous"
-            drawing.layers.add(name, color=colour, lineweight=breadth, linetype=linetype)
-        plan = _Plan(drawing.modelspace())
-        for feature in features:
-            plan.feature(feature)
-        for dimension in dimensions:
-            plan.dimension(dimension)
-        low, high = plan.bounds
-        words = [title, *(["lengths in m, areas in m², with 95 % intervals"] if dimensions else [])]
-        for line, each in enumerate(words):
-            plan.note(each, low - [0.0, (2.0 + 1.6 * line) * NOTE_M])
-        _show(drawing, low, high)
-        stream = StringIO()
-        drawing.write(stream)
-        return drawing.encode(stream.getvalue())
+    plan = _Plan()
+    for feature in features:
+        plan.feature(feature)
+    for dimension in dimensions:
+        plan.dimension(dimension)
+    low, high = plan.bounds
+    words = [title, *(["lengths in m, areas in m², with 95 % intervals"] if dimensions else [])]
+    for line, each in enumerate(words):
+        plan.note(each, low - [0.0, (2.0 + 1.6 * line) * NOTE_M])
+    return plan.drawing(low, high)
 
 
-@contextmanager
-def _same_bytes() -> Iterator[None]:
-    """Let ezdxf write constants where it writes the time, its version and random ids."""
-    with _fixed:
-        before = ezdxf.options.write_fixed_meta_data_for_testing
-        ezdxf.options.write_fixed_meta_data_for_testing = True
-        try:
-            yield
-        finally:
-            ezdxf.options.write_fixed_meta_data_for_testing = before
+@cache
+def _blank() -> str:
+    """Return a drawing without shapes, in the oldest format that states its unit (R2000): all that read DXF read it.
 
-
-def _show(drawing: Drawing, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
-    """State how far the drawing reaches, and let a program open it with all of it in sight."""
-    drawing.modelspace().reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
-    middle, size = (low + high) / 2, high - low
-    drawing.set_modelspace_vport(1.2 * max(float(size.max()), 1.0), (float(middle[0]), float(middle[1])))
+    It has the layers, line types and letters of ours. ezdxf wrote it; to import that takes longer than ten steps.
+    """
+    return (Path(__file__).parent / "blank.dxf").read_text(encoding="ascii")
 
 
 class _Plan:
-    """Puts shapes into a drawing, and keeps how far they reach."""
+    """Gathers shapes as lines of the file, a code and a value in turn, and keeps how far they reach."""
 
-    def __init__(self, space: Modelspace) -> None:
-        self._space = space
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._shapes = 0
         self._corners: list[Float[np.ndarray, "_ 2"]] = []
 
     @property
@@ -96,6 +62,25 @@ class _Plan:
         """The lower left and the upper right corner around all shapes, m; zeros where there are none."""
         points = np.concatenate(self._corners) if self._corners else np.zeros((1, 2))
         return points.min(axis=0), points.max(axis=0)
+
+    def drawing(self, low_world: Float[np.ndarray, "2"], high_world: Float[np.ndarray, "2"]) -> bytes:
+        """Return the file, which a program opens with all between two corners in sight."""
+        middle, size = 0.5 * (low_world + high_world), high_world - low_world
+        values = {
+            **dict(
+                zip(("LOW_X", "LOW_Y", "HIGH_X", "HIGH_Y"), (*low_world.tolist(), *high_world.tolist()), strict=True)
+            ),
+            **dict(zip(("MIDDLE_X", "MIDDLE_Y"), middle.tolist(), strict=True)),
+            "TALL": 1.2 * max(float(size.max()), 1.0),
+            "NEXT": f"{FIRST_HANDLE + self._shapes:X}",
+        }
+        text = _blank()
+        for name, value in values.items():
+            text = text.replace(f"@{name}@", str(value))
+        text = text.replace("@ENTITIES@\n", "".join(f"{line}\n" for line in self._lines))
+        # A letter that the code page lacks stands by its number.
+        escaped = (each if _is_western(each) else f"\\U+{ord(each):04x}" for each in text)
+        return "".join(escaped).encode("cp1252")
 
     def feature(self, feature: Mapping[str, Any]) -> None:
         """Draw a feature of `map.geojson`, of the kinds that a floor plan has."""
@@ -121,21 +106,22 @@ class _Plan:
 
     def note(self, words: str, corner_world: Float[np.ndarray, "2"]) -> None:
         """Write a line of words that begins at a place."""
-        self._text(words, corner_world, NOTE_M, 0.0, NOTES, TextEntityAlignment.LEFT)
+        self._text(words, corner_world, NOTE_M, 0.0, NOTES, is_centred=False)
 
     def _way(self, points_world: Any, layer: str, closed: bool = False) -> None:
         points = self._placed(points_world)
         if points is None:
             return
         if len(points) == 2 and not closed:
-            self._space.add_line(points[0].tolist(), points[1].tolist(), dxfattribs={"layer": layer})
+            self._shape("LINE", layer, "AcDbLine", *_at(points[0]), *_at(points[1], 1))
             return
-        self._space.add_lwpolyline(points.tolist(), close=closed, dxfattribs={"layer": layer})
+        corners = [pair for x, y in points.tolist() for pair in ((10, x), (20, y))]
+        self._shape("LWPOLYLINE", layer, "AcDbPolyline", (90, len(points)), (70, int(closed)), *corners)
 
     def _ring(self, centre_world: Any, radius_m: float, layer: str) -> None:
         centre = self._placed([centre_world])
         if centre is not None:
-            self._space.add_circle(centre[0].tolist(), radius_m, dxfattribs={"layer": layer})
+            self._shape("CIRCLE", layer, "AcDbCircle", *_at(centre[0]), (40, radius_m))
 
     def _placed(self, points_world: Any) -> Float[np.ndarray, "n 2"] | None:
         points = np.asarray(points_world, dtype=np.float64).reshape(-1, 2)
@@ -146,10 +132,33 @@ class _Plan:
 
     def _text(
         self, words: str, at_world: Float[np.ndarray, "2"], height_m: float, turn_deg: float, layer: str,
-        align: TextEntityAlignment = TextEntityAlignment.MIDDLE_CENTER,
+        is_centred: bool = True,
     ) -> None:  # fmt: skip
         # A line of the file is a value: a line break in a world's name would end it.
         line = "".join(each if each.isprintable() else " " for each in words)
-        attributes = {"layer": layer, "style": LETTERS}
-        text = self._space.add_text(line, height=height_m, rotation=turn_deg, dxfattribs=attributes)
-        text.set_placement(at_world.tolist(), align=align)
+        across, along = [(72, 1)] * is_centred, [(73, 2)] * is_centred
+        self._shape(
+            "TEXT", layer, "AcDbText", *_at(at_world), (40, height_m), (1, line), (50, turn_deg), (7, LETTERS),
+            *across, *_at(at_world, 1), (100, "AcDbText"), *along,
+        )  # fmt: skip
+
+    def _shape(self, kind: str, layer: str, marker: str, *values: tuple[int, object]) -> None:
+        handle = f"{FIRST_HANDLE + self._shapes:X}"
+        self._shapes += 1
+        begin = ((0, kind), (5, handle), (330, SPACE), (100, "AcDbEntity"), (8, layer), (100, marker))
+        for code, value in (*begin, *values):
+            self._lines += [f"{code:3}", str(value)]
+
+
+def _at(point_world: Float[np.ndarray, "2"], nth: int = 0) -> list[tuple[int, object]]:
+    """Return the codes and values of the nth point of a shape."""
+    x, y = point_world.tolist()
+    return [(10 + nth, x), (20 + nth, y), (30 + nth, 0.0)]
+
+
+def _is_western(letter: str) -> bool:
+    try:
+        letter.encode("cp1252")
+    except UnicodeEncodeError:
+        return False
+    return True
