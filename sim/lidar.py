@@ -7,8 +7,7 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals, through
 
-_ON_THE_VERTEX = 1e-9
-"""Share of a beam step by which a face reaches past its ends, so that no beam slips between two faces that touch."""
+from .kernels import nearest, seen_from
 
 
 @dataclass(frozen=True)
@@ -85,35 +84,20 @@ class RangeFinder:
         """Return exact ranges (k,) m, +inf beyond the maximum, and the index of the face of each beam, -1 for none."""
         x, y, heading = float(pose_world[0]), float(pose_world[1]), float(pose_world[2])
         ids, rows = self._near(x, y)
-        distance = rows[6] - rows[4] * x - rows[5] * y
-        seen = np.flatnonzero(distance > 0.0)
-        first, counts = self._beam_runs(rows[:4, seen] - np.array([[x], [y], [x], [y]]), heading)
-        # Along a beam 1/range = (n·d)/distance is linear in (cos, sin), and the nearest face is the largest.
-        normal = rows[4:6, seen] / distance[seen]
-        ends = np.cumsum(counts)
-        face = np.repeat(np.arange(len(counts)), counts)
-        beam = np.arange(len(face)) + np.repeat(first - ends + counts, counts)
-        face %= len(seen) if len(seen) else 1
+        seen, ends, inverse = seen_from(rows, x, y)
         world_bearings = self.bearings_rad + heading
-        inverse = normal[0, face] * np.cos(world_bearings)[beam] + normal[1, face] * np.sin(world_bearings)[beam]
-        best = np.full(self.config.beams, 1.0 / self.config.range_max_m)
-        np.maximum.at(best, beam, inverse)
-        hit = np.flatnonzero(inverse == best[beam])
-        face_of_beam = np.full(self.config.beams, -1)
-        face_of_beam[beam[hit]] = ids[seen[face[hit]]]
-        return np.where(face_of_beam >= 0, 1.0 / best, np.inf), face_of_beam
-
-    def _beam_runs(
-        self, ends_from_robot: Float[np.ndarray, "4 m"], heading: float
-    ) -> tuple[Int[np.ndarray, " m2"], Int[np.ndarray, " m2"]]:
-        """Return the first beam and the number of beams in the angle of each face, for this turn and the one before."""
-        bearing = np.arctan2(ends_from_robot[1::2], ends_from_robot[::2])
-        start = np.mod(bearing[0] - (heading + self.bearings_rad[0]), 2 * np.pi)
-        stop = start + np.mod(bearing[1] - bearing[0], 2 * np.pi)
-        turns = np.concatenate([start, start - 2 * np.pi]), np.concatenate([stop, stop - 2 * np.pi])
-        first = np.maximum(np.ceil(turns[0] / self._step - _ON_THE_VERTEX), 0.0)
-        last = np.minimum(np.floor(turns[1] / self._step + _ON_THE_VERTEX), self.config.beams - 1.0)
-        return first.astype(int), np.maximum(last - first + 1.0, 0.0).astype(int)
+        ranges, face = nearest(
+            np.arctan2(ends[1::2], ends[::2]),
+            inverse,
+            np.cos(world_bearings),
+            np.sin(world_bearings),
+            heading + float(self.bearings_rad[0]),
+            self._step,
+            float(self.config.range_max_m),
+        )
+        hit = face >= 0
+        face[hit] = ids[seen[face[hit]]]
+        return ranges, face
 
     def _near(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """Return ids and rows (7, m) of the faces within range of the grid cell that holds (x, y)."""

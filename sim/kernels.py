@@ -1,0 +1,65 @@
+"""Beams against faces in compiled loops: along a beam 1/range is linear in (cos, sin), the nearest face is the largest.
+
+A face is a column of `rows`: x and y of its start, of its end, the normal of its line and the line's distance.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.geometry.compiled import compiled
+
+_ON_THE_VERTEX = 1e-9
+"""Share of a beam step by which a face reaches past its ends, so that no beam slips between two faces that touch."""
+
+
+@compiled
+def seen_from(
+    rows: Float[np.ndarray, "7 m"], x: float, y: float
+) -> tuple[Int[np.ndarray, " s"], Float[np.ndarray, "4 s"], Float[np.ndarray, "2 s"]]:
+    """Return which faces are seen from their free side, their ends from there, and normals over distances, 1/m."""
+    seen, count = np.empty(rows.shape[1], np.int64), 0
+    ends, inverse = np.empty((4, rows.shape[1])), np.empty((2, rows.shape[1]))
+    for k in range(rows.shape[1]):
+        distance = rows[6, k] - rows[4, k] * x - rows[5, k] * y
+        if distance > 0.0:
+            seen[count] = k
+            ends[0, count], ends[1, count] = rows[0, k] - x, rows[1, k] - y
+            ends[2, count], ends[3, count] = rows[2, k] - x, rows[3, k] - y
+            inverse[0, count], inverse[1, count] = rows[4, k] / distance, rows[5, k] / distance
+            count += 1
+    return seen[:count], ends[:, :count], inverse[:, :count]
+
+
+@compiled
+def nearest(
+    bearing: Float[np.ndarray, "2 s"],
+    inverse: Float[np.ndarray, "2 s"],
+    cos: Float[np.ndarray, " k"],
+    sin: Float[np.ndarray, " k"],
+    first_rad: float,
+    step_rad: float,
+    range_max_m: float,
+) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return the range of each beam, +inf beyond the maximum, and the face that it meets, -1 for none.
+
+    `bearing` are those of the ends of faces, `cos` and `sin` of the beams, of which the first has the bearing
+    `first_rad`. A face may lie across the seam: its beams are sought in this turn and in the one before.
+    """
+    beams = len(cos)
+    best, face = np.full(beams, 1.0 / range_max_m), np.full(beams, -1)
+    for turn in range(2):
+        for k in range(bearing.shape[1]):
+            start = (bearing[0, k] - first_rad) % (2.0 * np.pi)
+            stop = start + (bearing[1, k] - bearing[0, k]) % (2.0 * np.pi) - 2.0 * np.pi * turn
+            start -= 2.0 * np.pi * turn
+            first = max(np.ceil(start / step_rad - _ON_THE_VERTEX), 0.0)
+            last = min(np.floor(stop / step_rad + _ON_THE_VERTEX), beams - 1.0)
+            for beam in range(int(first), int(last) + 1):
+                value = inverse[0, k] * cos[beam] + inverse[1, k] * sin[beam]
+                if value >= best[beam]:
+                    best[beam], face[beam] = value, k
+    ranges = np.full(beams, np.inf)
+    for beam in range(beams):
+        if face[beam] >= 0:
+            ranges[beam] = 1.0 / best[beam]
+    return ranges, face
