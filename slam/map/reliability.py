@@ -19,6 +19,9 @@ from .kernels import reliability_kernels
 from .kernels.reliability_kernels import add_directions, add_fits, in_conflict
 from .records import Merger, Records
 
+NOISE_SIGMAS = 3.0
+"""What is within so many standard errors of the noise is no misfit of a wall's own."""
+
 
 @dataclass(frozen=True)
 class ReliabilityConfig:
@@ -71,8 +74,8 @@ class Reliability:
             first=np.nan,
             directions=np.zeros((2, 2)),
             crooked=False,
-            # Squared residuals beyond those of the noise, m^2, and of how many beams.
-            residue=np.zeros(2),
+            # Squared residuals beyond those of the noise, m^2, their variance by noise alone, and of how many beams.
+            residue=np.zeros(3),
         )
 
     def see(self, segments: Segments, owners: Int[np.ndarray, " s"], pose_world: Float[np.ndarray, "3"]) -> None:
@@ -125,14 +128,14 @@ class Reliability:
         return crooked
 
     def misfits(self, ids: Int[np.ndarray, " n"]) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Return how far the faces of crooked walls are off their line: variances in m^2 across it and in rad^2.
+        """Return how far the faces of walls are off their line: variances in m^2 across it and in rad^2.
 
         Of two faces that meet in a corner each is off the line through both by twice what their residuals show; where
-        what is vague and what is clear disagree, the clear ones have moved the line to where the others are not.
+        what is vague and what is clear disagree, the clear ones have moved the line to where the others are not. What
+        noise alone may show counts nothing: a straight wall lies on its line however often it was seen.
         """
         rows, columns = self._records.rows(ids), self._records.columns
-        told = columns["crooked"][rows], columns["residue"][rows], columns["directions"][rows]
-        return reliability_kernels.misfits(*told, self._level)
+        return reliability_kernels.misfits(columns["residue"][rows], columns["directions"][rows], NOISE_SIGMAS)
 
     @property
     def _level(self) -> float:

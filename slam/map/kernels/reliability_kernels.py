@@ -17,7 +17,7 @@ def add_fits(
     chi2: Float[np.ndarray, " m"],
     beam_counts: Int[np.ndarray, " m"],
     fits: Float[np.ndarray, "n 2"],
-    residue: Float[np.ndarray, "n 2"],
+    residue: Float[np.ndarray, "n 3"],
 ) -> None:
     """Add the squared residuals of the fits of one scan, each to the row of its wall."""
     for k in range(len(rows)):
@@ -26,8 +26,10 @@ def add_fits(
         fits[row, 1] += dof
         # Across the line a beam has the variance of the whole fit, times as many beams.
         across = cov[k, 1, 1] - cov[k, 0, 1] ** 2 / cov[k, 0, 0]
-        residue[row, 0] += (chi2[k] - dof) * across * beams
-        residue[row, 1] += beams
+        of_a_beam = across * beams
+        residue[row, 0] += (chi2[k] - dof) * of_a_beam
+        residue[row, 1] += 2.0 * dof * of_a_beam * of_a_beam
+        residue[row, 2] += beams
 
 
 @compiled
@@ -74,23 +76,21 @@ def in_conflict(directions: Float[np.ndarray, "n 2 2"], level: float) -> Bool[np
 
 @compiled
 def misfits(
-    crooked: Bool[np.ndarray, " n"],
-    residue: Float[np.ndarray, "n 2"],
-    directions: Float[np.ndarray, "n 2 2"],
-    level: float,
+    residue: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 2 2"], noise_sigmas: float
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return how far faces of crooked walls are off their line: variances in m^2 across it and in rad^2.
+    """Return how far faces of walls are off their line: variances in m^2 across it and in rad^2.
 
     Of two faces that meet in a corner each is off the line through both by twice what their residuals show; where
-    what is vague and what is clear disagree, the clear ones have moved the line to where the others are not.
+    what is vague and what is clear disagree, the clear ones have moved the line to where the others are not. What is
+    within so many standard errors of the noise counts nothing.
     """
-    across, turned = np.zeros(len(crooked)), np.zeros(len(crooked))
-    conflict = in_conflict(directions, level)
-    for k in range(len(crooked)):
-        if crooked[k]:
-            across[k] = 4.0 * max(residue[k, 0], 0.0) / max(residue[k, 1], 1.0)
-            if conflict[k]:
-                turned[k] = apart(directions[k])[0] ** 2
+    across, turned = np.zeros(len(residue)), np.zeros(len(residue))
+    for k in range(len(residue)):
+        if residue[k, 0] > noise_sigmas * math.sqrt(residue[k, 1]):
+            across[k] = 4.0 * residue[k, 0] / residue[k, 2]
+        difference, variance = apart(directions[k])
+        if difference * difference > noise_sigmas**2 * variance:
+            turned[k] = difference * difference
     return across, turned
 
 

@@ -229,6 +229,18 @@ def test_of_two_faces_that_meet_each_is_off_the_line_through_both_by_what_is_tol
     assert np.sqrt(told[0, 0]) == pytest.approx(np.tan(0.5 * bend_rad), rel=0.1)
 
 
+@pytest.mark.parametrize(("misfit", "is_told"), [(1.0, False), (1.2, False), (1.3, True), (1.4, True)])
+def test_a_line_over_a_step_is_told_with_its_misfit_long_before_it_is_surely_crooked(misfit, is_told):
+    """In an office a line of 1.1 m over two faces, of chi-square 1.3 a degree of freedom, was 20 sigmas off."""
+    reliability = Reliability()
+    for _ in range(38):
+        reliability.see(observation(0.0, 0.01, beams=10, chi2=8.0 * misfit, length_m=1.1), OWNER, POSE)
+    assert reliability.are_crooked(OWNER).tolist() == [misfit > 1.35]
+    across, turned = reliability.misfits(OWNER)
+    assert (across[0] > 0.0) == is_told
+    assert turned[0] == 0.0
+
+
 def test_a_straight_wall_is_on_its_line_however_often_it_was_seen():
     rng, reliability = np.random.default_rng(2), Reliability()
     for _ in range(100):

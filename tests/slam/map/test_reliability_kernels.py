@@ -31,7 +31,7 @@ def scene(seed):
         crooked=rng.random(5) < 0.5,
         first=np.where(known[:, 0], rng.uniform(-3.0, 3.0, 5), np.nan),
         sums=rng.uniform(0.0, 5.0, (5, 2, 2)) * (rng.random((5, 2, 1)) < 0.7),
-        residue=rng.normal(0.0, 1.0, (5, 2)),
+        residue=np.column_stack([rng.normal(0.0, 2.0, 5), rng.uniform(0.0, 1.0, 5), rng.integers(1, 50, 5)]),
     )
 
 
@@ -39,7 +39,7 @@ def scene(seed):
 @given(seed=seeds)
 def test_each_observation_adds_to_the_sums_of_its_wall(seed):
     one = scene(seed)
-    fits, residue, first, sums = np.zeros((5, 2)), np.zeros((5, 2)), one.first.copy(), np.zeros((5, 2, 2))
+    fits, residue, first, sums = np.zeros((5, 2)), np.zeros((5, 3)), one.first.copy(), np.zeros((5, 2, 2))
     add_fits(one.rows, one.cov, one.chi2, one.beams, fits, residue)
     add_directions(one.rows, one.alpha, one.cov, one.flags[0], first, sums)
     for row in range(5):
@@ -48,8 +48,9 @@ def test_each_observation_adds_to_the_sums_of_its_wall(seed):
         np.testing.assert_allclose(fits[row], [one.chi2[ours].sum(), dof.sum()])
         # What is left of the variance of r where the direction is known, for each beam.
         across = np.array([1.0 / np.linalg.inv(C)[1, 1] for C in one.cov[ours]])
-        excess = np.sum((one.chi2[ours] - dof) * across * one.beams[ours])
-        np.testing.assert_allclose(residue[row], [excess, one.beams[ours].sum()], atol=1e-9)
+        of_a_beam = across * one.beams[ours]
+        excess, by_noise = np.sum((one.chi2[ours] - dof) * of_a_beam), np.sum(2 * dof * of_a_beam**2)
+        np.testing.assert_allclose(residue[row], [excess, by_noise, one.beams[ours].sum()], atol=1e-9)
         if not len(ours):
             assert first[row] == one.first[row] or np.isnan(one.first[row])
             continue
@@ -66,16 +67,15 @@ def test_each_observation_adds_to_the_sums_of_its_wall(seed):
 @given(seed=seeds)
 def test_a_wall_is_off_its_line_by_its_residuals_and_by_what_its_directions_differ(seed):
     one = scene(seed)
-    across, turned = misfits(one.crooked, one.residue, one.sums, 2.0)
+    across, turned = misfits(one.residue, one.sums, 1.4)
     extents = np.sort(np.random.default_rng(seed).uniform(-2.0, 2.0, (5, 2)), axis=1)
     off = off_line_cov(extents, across, turned, 0.01, 0.2)
     for row in range(5):
         (vague, vague_sum), (clear, clear_sum) = one.sums[row]
-        expected = (0.0, 0.0)
-        if one.crooked[row]:
-            difference = clear_sum / clear - vague_sum / vague if vague > 0.0 and clear > 0.0 else 0.0
-            surely = difference != 0.0 and difference**2 / (1.0 / vague + 1.0 / clear) > 2.0
-            expected = 4.0 * max(one.residue[row, 0], 0.0) / max(one.residue[row, 1], 1.0), surely * difference**2
+        difference = clear_sum / clear - vague_sum / vague if vague > 0.0 and clear > 0.0 else 0.0
+        surely = difference != 0.0 and abs(difference) / np.sqrt(1.0 / vague + 1.0 / clear) > 1.4
+        excess, by_noise, beams = one.residue[row]
+        expected = 4.0 * excess / beams * (excess / np.sqrt(by_noise) > 1.4), surely * difference**2
         np.testing.assert_allclose((across[row], turned[row]), expected, atol=1e-12)
         length = np.ptp(extents[row])
         variance = expected[0] + (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
