@@ -12,7 +12,7 @@ from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
 from .association.recovery import Localisation, unstated_motion
-from .association.view import View
+from .association.view import View, near_segments
 from .config import MapperConfig
 from .estimation.backend import Backend, Belief, Observations
 from .estimation.mounting import belief_of_body, odometry_of_body, odometry_of_scanner
@@ -90,7 +90,7 @@ class Mapper:
         self.config = config
         self._extract = extractor
         method = METHODS[config.matching.method]
-        self._method = method if matcher is None else replace(method, matcher=matcher)
+        self._method = method if matcher is None else replace(method, matcher=matcher, looks_near=False)
         self._keeper = MapKeeper(backend, config)
         noise = None if config.recovery is None else config.recovery.noise
         self._noise = None if noise is None else MotionNoise(noise)
@@ -163,7 +163,13 @@ class Mapper:
         if self.config.recovery is None:
             return None
         motion, self._is_lost = unstated_motion(
-            scan, found.view, found.matches, walls, self._is_lost, self.config.recovery
+            scan,
+            found.view,
+            found.matches,
+            walls,
+            self._is_lost,
+            self.config.recovery,
+            lambda: self._view(scan, found.view.segments, walls, anywhere=True),
         )
         return motion
 
@@ -197,12 +203,17 @@ class Mapper:
             self._noise.see(found.innovation)
         return factor
 
-    def _view(self, scan: Scan, segments: Segments, walls: StochasticMap) -> View:
-        """Return the scan beside the walls that it can show."""
-        lost_m = 3.0 * float(np.sqrt(np.trace(walls.belief.pose_cov[:2, :2])))
-        near = walls.distances_m < scan.range_max_m + max(self.config.matching.offset_m, lost_m)
+    def _view(self, scan: Scan, segments: Segments, walls: StochasticMap, anywhere: bool = False) -> View:
+        """Return the scan beside the walls that its segments may be of, or `anywhere` in the scanner's range."""
+        belief, config = walls.belief, self.config.matching
+        lost_m = 3.0 * float(np.sqrt(np.trace(belief.pose_cov[:2, :2])))
+        near = walls.distances_m < scan.range_max_m + max(config.offset_m, lost_m)
+        if self._method.looks_near and not anywhere:
+            in_range = np.flatnonzero(near)
+            ends = walls.ends_world[in_range]
+            near = in_range[near_segments(segments, ends, belief.pose_world, belief.pose_cov, config)]
         known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
-        return View(segments, known, self.backend.belief.joint(known.ids), self._method, self.config.matching)
+        return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 
     def _reliable(self, matches: Matches, segments: Segments) -> Observations:
         """Return the matches that may move the estimate."""

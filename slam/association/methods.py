@@ -34,6 +34,8 @@ class Method:
     """What is known once the robot is localised, to match again."""
     clear_stay: bool
     """Whether the first matches stand, and only the other segments are matched again."""
+    looks_near: bool = True
+    """Whether a segment is never of a wall that lies far from it; an oracle may know better."""
 
 
 METHODS: dict[MatchingMethod, Method] = {

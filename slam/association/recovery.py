@@ -7,6 +7,7 @@ the robot stands where it believes, a wall that nobody has seen fits no known on
 such motion explains the scan and beams go through known walls, the robot is lost; the whole map is searched then.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -75,16 +76,23 @@ def _leaves_much(segments: Segments, matches: Matches, config: RecoveryConfig) -
 
 
 def unstated_motion(
-    scan: Scan, view: View, matches: Matches, walls: StochasticMap, was_lost: bool, config: RecoveryConfig
+    scan: Scan,
+    view: View,
+    matches: Matches,
+    walls: StochasticMap,
+    was_lost: bool,
+    config: RecoveryConfig,
+    anywhere: Callable[[], View],
 ) -> tuple[Odometry | None, bool]:
     """Return the motion that explains far more of a scan than `matches` do, as odometry to add, or None; and whether
     the robot is lost, since such a motion must be and none explains the scan.
 
-    Its covariance is as wide as it was sought: where the robot is, the scan tells once it is taken in.
+    Its covariance is as wide as it was sought: where the robot is, the scan tells once it is taken in. `anywhere` shows
+    the scan beside all walls in range, for a robot that may be elsewhere.
     """
     if not _leaves_much(view.segments, matches, config):
         return None, False
-    near = _nearby(view, matches, config)
+    near = _nearby(anywhere(), matches, config)
     is_lost = was_lost and not _explains(view.segments, matches, config)
     if near is None and not is_lost and not is_contradicted(scan, walls, config):
         return None, False

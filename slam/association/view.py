@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
+from ..geometry.lines import segment_distances
+from ..geometry.poses import to_world
 from ..robot import Odometry
 from .joint_compatibility import Nis
 from .matching import KnownWalls, Matches, MatchingConfig
@@ -55,3 +58,26 @@ class View:
             rest[again.doubtful],
             {int(rest[k]): why for k, why in again.refusals.items()},
         )
+
+
+SIGMAS = 6.0
+"""A wall is looked for as far as the pose may be off by so many sigma: beyond the level of doubt."""
+
+
+def near_segments(
+    segments: Segments,
+    ends_world: Float[np.ndarray, "n 2 2"],
+    pose_world: Float[np.ndarray, "3"],
+    pose_cov: Float[np.ndarray, "3 3"],
+    config: MatchingConfig,
+) -> Bool[np.ndarray, " n"]:
+    """Return which walls, by their ends, lie so near a segment that it may be of them.
+
+    Of the others no more is asked: a joint covariance with hundreds of walls takes longer than all matching with it.
+    """
+    if not len(segments) or not len(ends_world):
+        return np.zeros(len(ends_world), dtype=bool)
+    away_m = np.hypot(segments.ends[..., 0], segments.ends[..., 1]).max(axis=1)
+    lost_m = SIGMAS * (np.sqrt(np.trace(pose_cov[:2, :2])) + away_m * np.sqrt(pose_cov[2, 2]))
+    apart = segment_distances(to_world(segments.ends, pose_world), ends_world)
+    return np.asarray(np.any(apart < max(config.offset_m, config.apart_m) + lost_m[:, None], axis=0))
