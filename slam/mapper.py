@@ -162,7 +162,7 @@ class Mapper:
         """Return the motion that the odometry did not report and this scan shows; notes whether the robot is lost."""
         if self.config.recovery is None:
             return None
-        motion, self._is_lost = unstated_motion(
+        motion, is_lost = unstated_motion(
             scan,
             found.view,
             found.matches,
@@ -171,6 +171,8 @@ class Mapper:
             self.config.recovery,
             lambda: self._view(scan, found.view.segments, walls, anywhere=True),
         )
+        # Where scans told the motion it is walls that are wrong, and only a map that goes on can mend them.
+        self._is_lost = is_lost and not self._odometry.by_scans
         return motion
 
     def _nothing_taken_in(self, segments: Segments, walls: StochasticMap) -> MapUpdate:

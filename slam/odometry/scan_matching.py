@@ -73,7 +73,7 @@ class ScanMatcher:
         if score < c.slip_score:
             found, better = self._best(field, points, Window(guess, half_m, c.slip_rad, c.step_rad, c.penalty))
             if better >= c.slip_score:
-                pose = found
+                pose, score = found, better
                 wheels_cov = wheels_cov + np.diag([half_m**2, half_m**2, c.slip_rad**2])
                 self.slips += 1
         R = np.eye(3)
@@ -86,7 +86,8 @@ class ScanMatcher:
         )
         cov = np.linalg.inv(prior + c.independent * R.T @ information @ R)
         floor = np.diag([c.floor_m**2, c.floor_m**2, c.floor_rad**2])
-        return Odometry(compose(inverse(self._pose), pose), 0.5 * (cov + cov.T) + floor, wheels.touched)
+        motion = compose(inverse(self._pose), pose)
+        return Odometry(motion, 0.5 * (cov + cov.T) + floor, wheels.touched, by_scans=score >= c.slip_score)
 
     def _field(
         self,

@@ -176,6 +176,8 @@ class Odometry:
     """Covariance of the motion's error, in the same frame."""
     touched: bool = False
     """A bumper says that the body met something on the way; a robot without one never says so."""
+    by_scans: bool = False
+    """The scan after the motion fits those before it where this puts it: nobody has moved the robot on the way."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for numbers that are none."""

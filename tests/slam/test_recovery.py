@@ -36,8 +36,8 @@ class Drive:
         ranges = noisy(self.finder.cast(self.pose)[0], np.full(360, 0.01), noise, CONFIG.range_max_m)
         return self.mapper.step(Scan(self.finder.bearings_rad, ranges, 0.01, CONFIG.range_max_m, 0.0))
 
-    def move(self, motion, unreported=(0.0, 0.0, 0.0), cov=ODOMETRY_COV):
-        self.mapper.predict(Odometry(motion, cov))
+    def move(self, motion, unreported=(0.0, 0.0, 0.0), cov=ODOMETRY_COV, by_scans=False):
+        self.mapper.predict(Odometry(motion, cov, by_scans=by_scans))
         self.pose = compose(compose(self.pose, motion), np.asarray(unreported))
         self.updates.append(self.see())
         return self.updates[-1]
@@ -101,6 +101,17 @@ def test_a_robot_carried_to_another_building_is_lost_and_keeps_its_map():
     back = drive.move(np.zeros(3), _relative(drive.pose, home))
     assert not back.localisation.is_lost
     assert drive.off[0] < 0.1
+
+
+def test_where_scans_told_the_motion_the_walls_are_doubted_and_not_the_robot():
+    """Walls that were once drawn at a wrong pose contradict each scan from then on; a map that stops keeps them."""
+    drive = Drive()
+    before = len(drive.updates[-1].map)
+    motion = _relative(drive.pose, np.array([41.5, 1.5, 0.3]))
+    update = drive.move(np.zeros(3), motion, by_scans=True)
+    assert not update.localisation.is_lost
+    assert len(update.map) > before
+    assert not drive.move(STEP, by_scans=True).localisation.is_lost
 
 
 def test_wheels_that_slip_more_than_they_state_are_found_out():

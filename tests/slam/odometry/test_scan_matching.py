@@ -90,9 +90,11 @@ def test_a_slip_is_found_out_and_made_good(slip_deg):
     matcher, told, true = matched(poses, ROOM, wheels)
     assert matcher.slips == 1
     assert np.abs(errors_of(told, true)).max() < 0.02
+    assert all(each.by_scans for each in told)
     narrow = ScanMatchingConfig(slip_rad=np.deg2rad(6.0))
     _, told, true = matched(poses, ROOM, wheels, config=narrow)
     assert np.abs(errors_of(told, true)[6, 2]) > 0.2
+    assert not told[6].by_scans
 
 
 def test_without_returns_the_wheels_are_believed():
