@@ -9,6 +9,7 @@ from .association.matching import Matches
 from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
+from .extraction.straightness import cov_of_bows
 from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
@@ -74,7 +75,9 @@ class MapKeeper:
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = seen_centres(segments, fresh)
-            owners[fresh] = self.backend.grow(segments.lines[fresh], segments.cov[fresh], centres)
+            begun = segments.take(fresh)
+            cov = begun.cov + cov_of_bows(begun, self.config.walls.reliability.straightness)
+            owners[fresh] = self.backend.grow(begun.lines, cov, centres)
         known = np.unique(owners[sides][owners[sides] >= 0])
         if len(known) == 2:
             self.landmarks.change_points.keep_apart(*known.tolist())

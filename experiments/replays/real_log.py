@@ -25,6 +25,10 @@ from .looked_again import looked_again
 from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
 from .unwitnessed import run_unwitnessed, unwitnessed
 
+_BOW = {"bow_rad": float(np.deg2rad(0.5)), "bow_m": 0.02}
+REAL_WALLS = {"mission": {"mapper": {"walls": {"reliability": {"straightness": _BOW}}}}}
+"""Doors, panels and cupboards of a real building: no wall is nearer to its line than this, in any log."""
+
 
 @dataclass(frozen=True)
 class RealOptions:
@@ -69,7 +73,8 @@ def read_real_run(
     plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
-    return RealRun(path.name, log, trial_of(record_of(plain), robot, at_axle, asked(config, sets, settled)), options)
+    trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, sets, settled))
+    return RealRun(path.name, log, trial, options)
 
 
 def replayed_real(run: RealRun, backend: str) -> TrialConfig:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from ..geometry.lines import directions
 from .segments import Segments
 from .straightness_kernels import faces_cov
 
@@ -23,8 +24,27 @@ class StraightnessConfig:
     """The shortest; 0 where every segment is known to be of one face."""
     face_m: float = 0.2
     """A face of this length is half as far off, a longer one falls with the fourth power: two thicknesses of a wall."""
+    bow_rad: float = 0.0
+    """How far the direction of a wall of any length is off, where one scan sees another part of it than the next ..."""
+    bow_m: float = 0.0
+    """... and how far it is off across; 0 where walls are drawn with a ruler."""
 
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    return faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.face_m))
+    edges = faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.face_m))
+    return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
+
+
+def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
+    """Return what they lack since no wall is straight: any direction and distance is that of the part in sight."""
+    middles = _middles_m(segments)
+    cov = np.empty((len(middles), 2, 2))
+    cov[:, 0, 0], cov[:, 1, 1] = config.bow_rad**2, config.bow_m**2 + (config.bow_rad * middles) ** 2
+    cov[:, 0, 1] = cov[:, 1, 0] = config.bow_rad**2 * middles
+    return cov
+
+
+def _middles_m(segments: Segments) -> Float[np.ndarray, " s"]:
+    """Return how far along its line the middle of each segment lies from the foot of the robot."""
+    return np.asarray(np.vecdot(segments.ends.mean(axis=1), directions(segments.lines[:, 0])))

@@ -7,15 +7,18 @@ import pytest
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.config import MapperConfig
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
-from slam.extraction.straightness import cov_of_faces
+from slam.extraction.straightness import StraightnessConfig, cov_of_bows, cov_of_faces
 from slam.extraction.straightness_kernels import edge_cov, edge_variance
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import wrap
 from slam.map.reliability import ReliabilityConfig, are_clear, as_told
 from slam.map.stochastic_map import StochasticMap
-from slam.robot import Scan
+from slam.mapper import Mapper
+from slam.robot import Odometry, Scan
 
 
 @pytest.mark.parametrize(("length", "middle"), [(0.1, 0.0), (0.4, 1.3), (0.2, -2.0)])
@@ -96,6 +99,38 @@ def test_a_short_face_is_not_clear_and_moves_the_estimate_by_no_more_than_it_is_
     assert not are_clear(short, config).any()
     np.testing.assert_allclose(as_told(short.cov, short, config), short.cov + cov_of_faces(short))
     np.testing.assert_allclose(as_told(long.cov, long, config), long.cov, rtol=0.2)
+
+
+def test_a_wall_that_bows_lies_and_points_otherwise_where_another_part_of_it_is_in_sight():
+    """Draws of a wall turned about the middle of the part in sight, and shifted, as the scan's (alpha, r)."""
+    scan = Scan(np.linspace(0.2, 0.8, 30), 2.0 / np.cos(np.linspace(0.2, 0.8, 30)), 0.002, 6.0, 0.0)
+    segments, bow = extract(scan), StraightnessConfig(bow_rad=0.01, bow_m=0.02)
+    (alpha, _), middle = segments.lines[0], segments.ends[0].mean(axis=0)
+    rng = np.random.default_rng(1)
+    turned = alpha + bow.bow_rad * rng.standard_normal(50_000)
+    r = normals(turned) @ middle + bow.bow_m * rng.standard_normal(50_000)
+    drawn = np.cov(turned, r)
+    sigma = np.sqrt(np.diag(drawn))
+    (found,) = cov_of_bows(segments, bow)
+    np.testing.assert_allclose(found / np.outer(sigma, sigma), drawn / np.outer(sigma, sigma), atol=0.02)
+    np.testing.assert_allclose(cov_of_faces(segments, bow), cov_of_faces(segments) + cov_of_bows(segments, bow))
+    assert not cov_of_bows(segments).any()
+
+
+@pytest.mark.parametrize("looks", [1, 3])
+def test_a_map_of_walls_that_bow_knows_none_better_than_its_looks_allow(looks):
+    bow = StraightnessConfig(bow_rad=0.02, bow_m=0.05)
+    config = MapperConfig()
+    config = replace(config, walls=replace(config.walls, reliability=ReliabilityConfig(straightness=bow)))
+    mapper = Mapper(BACKENDS["full-ekf"].make(np.zeros(3), 1e-12 * np.eye(3)), config)
+    bearings = np.linspace(-0.5, 0.5, 60)
+    for look in range(looks):
+        if look:
+            mapper.predict(Odometry(np.zeros(3), 1e-14 * np.eye(3)))
+        mapper.step(Scan(bearings, 2.0 / np.cos(bearings), 0.002, 6.0, 0.0))
+    belief = mapper.belief
+    sigma = np.sqrt(np.diag(belief.joint(belief.ids).cov)[3:])
+    np.testing.assert_allclose(sigma, np.array([0.02, 0.05]) / np.sqrt(looks), rtol=0.05)
 
 
 def test_a_map_tells_how_far_walls_are_off_in_whatever_order_it_is_asked():
