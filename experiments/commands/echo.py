@@ -32,7 +32,9 @@ def world_lines(world: World) -> tuple[str, ...]:
     x0, y0, x1, y1 = world.free.bounds
     size = f"{x1 - x0:.1f} x {y1 - y0:.1f} m, {world.free.area:.1f} m2 of floor, {len(world.faces)} walls"
     x, y, heading = world.start
-    start = f"({x:.2f}, {y:.2f}) m, {np.rad2deg(heading):.0f} degrees"
+    # Adding zero makes -0 a plain 0.
+    x, y, degrees = (round(value, digits) + 0.0 for value, digits in ((x, 2), (y, 2), (np.rad2deg(heading), 0)))
+    start = f"({x:.2f}, {y:.2f}) m, {degrees:.0f} degrees"
     if world.reading is None:
         return (f"world {world.name}: {size}; start {start}",)
     understood = f"; understood {world.reading.understood}" if world.reading.understood else ""

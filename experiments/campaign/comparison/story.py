@@ -11,7 +11,7 @@ from ..scores.score import END
 from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY
 from .words import ANSWERS, ARMS_SHORT, mean, within
 
-TOLD = (("wall_rmse_m", "walls"), ("pose_anees", "pose ANEES"))
+TOLD = (("wall_rmse_m", "error of the walls"), ("pose_anees", "pose ANEES"))
 """Ratios that a verdict names: how wrong, and how honest."""
 
 

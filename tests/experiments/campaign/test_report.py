@@ -208,7 +208,7 @@ def test_the_story_is_that_of_the_campaign():
     assert story.title == "Estimators compared: graph and full-ekf"
     assert "cross-correlations" not in story.title + story.question
     assert len(story.verdict) == 1
-    assert "walls 0.8 times (0.72 to 0.88)" in story.verdict[0]
+    assert "error of the walls 0.8 times (0.72 to 0.88)" in story.verdict[0]
     assert "pose ANEES 2 times (1.8 to 2.2)" in story.verdict[0]
 
     strategies = replace(plain, backends=("graph",), strategies=("frontier", "nearest-robot"), trials=3)

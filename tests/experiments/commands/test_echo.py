@@ -32,6 +32,12 @@ def test_a_plan_is_told_with_its_size_and_who_said_what(tmp_path):
     assert "start (2.00, 2.00) m, 0 degrees, given" in lines_of(path, start=(2.0, 2.0))[1]
 
 
+def test_a_heading_just_below_zero_is_no_minus_zero(tmp_path):
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps({"walls": BOX, "start": [4, 3, -0.001]}))
+    assert lines_of(path)[1].startswith("start (4.00, 3.00) m, 0 degrees,")
+
+
 def test_what_was_assumed_is_told_with_how_to_say_it(tmp_path):
     path = tmp_path / "plan.png"
     grey = np.full((100, 100), 255, dtype=np.uint8)
