@@ -10,13 +10,14 @@ import tyro
 
 from explore.step import Step
 from sim.logs.recorded_log import is_own_log
+from sim.logs.recorded_robot import knows_truth
 from slam.backends import BACKENDS
 
 from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..replays.measured import held_against
-from ..replays.real_log import RealOptions, read_real_run
+from ..replays.real_log import RealOptions, read_own_run, read_real_run
 from ..replays.replay import Association, OdometrySource, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
 from ..scenario import load_world
@@ -38,8 +39,8 @@ class Replay:
     """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """The log.npz that a run left, with its config.json beside it; or a CARMEN or dp-slam log, also packed by gzip;
-    or a ROS bag (a file, or the folder of a ROS 2 bag)."""
+    """The log.npz that a run left, also that of a robot of one's own, with its config.json beside it; or a CARMEN or
+    dp-slam log, also packed by gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
     backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
     """The estimators (see `chainslam backends`)."""
     association: Association = "own"
@@ -117,9 +118,10 @@ class Replay:
     def source(self) -> OwnLog | RealLog:
         """Return the log, read; raises UsageError where it is none."""
         robot = stated(robot_of(self.robot))
-        if is_own_log(self.log):
-            if self.every != 1:
-                raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
+        is_own = is_own_log(self.log)
+        if is_own and self.every != 1:
+            raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
+        if is_own and knows_truth(self.log):
             run = retuned(read_run(self.log), self.config, self.set, robot)
             options = ReplayOptions(
                 self.association, self.perfect_extraction, self.perfect_odometry, self.odometry or "wheels"
@@ -130,15 +132,9 @@ class Replay:
                 "expected a log that knows the truth for --association true, --perfect-extraction and"
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
-        real = RealLog(
-            read_real_run(
-                self.log,
-                RealOptions(self.every, self.odometry or "scans", self.second_looks),
-                self.config,
-                self.set,
-                robot,
-            )
-        )
+        read = read_own_run if is_own else read_real_run
+        told = RealOptions(self.every, self.odometry or ("wheels" if is_own else "scans"), self.second_looks)
+        real = RealLog(read(self.log, told, self.config, self.set, robot))
         if real.run.log.trouble:
             say(
                 f"chainslam: {self.log.name}, {real.run.log.trouble}: {len(real.run.log.scan_time_s)} scans before it"

@@ -9,6 +9,7 @@ from slam.association.second_looks.second_looks import Survey, second_looks
 from slam.evaluation.doubles import doubles
 from slam.extraction.extract import extract
 from slam.extraction.visible_extent import sure_pieces
+from slam.geometry.poses import to_world
 from slam.map.chains import connect
 from slam.odometry.scan_matching import returns_within
 
@@ -29,8 +30,9 @@ def looked_again(result: TrialResult) -> TrialResult:
     mission = result.scenario.config.mission
     scans = [recorded.recording.scan(k) for k in range(len(log))]
     rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
-    segments = [sure_pieces(extract(scan, rules), scan, rules) for scan in scans]
-    returns = [returns_within(scan, reach_m) for scan in scans]
+    on_body = result.scenario.config.robot.scanner
+    segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
+    returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
     survey = second_looks(log.estimated_world[0], log.odometry[1:], segments, returns, mission.second_looks)
     return _mapped(result, log, last, survey)
 

@@ -13,9 +13,10 @@ from explore.mission import ride_mission
 from explore.step import Step
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
-from sim.logs.recorded_robot import RecordedRobot, RecordingError
+from sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, recording_of
 from slam.mapper import Mapper
 
+from ..artifacts.saved import read_trial
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
 from ..scoring.summary import odometry_poses
@@ -23,7 +24,7 @@ from ..trial import TrialResult
 from ..usage import UsageError
 from .looked_again import looked_again
 from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
-from .unwitnessed import run_unwitnessed, unwitnessed
+from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
 _BOW = {"bow_rad": float(np.deg2rad(0.5)), "bow_m": 0.02}
 REAL_WALLS = {"mission": {"mapper": {"walls": {"reliability": {"straightness": _BOW}}}}}
@@ -75,6 +76,24 @@ def read_real_run(
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
     trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, sets, settled))
     return RealRun(path.name, log, trial, options)
+
+
+def read_own_run(
+    path: Path, options: RealOptions, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any]
+) -> RealRun:
+    """Read the `log.npz` of a robot of one's own and the `config.json` beside it; raises UsageError.
+
+    Settings, odometry and noise are those of its drive. `robot` holds settings of what the robot states.
+    """
+    try:
+        recording = recording_of(read_log(path))
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    trial = replace(read_trial(path.with_name("config.json")), strategy=STRATEGY_OF_REPLAYS)
+    settled = record_of(trial).keys() - set(OPEN_TO_REPLAYS)
+    return RealRun(
+        trial.world, every_scan(recording), trial_of(record_of(trial), robot, asked(config, sets, settled)), options
+    )
 
 
 def replayed_real(run: RealRun, backend: str) -> TrialConfig:

@@ -89,10 +89,16 @@ def run_unwitnessed(
 
 
 def _own_log(log: Log) -> RecordedLog:
-    """Return what a robot reported on its own drive, every scan of it a keyframe."""
-    recording = Recording(
-        log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
-        log.touched, log.sigma_share, log.scan_start_s,
+    """Return what a robot reported on its own drive."""
+    return every_scan(
+        Recording(
+            log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
+            log.touched, log.sigma_share, log.scan_start_s,
+        )
     )  # fmt: skip
-    steps = len(log)
-    return RecordedLog(recording, log.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(3))
+
+
+def every_scan(recording: Recording) -> RecordedLog:
+    """Return a recording as a log of which every scan is a keyframe."""
+    steps = len(recording)
+    return RecordedLog(recording, recording.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(3))

@@ -114,6 +114,14 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
         raise RecordingError(f"expected a run's log.npz, found {name} ({reason}): name a run's log") from error
 
 
+def knows_truth(source: Path) -> bool:
+    """Return whether a run's own log tells the truth beside; also for a file that is none, which its reader refuses."""
+    try:
+        return any(name.startswith("true_") for name in read_log(source))
+    except RecordingError:
+        return True
+
+
 def _of_format_1(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     ranges = arrays["ranges_m"]
     sigma = np.full(len(arrays["bearings_rad"]), float(arrays["sigma_m"]))
