@@ -5,6 +5,8 @@ import signal
 import jaxtyping
 import pytest
 
+pytest.register_assert_rewrite("tests.slam.backends.rooms")
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _interruptible():

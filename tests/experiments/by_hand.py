@@ -50,7 +50,7 @@ class Run:
 def log_of(estimated=None, **changes):
     estimated = TRUE + OFF if estimated is None else estimated
     kept = {
-        "time_s": np.arange(3.0), "scan_start_s": np.arange(3.0) - 0.1,
+        "time_s": np.arange(3.0),
         "bearings_rad": np.linspace(-np.pi, np.pi, BEAMS, endpoint=False),
         "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": np.full(BEAMS, 0.01), "sigma_share": 0.0, "range_max_m": 4.0,
         "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
@@ -63,7 +63,8 @@ def log_of(estimated=None, **changes):
         "unstated_motion": np.zeros(3, bool), "is_lost": np.zeros(3, bool), "wheel_noise_factor": np.ones(3),
         "reasons": ("", "", ""),
     }  # fmt: skip
-    return Log(**(kept | changes))
+    kept |= changes
+    return Log(scan_start_s=kept["time_s"] - 0.1, **kept)
 
 
 def step_of(walls, chains, **changes):

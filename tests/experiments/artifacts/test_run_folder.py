@@ -34,6 +34,7 @@ FULL = (
 STRUCK = """
 import os, signal, sys
 from contextlib import contextmanager
+from types import SimpleNamespace
 from experiments.artifacts import running_log
 from experiments.commands import cli, replay
 
@@ -69,7 +70,7 @@ elif place == "torn":
             write(descriptor, content[:700])
         strike()
         return write(descriptor, content)
-    running_log.os.write = torn
+    running_log.os = SimpleNamespace(**vars(os) | {"write": torn})
 elif place == "file":
     before(os, "fsync")
 elif place == "removed":

@@ -9,8 +9,6 @@ from slam.estimation.backend import Observations
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
 
-pytest.register_assert_rewrite("tests.slam.backends.rooms")
-
 
 def normal(alpha):
     return np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)

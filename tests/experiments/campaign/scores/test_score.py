@@ -39,7 +39,8 @@ def made(world, make_map, make_chains):
                      "unstated_motion", "is_lost", "wheel_noise_factor")
     }  # fmt: skip
     log = replace(
-        run.log, **columns, time_s=np.arange(float(N)), estimated_world=TRUE + OFF, estimated_cov=COVS, true_world=TRUE,
+        run.log, **columns, time_s=np.arange(float(N)), scan_start_s=np.arange(float(N)) - 0.1,
+        estimated_world=TRUE + OFF, estimated_cov=COVS, true_world=TRUE,
         path_length_m=PATH, lines=np.arange(N), reasons=("",) * N,
     )  # fmt: skip
     return replace(run, log=log, step=replace(run.step, index=N - 1, path_length_m=12.0))
