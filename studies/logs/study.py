@@ -30,7 +30,7 @@ from ..runner.rows import Row, rows_of
 NAMES = ("log", "backend", "odometry", "every")
 HEAD = (
     "log", "back end", "odometry", "scans", "at scans, m", "degrees", "60 s apart, m", "interpolated, m",
-    "reference, m", "walls", "twice", "ms a scan", "status",
+    "reference, m", "relations, median", "reference, median", "walls", "twice", "ms a scan", "status",
 )  # fmt: skip
 
 
@@ -48,6 +48,8 @@ class LogsStudy:
     """Who tells the motion between two keyframes."""
     every: int = 1
     """One of so many keyframes is mapped."""
+    second_looks: bool = True
+    """Whether all segments are associated anew once the drive has ended."""
     out: Path = Path("studies/logs/rows.jsonl")
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
@@ -66,14 +68,14 @@ def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
     name, backend = task
     relations, path = study.logs / f"{name}.relations", study.logs / f"{name}.ref_gmapping.txt"
     references = read_references(*(file if file.is_file() else None for file in (relations, path)))
-    options = RealOptions(study.every, study.odometry, second_looks=True)
+    options = RealOptions(study.every, study.odometry, study.second_looks)
     run = read_real_run(study.logs / f"{name}.log.gz", options, None, (), {})
     began = time.process_time()
     result = held_against(replay_real(run, backend), references)
     ms = 1e3 * (time.process_time() - began) / max(len(run.log.recording), 1)
     kept = ("status", "reason", "steps", "lines", "lines_crooked", "duplicate_lines", "chains_closed", "path_length_m")
     told: dict[str, Any] = {key: result.summary[key] for key in kept}
-    for key in ("relations", "reference", "relations_smoothed", "reference_smoothed"):
+    for key in (f"{kind}{tail}" for kind in ("relations", "reference") for tail in ("", "_smoothed", "_normalised")):
         if key in result.summary:
             told[key] = result.summary[key]
     of = {"log": name, "backend": backend, "odometry": study.odometry, "every": study.every}
@@ -95,12 +97,14 @@ def table(rows: Sequence[Row]) -> Table:
 def _cells(row: Row, tail: str) -> list[str]:
     relations, reference = row.get(f"relations{tail}"), row.get(f"reference{tail}")
     at = relations["at_scans"] if relations else None
+    honest = [(row.get(f"{kind}_normalised") or {}).get("all") for kind in ("relations", "reference")]
     numbers = [
         at and at["all"]["translation_m"]["mean"],
         at and float(np.rad2deg(at["all"]["rotation_rad"]["mean"])),
         at and at["far"]["translation_m"]["mean"],
         relations and relations["interpolated"]["all"]["translation_m"]["mean"],
         reference and reference["ate_aligned_m"],
+        *(found and found["median"] for found in honest),
     ]
     return [
         row["log"], row["backend"] + tail.replace("_", ", "), row["odometry"], str(row["steps"]),
