@@ -14,10 +14,9 @@ from jaxtyping import Float, Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
-from ..extraction.visible_extent import beam_step, beams_of
-from ..geometry.lines import directions, normals
-from ..geometry.poses import to_world
+from ..extraction.visible_extent import beam_step
 from ..robot import Scan
+from .kernels.change_point_kernels import beams_on_lines, feet_along, places_between, surest, turns_of_beams
 from .records import Merger, Records
 from .vertices import LEAST_RAD
 
@@ -80,36 +79,24 @@ class ChangePoints:
 
     def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> ChangePoint | None:
         """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
-        beams, of = beams_of(segments.beams[pairs[:, 0]], len(scan.bearings_rad))
-        alpha, r = segments.lines[pairs[:, 0]].T
-        off_normal = scan.bearings_rad[beams] - alpha[of]
-        cos = np.cos(off_normal)
-        across, sigma = scan.ranges_m[beams] * cos - r[of], scan.sigmas_m[beams] * cos
-        ours = np.abs(across) < self._config.gate_sigmas * sigma
-        number = np.arange(len(of))
-        from_end = np.minimum(number - np.searchsorted(of, of), np.searchsorted(of, of, side="right") - 1 - number)
-        ours &= from_end >= 1
-        if not ours.any():
-            return None
-        # Where beams meet the line, not where they ended: at a flat angle noise in range is noise along the wall, too.
-        foot = _along(belief, pairs[:, 1], to_world(r[:, None] * normals(alpha), belief.pose_world))
-        along = foot[of] + r[of] * np.tan(off_normal)
-        place, place_of = _places(along[ours], of[ours], len(pairs), self._config.pitch_m)
+        config, walls = self._config, pairs[:, 1]
+        rows, lines = belief.rows(walls), segments.lines[pairs[:, 0]]
+        feet = feet_along(lines, belief.pose_world, belief.anchors[rows], belief.means[rows, 0])
+        beams = scan.bearings_rad, scan.ranges_m, np.ascontiguousarray(scan.sigmas_m)
+        met = beams_on_lines(segments.beams[pairs[:, 0]], lines, feet, *beams, float(config.gate_sigmas))
+        place, place_of = places_between(met[0], met[3], float(config.pitch_m))
         if not len(place):
             return None
-        at = self._config.pitch_m * place
-        turns = _turns(along[ours], across[ours], sigma[ours], of[ours], at, place_of, self._config.least_beams)
-        information, sums = self._add(pairs[:, 1], place, place_of, turns)
-        turn = -sums / np.maximum(information, 1e-9)
-        is_bend = np.abs(turn) > LEAST_RAD
-        sure = turn**2 * information * is_bend * (turns[0] > 0.0)
-        best = int(np.argmax(sure))
-        if sure[best] <= self._config.sigmas**2:
+        at = config.pitch_m * place
+        turns = turns_of_beams(*met, at, place_of, config.least_beams)
+        information, sums = self._add(walls, place, place_of, turns)
+        best, turn, square = surest(information, sums, turns[0], LEAST_RAD)
+        if square <= config.sigmas**2:
             return None
         row = place_of[best]
-        bearing = float(alpha[row] + np.arctan((at[best] - foot[row]) / r[row]))
+        bearing = float(lines[row, 0] + np.arctan((at[best] - feet[row]) / lines[row, 1]))
         segment, wall = pairs[row].tolist()
-        return ChangePoint(wall, segment, bearing, float(at[best]), float(turn[best]), float(information[best] ** -0.5))
+        return ChangePoint(wall, segment, bearing, float(at[best]), turn, float(information[best] ** -0.5))
 
     def sides_of(
         self, change_point: ChangePoint, segments: Segments, pieces: Segments, scan: Scan
@@ -168,63 +155,3 @@ class ChangePoints:
         if turns[merger.drop] is not None:
             first, sums = turns[merger.drop]
             self._add_to(merger.keep, first + round(merger.shift_m / self._config.pitch_m), sums)
-
-
-def _along(
-    belief: Belief, walls: Int[np.ndarray, " m"], points_world: Float[np.ndarray, "m 2"]
-) -> Float[np.ndarray, " m"]:
-    """Return how far along walls, each from its anchor, points lie, m."""
-    rows = belief.rows(walls)
-    return np.vecdot(directions(belief.means[rows, 0]), points_world - belief.anchors[rows])
-
-
-def _places(
-    along: Float[np.ndarray, " k"], of: Int[np.ndarray, " k"], count: int, pitch_m: float
-) -> tuple[Int[np.ndarray, " p"], Int[np.ndarray, " p"]]:
-    """Return the places, in pitches, between the first and the last beam of each of so many walls, and whose they are.
-
-    The beams are given wall by wall, in the order in which they meet it.
-    """
-    bounds = np.searchsorted(of, np.arange(count + 1))
-    seen = np.flatnonzero(np.diff(bounds))
-    first = np.floor(along[bounds[seen]] / pitch_m).astype(np.int64) + 1
-    # A lone beam at a place itself would have one less than none.
-    places = np.maximum(np.ceil(along[bounds[seen + 1] - 1] / pitch_m).astype(np.int64) - first, 0)
-    begin = np.cumsum(places) - places
-    return np.arange(places.sum()) + np.repeat(first - begin, places), np.repeat(seen, places)
-
-
-def _turns(
-    along: Float[np.ndarray, " k"],
-    across: Float[np.ndarray, " k"],
-    sigma: Float[np.ndarray, " k"],
-    of: Int[np.ndarray, " k"],
-    places: Float[np.ndarray, " p"],
-    place_of: Int[np.ndarray, " p"],
-    least_beams: int,
-) -> Sums:
-    """Return the sums of beams at `along`, off lines by `across`, m: by how much more per metre a wall leads away
-    beyond each place, whatever its line; nothing where fewer than so many beams lie on either side.
-
-    The model is across = a + b along + turn max(along - place, 0); a and b are eliminated. Beams, and places, are given
-    wall by wall in ascending order, so that what lies beyond a place is a difference of running sums.
-    """
-    walls = np.arange(of[-1] + 1)
-    bounds = np.searchsorted(of, np.append(walls, len(walls)))
-    middle = np.zeros(len(walls))
-    seen = np.diff(bounds) > 0
-    middle[seen] = 0.5 * (along[bounds[:-1][seen]] + along[bounds[1:][seen] - 1])
-    x, s, weight = along - middle[of], places - middle[place_of], 1.0 / np.square(sigma)
-    running = np.zeros((5, len(x) + 1))
-    np.cumsum(weight * np.stack([np.ones_like(x), x, x * x, across, x * across]), axis=1, out=running[:, 1:])
-    end = bounds[place_of + 1]
-    # Walls lie in order, and so do the beams along each: one search for all, with each wall far from the next.
-    apart = 4.0 * (np.abs(x).max() + np.abs(s).max()) + 1.0
-    beyond = np.searchsorted(x + apart * of, s + apart * place_of, side="right")
-    w0, w1, w2, e0, e1 = running[:, end] - running[:, beyond]
-    t0, t1, t2, f0, f1 = running[:, end] - running[:, bounds[place_of]]
-    h0, h1, hh, he = w1 - s * w0, w2 - s * w1, w2 - 2.0 * s * w1 + s * s * w0, e1 - s * e0
-    det = t0 * t2 - t1 * t1
-    a, b = (t2 * h0 - t1 * h1) / det, (t0 * h1 - t1 * h0) / det
-    enough = np.minimum(end - beyond, beyond - bounds[place_of]) >= least_beams
-    return np.where(enough, np.stack([np.maximum(hh - a * h0 - b * h1, 0.0), he - a * f0 - b * f1]), 0.0)

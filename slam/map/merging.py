@@ -13,6 +13,7 @@ from jaxtyping import Bool, Int
 from ..estimation.backend import Joint
 from ..estimation.gates import gate_level
 from ..geometry.lines import directions, normals
+from .kernels import merging_kernels
 from .stochastic_map import StochasticMap
 
 
@@ -75,29 +76,16 @@ def lying_along(
 
     And of which pairs the one hides the other.
     """
-    established = np.flatnonzero(~walls.tentative)
-    ours = established[np.isin(walls.ids[established], list(touched))]
-    alpha, ends = walls.belief.means[:, 0], walls.ends_world
-    middle, length = ends.mean(axis=1), walls.extents[:, 1] - walls.extents[:, 0]
-    # Circles around two walls that lie along each other meet: this leaves few pairs to look at.
-    between = middle[ours, None] - middle[established]
-    reach = 0.5 * (length[ours, None] + length[established]) + config.across_m
-    near = (between[..., 0] ** 2 + between[..., 1] ** 2 <= reach**2) & (ours[:, None] != established)
-    near &= np.cos(alpha[ours, None] - alpha[established]) > np.cos(config.turn_rad)
-    row, column = np.nonzero(near)
-    one, other = ours[row], established[column]
-    older, younger = np.divmod(np.unique(np.minimum(one, other) * len(walls) + np.maximum(one, other)), len(walls))
-    is_shorter = length[older] <= length[younger]
-    shorter, longer = np.where(is_shorter, older, younger), np.where(is_shorter, younger, older)
-    off = ends[shorter] - ends[longer, :1]
-    across = np.abs(np.vecdot(off, normals(alpha[longer])[:, None])).max(axis=1)
-    along = np.vecdot(off, directions(alpha[longer])[:, None])
-    # By so much one would have to slide until they part: their overlap, or more where one lies amid the other.
-    overlap = np.minimum(length[longer] - along[:, 0], along[:, 1])
-    found = (across <= config.across_m) & (overlap >= config.across_m)
-    hidden = (across <= config.hidden_m) & (length[shorter] >= config.hidden_overlap_m)
+    lengths, alpha = walls.extents[:, 1] - walls.extents[:, 0], walls.belief.means[:, 0].copy()
+    ours, trusted = np.array(sorted(touched), dtype=np.int64), ~walls.tentative
+    turn_cosine, across_m = float(np.cos(config.turn_rad)), float(config.across_m)
+    pairs, beside = merging_kernels.lying_along(
+        walls.ids, ours, trusted, alpha, walls.ends_world, lengths, turn_cosine, across_m
+    )
+    length, across, overlap = beside.T
+    hidden = (across <= config.hidden_m) & (length >= config.hidden_overlap_m)
     hidden &= overlap >= config.hidden_overlap_m
-    return walls.ids[np.stack([older, younger], axis=-1)[found]], hidden[found]
+    return walls.ids[pairs], hidden
 
 
 def same_line(joint: Joint, gate: float) -> bool:

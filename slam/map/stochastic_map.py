@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import POSE, Belief, Joint
-from ..geometry.lines import directions, distance_to_segments, normals
+from .kernels import wall_kernels
 
 ESTABLISHED = 10
 """A wall seen this often outlives one scan that speaks against it, and may be the side of a bend."""
@@ -65,13 +65,11 @@ class StochasticMap:
     @cached_property
     def ends_world(self) -> Float[np.ndarray, "n 2 2"]:
         """First and last point of each wall, world frame, m: walking on, the free side is on the left. Read-only."""
-        alpha, d = self.belief.means[:, 0], self.belief.means[:, 1]
-        feet = self.belief.anchors + d[:, None] * normals(alpha)
-        ends = feet[:, None, :] + self.extents[..., None] * directions(alpha)[:, None, :]
+        ends = wall_kernels.ends_world(self.belief.anchors, self.belief.means, self.extents)
         ends.flags.writeable = False
         return ends
 
     @cached_property
     def distances_m(self) -> Float[np.ndarray, " n"]:
         """How far each wall is from where the belief puts the robot."""
-        return distance_to_segments(self.belief.pose_world[None, :2], self.ends_world)[0]
+        return wall_kernels.distances(self.belief.pose_world[:2], self.ends_world)

@@ -7,14 +7,16 @@ after scan. The map, which has seen each part alone, knows where to cut.
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.gates import gate_level
 from ..extraction.segments import Segments
-from ..geometry.lines import directions, normals
-from ..geometry.poses import to_robot, to_world, wrap
+from ..geometry.lines import directions
+from .kernels import vertex_kernels
+from .kernels.vertex_kernels import Bends, Bounds
 from .merging import same_line
 from .stochastic_map import StochasticMap
 
@@ -66,16 +68,13 @@ def vertices_within(
     if not len(segments):
         return np.zeros(0)
     bends = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
-    alpha_world = walls.belief.means[bends.rows[:, 0], 0]
-    points, alpha = to_robot(bends.points_world, walls.belief.pose_world), alpha_world - walls.belief.pose_world[2]
-    offset = points[:, None] - segments.ends[None, :, 0]
-    along = np.vecdot(offset, directions(segments.lines[:, 0]))
-    across = np.vecdot(offset, normals(segments.lines[:, 0]))
-    length = segments.lengths_m
-    on = (along > config.past_m) & (along < length - config.past_m) & (np.abs(across) < config.beside_m)
-    on &= np.abs(wrap(alpha[:, None] - segments.lines[:, 0])) < config.largest_rad
-    found = points[_are_known(bends, on.any(axis=1), walls, one_wall)]
-    return np.arctan2(found[:, 1], found[:, 0])
+    if not len(bends.rows):
+        return np.zeros(0)
+    alpha_world, pose = walls.belief.means[bends.rows[:, 0], 0], walls.belief.pose_world
+    on, bearings = vertex_kernels.on_segments(
+        bends.points_world, alpha_world, pose, segments.lines, segments.ends, _bounds(config)
+    )
+    return bearings[_are_known(bends, on, walls, one_wall)]
 
 
 def meetings(
@@ -92,6 +91,8 @@ def meetings(
     bends = _bends(walls, range_m, config, cut)
     slight = (bends.turn_rad > LEAST_RAD) & (bends.turn_rad < config.slight_rad)
     asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
+    if not asked.any():
+        return np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
     known = _are_known(bends, asked, walls, one_wall)
     rows = bends.rows[known]
     from_anchor = bends.points_world[known][:, None] - walls.belief.anchors[rows]
@@ -111,45 +112,19 @@ def mistaken(
     From 4 m the sides of a bend of a few degrees are one line of eight beams; from a step nearer they are two, and the
     clearer of them passes every gate of that line and turns the robot by half the bend.
     """
-    after = np.roll(np.arange(len(segments)), -1)
-    turn = wrap(segments.lines[after, 0] - segments.lines[:, 0])
-    variance = segments.cov[:, 0, 0] + segments.cov[after, 0, 0]
-    between = segments.ends[after, 0] - segments.ends[:, 1]
-    shown = ~segments.is_tentative & ~segments.is_tentative[after] & (np.abs(turn) < config.sharpest_rad)
-    shown &= (turn**2 > gate_level(gate, 1) * variance) & (np.linalg.norm(between, axis=1) < config.cut_reach_m)
-    before = np.flatnonzero(shown)
-    pose = walls.belief.pose_world
-    points = to_world(segments.ends[before, 1] + 0.5 * between[before], pose)
-    alpha = segments.lines[before, 0] + pose[2] + 0.5 * turn[before]
-    means = walls.belief.means[:, 0]
-    offset = points[:, None, None] - walls.ends_world
-    along, across = (np.vecdot(offset, axis[:, None]) for axis in (directions(means), normals(means)))
-    laid = (along[..., 0] > config.past_shown_m) & (along[..., 1] < -config.past_shown_m)
-    laid &= np.abs(across[..., 0]) < config.beside_m
-    laid &= np.abs(wrap(means - alpha[:, None])) < config.largest_rad
-    return walls.ids[laid.any(axis=0) & ~walls.established]
+    seen = segments.lines, segments.cov[:, 0, 0].copy(), segments.ends, segments.is_tentative
+    walls_seen = walls.belief.pose_world, walls.belief.means[:, 0].copy(), walls.ends_world
+    laid = vertex_kernels.laid_across(*seen, *walls_seen, gate_level(gate, 1), _bounds(config))
+    return walls.ids[laid & ~walls.established]
 
 
-@dataclass(frozen=True)
-class _Vertices:
-    """Where walls may make a bend."""
-
-    rows: Int[np.ndarray, "b 2"]
-    """Of the walls before and after it."""
-    points_world: Float[np.ndarray, "b 2"]
-    """Where it lies, m: where the lines cross, if both walls end or overlap there; else amid the two ends."""
-    turn_rad: Float[np.ndarray, " b"]
-    """From one normal to the other, without its sign."""
-    cross: Bool[np.ndarray, " b"]
-    """Whether it lies where the lines cross."""
-    overlap: Bool[np.ndarray, " b"]
-    """Whether the walls overlap, by more than ends are known to."""
-    is_cut: Bool[np.ndarray, " b"]
-    """Whether it is known that they are two."""
+@lru_cache
+def _bounds(config: VerticesConfig) -> Bounds:
+    return Bounds(*(float(getattr(config, name)) for name in Bounds._fields))
 
 
 def _are_known(
-    bends: _Vertices, asked: Bool[np.ndarray, " b"], walls: StochasticMap, one_wall: float
+    bends: Bends, asked: Bool[np.ndarray, " b"], walls: StochasticMap, one_wall: float
 ) -> Bool[np.ndarray, " b"]:
     """Return which of the bends asked for lie between walls that are surely not one straight wall."""
     known = asked & bends.is_cut
@@ -161,37 +136,8 @@ def _are_known(
     return known
 
 
-def _bends(walls: StochasticMap, range_m: float, config: VerticesConfig, cut: Collection[tuple[int, int]]) -> _Vertices:
+def _bends(walls: StochasticMap, range_m: float, config: VerticesConfig, cut: Collection[tuple[int, int]]) -> Bends:
     """Return where bends may lie; walls that begin beyond `range_m` have none that a scan of that range shows."""
     rows = np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
-    alpha, ends = walls.belief.means[rows, 0], walls.ends_world[rows]
-    turn = wrap(alpha - alpha[:, None])
-    # Every other wall's ends as seen from the head of each: along it, and across.
-    offset = ends[None] - ends[:, None, 1:]
-    along = np.vecdot(offset, directions(alpha)[:, None, None])
-    across = np.vecdot(offset, normals(alpha)[:, None, None])[..., 0]
-    gap, runs_on = along[..., 0], along[..., 1] > 0.0
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
-    is_cut = _are_pairs(walls.ids[rows], cut)
-    reach = np.where(is_cut, config.cut_reach_m, config.reach_m)
-    is_bend = (gap < reach) & (gap > -length[:, None]) & runs_on
-    is_bend &= (np.abs(across) < config.beside_m) & (np.abs(turn) < config.largest_rad)
-    before, after = np.nonzero(is_bend)
-    gap, across, turn = gap[is_bend], across[is_bend], turn[is_bend]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = gap + across / np.tan(turn)
-    cross = (crossing > np.minimum(gap, 0.0) - config.reach_m) & (crossing < np.maximum(gap, 0.0) + config.reach_m)
-    at = np.where(cross, crossing, 0.5 * gap)
-    points = ends[before, 1] + at[:, None] * directions(alpha[before])
-    pair = np.stack([rows[before], rows[after]], axis=-1)
-    return _Vertices(pair, points, np.abs(turn), cross, gap < -config.past_m, is_cut[is_bend])
-
-
-def _are_pairs(ids: Int[np.ndarray, " n"], pairs: Collection[tuple[int, int]]) -> Bool[np.ndarray, "n n"]:
-    """Return for each two of the ids, which ascend, whether they are one of the pairs, in either order."""
-    are_pairs = np.zeros((len(ids), len(ids)), dtype=bool)
-    wanted = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
-    wanted = wanted[np.isin(wanted, ids).all(axis=1)]
-    one, other = np.searchsorted(ids, wanted).T
-    are_pairs[one, other] = are_pairs[other, one] = True
-    return are_pairs
+    alpha, pairs = walls.belief.means[:, 0].copy(), np.array(sorted(cut), dtype=np.int64).reshape(-1, 2)
+    return vertex_kernels.bends(rows, walls.ids, alpha, walls.ends_world, pairs, _bounds(config))

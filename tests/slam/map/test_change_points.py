@@ -9,7 +9,8 @@ from slam.config import MapperConfig
 from slam.estimation.backend import Belief
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
-from slam.map.change_points import ChangePoint, ChangePoints, ChangePointsConfig, _places, _turns
+from slam.map.change_points import ChangePoint, ChangePoints, ChangePointsConfig
+from slam.map.kernels.change_point_kernels import beams_on_lines, feet_along, places_between, surest, turns_of_beams
 from slam.map.records import Records
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -61,7 +62,7 @@ def test_the_turn_at_a_place_is_that_of_a_dense_least_squares(seed):
     along = np.concatenate([np.sort(rng.uniform(28, 32, 40)), np.sort(rng.uniform(-9, -7, 25))])
     sigma = rng.uniform(0.005, 0.02, 65)
     across, places = sigma * rng.standard_normal(65), np.array([28.9, 30.0, 30.7, -8.5, -7.4])
-    information, sums = _turns(along, across, sigma, of, places, place_of, 1)
+    information, sums = turns_of_beams(along, across, sigma, of, places, place_of, 1)
     for k, place in enumerate(places):
         ours = of == place_of[k]
         turned = np.maximum(along[ours] - place, 0.0)
@@ -72,13 +73,13 @@ def test_the_turn_at_a_place_is_that_of_a_dense_least_squares(seed):
 
 
 def test_places_lie_between_the_first_and_the_last_beam_of_each_wall():
-    place, of = _places(np.array([-0.6, 0.1, 0.55, 0.26, 0.3, 1.2, 1.25]), np.array([0, 0, 0, 2, 2, 5, 5]), 7, 0.25)
+    place, of = places_between(np.array([-0.6, 0.1, 0.55, 0.26, 0.3, 1.2, 1.25]), np.array([0, 0, 0, 2, 2, 5, 5]), 0.25)
     np.testing.assert_array_equal(of, [0, 0, 0, 0, 0])
     np.testing.assert_array_equal(place, [-2, -1, 0, 1, 2])
 
 
 def test_a_lone_beam_at_a_place_itself_has_none():
-    place, of = _places(np.array([45.0, -0.1, 0.1]), np.array([0, 1, 1]), 2, 0.25)
+    place, of = places_between(np.array([45.0, -0.1, 0.1]), np.array([0, 1, 1]), 0.25)
     np.testing.assert_array_equal(of, [1])
     np.testing.assert_array_equal(place, [0])
 
@@ -260,3 +261,40 @@ def turns_at(records, place):
     """Return the sums of the wall at one place."""
     begin, sums = records.columns["turns"][0] or (0, np.zeros((2, 0)))
     return sums[:, place - begin].copy() if begin <= place < begin + sums.shape[1] else np.zeros(2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_each_beam_meets_its_line_where_plain_geometry_says(seed):
+    """One of the segments crosses the scan's seam; some beams miss their line, and some tell nothing."""
+    rng = np.random.default_rng(seed)
+    bearings = np.deg2rad(np.arange(0.0, 360.0, 4.0))
+    runs, alpha = np.array([[82, 5], [20, 31], [40, 41]]), np.deg2rad([350.0, 104.0, 160.0])
+    lines, pose = np.column_stack([alpha, rng.uniform(1.0, 3.0, 3)]), rng.uniform(-2.0, 2.0, 3)
+    anchors, turned, expected = rng.uniform(-2.0, 2.0, (3, 2)), alpha + pose[2] + rng.normal(0.0, 0.1, 3), []
+    sigmas, ranges = rng.uniform(0.01, 0.02, 90), np.full(90, np.nan)
+    feet = feet_along(lines, pose, anchors, turned)
+    for k, (first, last) in enumerate(runs):
+        run = np.arange(first, last + 1 + 90 * (last < first)) % 90
+        n, t = np.array([np.cos(alpha[k]), np.sin(alpha[k])]), np.array([-np.sin(alpha[k]), np.cos(alpha[k])])
+        for beam in run:
+            ray = np.array([np.cos(bearings[beam]), np.sin(bearings[beam])])
+            ranges[beam] = lines[k, 1] / (n @ ray) + rng.normal(0.0, 2.0) * sigmas[beam]
+            ranges[beam] = rng.choice([ranges[beam], np.nan, np.inf], p=[0.9, 0.05, 0.05])
+            off = ranges[beam] * (n @ ray) - lines[k, 1]
+            if beam not in run[[0, -1]] and abs(off) < 3.0 * sigmas[beam] * (n @ ray):
+                foot = np.array([np.cos(turned[k]), np.sin(turned[k])])
+                middle = pose[:2] + lines[k, 1] * np.array([np.cos(alpha[k] + pose[2]), np.sin(alpha[k] + pose[2])])
+                along = np.array([-foot[1], foot[0]]) @ (middle - anchors[k])
+                expected.append((along + lines[k, 1] / (n @ ray) * (t @ ray), off, sigmas[beam] * (n @ ray), k))
+    found = beams_on_lines(runs, lines, feet, bearings, ranges, sigmas, 3.0)
+    np.testing.assert_allclose(np.column_stack(found), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_surest_turn_is_one_that_the_scan_of_now_tells_of_and_not_a_slight_one(seed):
+    rng = np.random.default_rng(seed)
+    information, sums, now = rng.uniform(0.0, 9.0, 6), rng.normal(0.0, 2.0, 6), rng.choice([0.0, 1.0], 6)
+    turn = -sums / information
+    square = np.where((np.abs(turn) > 0.3) & (now > 0.0), turn**2 * information, 0.0)
+    best = int(np.argmax(square))
+    assert surest(information, sums, now, 0.3) == pytest.approx((best, turn[best], square[best]))
