@@ -65,8 +65,8 @@ MATCHING = (
     Switch("hypotheses.dropped", "slam.association.kernels.hypothesis_kernels",
            "wrong = «losses[worst] > unmatched»",
            "False", "a hypothesis drops the pair that contradicts the others"),
-    Switch("mapper.lost", "slam.mapper", "scan.range_max_m + «max(self.config.matching.offset_m, lost_m)»",
-           "self.config.matching.offset_m", "a robot that is lost looks at walls farther off"),
+    Switch("mapper.lost", "slam.mapper", "scan.range_max_m + «max(config.offset_m, lost_m)»",
+           "config.offset_m", "a robot that is lost looks at walls farther off"),
 )  # fmt: skip
 
 BENDS = (
