@@ -7,7 +7,7 @@ import pytest
 
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
-from studies.consistency.map_causes import causes, shares_of_one_wall, table
+from studies.exploration.map_causes import causes, shares_of_one_wall, table
 
 
 def test_the_share_of_one_wall_counts_all_its_faces():

@@ -2,7 +2,7 @@
 
 Each plan is explored once, and its map is scored in its own gauge: all of it, and without each kind of wall.
 
-.venv/bin/python -m studies.consistency.map_causes --plans ../shared/data/plans   # goes on where it was interrupted
+.venv/bin/python -m studies.exploration.map_causes --plans ../shared/data/plans   # goes on where it was interrupted
 """
 
 from collections.abc import Sequence
@@ -118,6 +118,6 @@ def table(rows: Sequence[Row]) -> Table:
 
 if __name__ == "__main__":
     try:
-        tyro.cli(MapCauses, prog="studies.consistency.map_causes").run()
+        tyro.cli(MapCauses, prog="studies.exploration.map_causes").run()
     except UsageError as error:
         raise SystemExit(f"map_causes: {error}") from error
