@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 from ..estimation.backend import Joint
 from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
-from ..map.ray_evidence import ray_evidence
+from ..map.kernels.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
 from ..robot import Odometry, Scan
 from .joint_compatibility import NO_NIS, Nis

@@ -10,7 +10,7 @@ from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind, Segments
 from slam.extraction.visible_extent import owners_of_beams, sure_pieces
 from slam.geometry.lines import normals, through
-from slam.map.ray_evidence import ray_evidence
+from slam.map.kernels.ray_evidence import ray_evidence
 from slam.robot import Scan
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ..robot import Scan
-from .kernels import ray_kernels
+from ...robot import Scan
+from . import ray_kernels
 
 
 @dataclass(frozen=True)
