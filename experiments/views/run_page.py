@@ -16,7 +16,8 @@ from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.maps.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
-from ..artifacts.settings import NAVIGATION, differing, options_of
+from ..artifacts.settings import NAVIGATION, differing, leaves, options_of
+from ..replays.real_log import REAL_WALLS
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..replays.sources import RECORDED, was_real
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
@@ -211,7 +212,8 @@ def _by_truth(options: ReplayOptions) -> str:
 
 def _command_real(trial: TrialConfig, names: list[str], said: Any) -> str:
     """Return the command that maps a real robot's log again."""
-    tuned = [(key, value) for key, value in differing(trial) if key.split(".")[0] in OPEN_TO_REPLAYS]
+    of_every_log = list(leaves(REAL_WALLS))
+    tuned = [item for item in differing(trial) if item[0].split(".")[0] in OPEN_TO_REPLAYS and item not in of_every_log]
     words = ["chainslam", "replay", trial.world, "--backend", *names, *options_of(tuned)]
     for key, value in sorted(said[RECORDED].items()):
         option = f"--{key.replace('_', '-')}"

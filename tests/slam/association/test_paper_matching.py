@@ -172,7 +172,7 @@ def test_the_setting_names_the_method_and_an_oracle_takes_the_place_of_its_match
 
     assert method(PAPER) == METHODS["paper"] == Method(match_alone, relocate_robot, False)
     assert method(MatchingConfig()) == METHODS["joint"]
-    assert method(PAPER, oracle) == Method(oracle, relocate_robot, False)
+    assert method(PAPER, oracle) == Method(oracle, relocate_robot, clear_stay=False, looks_near=False)
 
 
 def test_distances_of_segments_are_those_of_shapely():
