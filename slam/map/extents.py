@@ -9,7 +9,7 @@ from ..estimation.backend import Belief
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import owners_of_beams
 from ..robot import RobotSpec, Scan, of_robot
-from .kernels.extent_kernels import note_whole, seen_along, stretch, weigh
+from .kernels.extent_kernels import note_whole, seen_along, stretch, uncover, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import ESTABLISHED, StochasticMap
@@ -55,6 +55,7 @@ class Extents:
             spacing=np.full(2, np.inf),
             observations=0,
             last_seen=0,
+            overlaid=np.zeros(2, dtype=np.int64),
             against=0,
             claimed=0,
             whole=0,
@@ -89,6 +90,9 @@ class Extents:
         along, apart = seen_along(*pieces, belief.pose_world, belief.anchors, belief.means, scan.step_rad)
         stretch(rows, along, apart, kinds, extents, spacing)
         note_whole(before, rows, kinds, extents, whole, margin)
+        lines, kept = (belief.pose_world, belief.anchors, belief.means), (extents, spacing, columns["overlaid"])
+        scans = self._config.contradictions
+        uncover(used, owners, segments.ends, segments.end_kinds, rows, *lines, *kept, margin, scans)
         observations, last_seen = columns["observations"], columns["last_seen"]
         observations[np.unique(rows)] += 1
         observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)

@@ -187,6 +187,8 @@ UPKEEP = (
     Switch("walls.sharper", "slam.map.kernels.extent_kernels",
            "or («sharper and -beyond < spacing[row, side]»)",
            "False", "an end moves back to a corner seen more sharply"),
+    Switch("walls.uncover", "slam.map.kernels.extent_kernels", "if «overlaid[row, side] >= contradictions»:",
+           "False", "an end moves back to a corner before it from which another wall runs on"),
     Switch("walls.to_hits", "slam.map.kernels.extent_kernels",
            "if «best > 0 and first - kept[0] < TRIM_M»:",
            "False", "a wall cut back ends at its outermost hit"),

@@ -19,6 +19,20 @@ TRIM_M = 0.5
 
 
 @compiled
+def _along(
+    point_robot: Float[np.ndarray, "2"],
+    pose_world: Float[np.ndarray, "3"],
+    anchor: Float[np.ndarray, "2"],
+    alpha: float,
+) -> float:
+    """Return how far along a line of direction alpha from its anchor a point lies, m."""
+    c, s = math.cos(pose_world[2]), math.sin(pose_world[2])
+    east = c * point_robot[0] - s * point_robot[1] + pose_world[0] - anchor[0]
+    north = s * point_robot[0] + c * point_robot[1] + pose_world[1] - anchor[1]
+    return north * math.cos(alpha) - east * math.sin(alpha)
+
+
+@compiled
 def seen_along(
     ends: Float[np.ndarray, "m 2 2"],
     lines: Float[np.ndarray, "m 2"],
@@ -30,16 +44,11 @@ def seen_along(
 ) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
     """Return where the ends of segments lie along their walls, m, and how far beams stand apart there."""
     along, apart = np.empty((len(rows), 2)), np.empty((len(rows), 2))
-    c, s = math.cos(pose_world[2]), math.sin(pose_world[2])
     for k in range(len(rows)):
         row = rows[k]
-        tx, ty = -math.sin(means[row, 0]), math.cos(means[row, 0])
         for side in range(2):
-            x, y = ends[k, side, 0], ends[k, side, 1]
-            east = c * x - s * y + pose_world[0] - anchors[row, 0]
-            north = s * x + c * y + pose_world[1] - anchors[row, 1]
-            along[k, side] = east * tx + north * ty
-            distance = math.hypot(x, y)
+            along[k, side] = _along(ends[k, side], pose_world, anchors[row], means[row, 0])
+            distance = math.hypot(ends[k, side, 0], ends[k, side, 1])
             cosine = min(max(lines[k, 1] / max(distance, 1e-9), 0.05), 1.0)
             apart[k, side] = step_rad * distance / cosine
     return along, apart
@@ -64,6 +73,46 @@ def stretch(
             if beyond > 0.0 or (sharper and -beyond < spacing[row, side]):
                 extents[row, side] = along[k, side]
                 spacing[row, side] = apart[k, side]
+
+
+@compiled
+def uncover(
+    used: Int[np.ndarray, " m"],
+    owners: Int[np.ndarray, " s"],
+    ends: Float[np.ndarray, "s 2 2"],
+    end_kinds: Int[np.ndarray, "s 2"],
+    rows: Int[np.ndarray, " m"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    extents: Float[np.ndarray, "n 2"],
+    spacing: Float[np.ndarray, "n 2"],
+    overlaid: Int[np.ndarray, "n 2"],
+    margin_m: float,
+    contradictions: int,
+) -> None:
+    """Move an end back to the corner that scan after scan shows before it, if another wall runs on from there.
+
+    From afar a wall that turns by a few degrees is taken for one straight wall, and so reaches past the corner. Segment
+    `used[k]` is of the wall in row `rows[k]`; `overlaid` counts the scans in turn.
+    """
+    for side in range(2):
+        outward = -1 if side == 0 else 1
+        counts = overlaid[:, side].copy()
+        for k in range(len(rows)):
+            overlaid[rows[k], side] = 0
+        for k in range(len(rows)):
+            row, own, after = rows[k], used[k], (used[k] + outward) % len(ends)
+            corner = _along(ends[own, side], pose_world, anchors[row], means[row, 0])
+            far = _along(ends[after, side], pose_world, anchors[row], means[row, 0])
+            end = extents[row, side]
+            runs_on = end_kinds[own, side] == CORNER and end_kinds[after, 1 - side] == CORNER
+            runs_on = runs_on and outward * (far - end) > -margin_m
+            other = owners[after] >= 0 and owners[after] != owners[own]
+            if runs_on and other and outward * (end - corner) > margin_m:
+                overlaid[row, side] = counts[row] + 1
+                if overlaid[row, side] >= contradictions:
+                    extents[row, side], spacing[row, side] = corner, margin_m
 
 
 @compiled
