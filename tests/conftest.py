@@ -4,7 +4,11 @@ import signal
 
 import jaxtyping
 import pytest
+from hypothesis import settings
 
+# A kernel that is not in the cache yet compiles at its first example; no test is about time.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 pytest.register_assert_rewrite("tests.slam.backends.rooms")
 
 
