@@ -26,6 +26,20 @@ def test_the_simulated_robot_is_a_robot():
     assert robot.sense().ranges_m.shape == (180,)
 
 
+@pytest.mark.parametrize("sides", [127, 128, 129, 300])
+def test_every_beam_keeps_its_face_however_many_there_are(sides):
+    """A round room; the record takes as few bytes for a face as the count of faces allows."""
+    turn = np.linspace(-np.pi, np.pi, sides, endpoint=False)
+    corners = 2.0 + 2.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+    faces = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    robot = SimulatedRobot(Room(faces, np.array([2.0, 2.0, 0.01])), seed=1, errorless=True)
+    scan = robot.sense()
+    bearings = scan.bearings_rad + 0.01
+    ends = 2.0 + scan.ranges_m[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    nearest = [int(np.argmin(np.hypot(*(faces.mean(axis=1) - end).T))) for end in ends]
+    np.testing.assert_array_equal(robot.record.faces_of_beams[0], nearest)
+
+
 def test_errorless_wheels_go_where_they_are_told_and_state_their_noise():
     robot = SimulatedRobot(room(), seed=1, errorless=True)
     odometry = robot.drive(MotionCommand(0.1, 0.1))
