@@ -1,11 +1,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 PLANS ?= ../shared/data/plans
+ROWS := studies/results/rows
 
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: schools-default setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
+.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
 setup: .venv/made
 
@@ -56,14 +57,34 @@ bench: setup
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
 
-# 312 runs of 1,500 noisy steps, about two hours of one core; begun again, it goes on where it was.
-schools: setup
-	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --out results/schools-short.jsonl
+.PHONY: rows apartments schools-whole bundled paper-method navigation-apartments
 
-# Does full-ekf or invariant-ekf lose fewer maps? Two seeds of 39 schools; begun again, it goes on where it was.
-schools-default: setup
-	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --backends full-ekf invariant-ekf --seeds 1 2 --any-code \
-	    --out studies/results/rows/in_text/schools-default.jsonl
+# What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
+rows: intervals paper paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
+
+# 160 apartments with noise, by two back ends.
+apartments: setup
+	for backend in invariant-ekf graph; do $(BIN)/python -m studies.exploration.suite --plans $(PLANS) --named 'lifull_*' \
+	    --backend $$backend --out $(ROWS)/apartments.jsonl || exit; done
+
+# 39 schools and offices, 1,500 noisy steps each: every back end with one seed, and three of them with a second.
+schools: setup
+	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --jobs 2 --out $(ROWS)/schools.jsonl
+	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --jobs 2 --out $(ROWS)/schools.jsonl \
+	    --backends full-ekf invariant-ekf graph --seeds 1 2
+
+# The same buildings, to their end.
+schools-whole: setup
+	$(BIN)/python -m studies.exploration.suite --plans $(PLANS) --named 'cml_*' --backend invariant-ekf --max-steps 30000 \
+	    --out $(ROWS)/schools-whole.jsonl
+
+bundled: setup
+	$(BIN)/python -m studies.exploration.suite --errorless --out $(ROWS)/bundled-errorless.jsonl
+	$(BIN)/python -m studies.exploration.suite --seeds 10 --out $(ROWS)/bundled-noisy.jsonl
+
+# A wall entered twice by the paper's own method.
+paper-method: setup
+	$(BIN)/python -m studies.consistency.paper_method --max-steps 200 --out $(ROWS)/paper-method.jsonl
 
 bias: setup
 	$(BIN)/python -m studies.consistency.bias --strategies nearest-robot nearest-start --out results/bias.jsonl
@@ -100,7 +121,7 @@ scanners: setup
 	$(BIN)/python -m studies.robots.scanners --seeds 5
 
 courts: setup
-	$(BIN)/python -m studies.exploration.courts --out results/courts.jsonl
+	$(BIN)/python -m studies.exploration.courts --out $(ROWS)/courts.jsonl
 
 strategies: setup
 	$(BIN)/python -m studies.exploration.strategies --seeds 20 --out results/strategies.jsonl
@@ -110,6 +131,10 @@ navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
 .PHONY: navigation paper paper-check study intervals real-plans interval-causes counts settings
+
+# The same in every eighth apartment, errorless.
+navigation-apartments: setup
+	$(BIN)/python -m studies.exploration.navigation --worlds --plans $(PLANS) --every 8 --jobs 2 --out $(ROWS)/navigation.jsonl
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
@@ -121,11 +146,11 @@ study: setup
 
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
-	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out results/intervals.jsonl
+	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out $(ROWS)/intervals.jsonl
 
 # The paper's question in real plans: every fourth apartment, explored once and replayed through six back ends.
 real-plans: setup
-	$(BIN)/python -m studies.consistency.real_plans --plans $(PLANS) --out studies/results/rows/real-plans.jsonl
+	$(BIN)/python -m studies.consistency.real_plans --plans $(PLANS) --out $(ROWS)/real-plans.jsonl
 
 # Is it the matches, or the lines, that make them fail more often in one run than in another?
 interval-causes: setup
@@ -179,9 +204,3 @@ smoke: setup
 compare: setup
 	$(BIN)/chainslam compare --preset paper --out results/paper
 	$(BIN)/chainslam report results/paper --latex
-
-.PHONY: paper-method
-
-# How often the paper's method enters a wall twice (figure 9); begun again, it goes on where it was.
-paper-method: setup
-	$(BIN)/python -m studies.consistency.paper_method

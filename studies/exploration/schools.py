@@ -20,7 +20,7 @@ from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
-from ..results.headlines import LOST
+from ..results.plans import LOST
 from ..runner.trials import rows_of
 
 

@@ -1,10 +1,22 @@
 """What many rows come to, in the words of a table."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..runner.rows import Row
+
+Table = list[list[str]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What rows came to."""
+
+    table: Table
+    """The first row holds the columns' names."""
+    verdict: str
 
 
 def grouped(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:
@@ -25,9 +37,9 @@ def mean_of(rows: Sequence[Row], name: str) -> float:
     return float(np.mean(numbers(rows, name)))
 
 
-def median_of(rows: Sequence[Row], name: str) -> str:
-    """Return their median, in words."""
-    return f"{np.median(numbers(rows, name)):.3g}"
+def median_of(rows: Sequence[Row], name: str, digits: int = 3) -> str:
+    """Return their median to so many digits, in words."""
+    return f"{np.median(numbers(rows, name)):.{digits}g}"
 
 
 def typical(rows: Sequence[Row], name: str) -> str:

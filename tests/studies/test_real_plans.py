@@ -1,7 +1,7 @@
 """The study of real plans: what it runs, and what its tables say of rows."""
 
 from studies.consistency.real_plans import STAGES, cells_of, table_of_backends, table_of_stages
-from studies.results.headlines import real_plans
+from studies.results.plans import real_plans
 
 
 def row(backend, stage, world="a", pairs=10, **more):

@@ -4,8 +4,10 @@ import json
 
 import pytest
 
-from studies.results.headlines import HEADLINES, Headline, bundled
+from studies.results.headlines import HEADLINES, Headline
 from studies.results.page import BEGIN, END, Results, newest, section, state
+from studies.results.plans import apartments, schools, whole_schools
+from studies.results.worlds import bundled
 from studies.runner.rows import fingerprint
 
 
@@ -45,3 +47,35 @@ def test_a_section_has_aim_table_verdict_and_command(tmp_path):
     assert "| `hall` | 1 of 2 | 0.8000 | 2 of 4 | 10.0 m |" in made
     assert "**Verdict.** 1 of 2 complete, 2 of 4 contours closed, 2 collisions." in made
     assert "made at a commit not recorded: `make halls`" in made
+
+
+def run(backend, seed=1, **more):
+    scores = {"pose_anees": 1.0, "map_anees": 1.0, "false_matches": 2, "duplicate_lines": 1, "planning_ms_mean": 0.5}
+    own = {"backend": backend, "seed": seed, "coverage_own_frame": 0.9, "raised": False, "steps": 100}
+    return row("a", "school", **scores) | own | more
+
+
+def test_apartments_stand_by_back_end_and_the_verdict_says_which_way_the_covariance_is_off():
+    rows = [run("graph", map_anees=value) for value in (0.5, 0.7, 4.0)] + [run("full-ekf", map_anees=1.3)]
+    found = apartments(rows)
+    cells = {line[0]: line[1:] for line in found.table}
+    assert cells["measure"] == ["`graph`", "`full-ekf`"]
+    assert cells["map ANEES: mean, median"] == ["1.73, 0.7", "1.3, 1.3"]
+    assert cells["maps with an ANEES above 3"] == ["1", "0"]
+    assert cells["false matches, duplicate walls, a plan"] == ["2.00, 1.00", "2.00, 1.00"]
+    assert "`graph`: 3 of 3 complete, map ANEES 0.7 at the median: covariances are typically too wide." in found.verdict
+    assert found.verdict.endswith("typically too narrow.")
+
+
+def test_schools_count_the_runs_of_each_back_end_that_lost_their_map():
+    rows = [run("full-ekf", pose_anees=value) for value in (1.0, 3.1, 9.0)] + [run("graph", 2, raised=True)]
+    found = schools(rows)
+    assert [line[:6] for line in found.table[1:]] == [
+        ["`full-ekf`", "3", "0", "3.1", "1", "2"], ["`graph`", "1", "1", "1", "1", "0"]
+    ]  # fmt: skip
+    assert found.verdict == "Ended by an exception: 1 runs. Maps lost: `full-ekf` 2 of 3; `graph` 0 of 1."
+
+
+def test_schools_to_their_end_have_means_over_the_runs():
+    found = whole_schools([run("graph", coverage=0.8, status="stopped", steps=300), run("graph")])
+    assert found.table[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0"]

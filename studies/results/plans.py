@@ -1,0 +1,138 @@
+"""Tables of results in real plans: apartments, schools, courts."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..runner.rows import Row
+from .figures import (
+    Found,
+    Table,
+    closed_contours,
+    completed,
+    grouped,
+    mean_of,
+    median_of,
+    numbers,
+    total,
+    typical,
+)
+
+LOST = 3.0
+"""A run whose mean NEES is this many times what the estimator expects no longer knows where it is."""
+
+
+def apartments(rows: Sequence[Row]) -> Found:
+    """Return what exploring apartments with noise came to, by back end."""
+    by = grouped(rows, "backend")
+    table: Table = [["measure", *(f"`{name}`" for name in by)]]
+    measures: dict[str, Callable[[Sequence[Row]], str]] = {
+        "complete": completed,
+        "coverage: mean, median, least": lambda mine: (
+            f"{mean_of(mine, 'coverage'):.4f}, {median_of(mine, 'coverage', 4)}, {min(numbers(mine, 'coverage')):.3f}"
+        ),
+        "contours closed": closed_contours,
+        "collisions": lambda mine: str(total(mine, "collisions")),
+        "pose ANEES: mean, median": lambda mine: typical(mine, "pose_anees"),
+        "map ANEES: mean, median": lambda mine: typical(mine, "map_anees"),
+        "maps with an ANEES above 3": lambda mine: str(sum(value > LOST for value in numbers(mine, "map_anees"))),
+        "false matches, duplicate walls, a plan": lambda mine: (
+            f"{mean_of(mine, 'false_matches'):.2f}, {mean_of(mine, 'duplicate_lines'):.2f}"
+        ),
+        "planning, mean of a step": lambda mine: f"{mean_of(mine, 'planning_ms_mean'):.1f} ms",
+    }
+    for words, figure in measures.items():
+        table.append([words, *(figure(mine) for mine in by.values())])
+    return Found(table, " ".join(f"`{name}`: {completed(mine)} complete, {_anees(mine)}." for name, mine in by.items()))
+
+
+def _anees(rows: Sequence[Row]) -> str:
+    """Return the map's ANEES and what it says of the covariance, in words."""
+    median = float(np.median(numbers(rows, "map_anees")))
+    told = "as wide as they should be" if 0.9 <= median <= 1.15 else "too narrow" if median > 1.15 else "too wide"
+    return f"map ANEES {median:.3g} at the median: covariances are typically {told}"
+
+
+def real_plans(rows: Sequence[Row]) -> Found:
+    """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones."""
+    head = ["back end", "pose ANEES: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
+    table: Table = [["matches", *head, "false matches", "duplicate walls"]]
+    for stage in dict.fromkeys(row["stage"] for row in rows):
+        for backend, mine in grouped([row for row in rows if row["stage"] == stage], "backend").items():
+            pairs = np.array([row["pairs"] for row in mine])
+            held = np.average([row["held"] or 0.0 for row in mine], weights=pairs) if pairs.any() else np.nan
+            cells = [
+                stage,
+                f"`{backend}`",
+                typical(mine, "pose_anees"),
+                typical(mine, "map_anees"),
+                f"{100 * held:.1f} %",
+            ]
+            table.append([*cells, *(f"{mean_of(mine, name):.2f}" for name in ("false_matches", "duplicate_lines"))])
+    own = grouped([row for row in rows if row["stage"] == "own"], "backend")
+    plans = len({row["world"] for row in rows})
+    maps = ", ".join(f"`{name}` {mean_of(mine, 'map_anees'):.3g}" for name, mine in own.items())
+    verdict = f"The mean map ANEES over {plans} apartments: {maps}. Intervals are too wide where faces are short"
+    return Found(table, f"{verdict} ([limits](limits.md)).")
+
+
+def schools(rows: Sequence[Row]) -> Found:
+    """Return how back ends fare in schools over a limited number of steps, and which of them loses fewest maps."""
+    head = ["back end", "runs", "exceptions", "pose ANEES: median", "map ANEES: median"]
+    lost = f"lost: pose ANEES above {LOST:g}"
+    table: Table = [[*head, lost, "coverage by then: mean", "false matches a run", "collisions"]]
+    shares = {}
+    for backend, mine in grouped(rows, "backend").items():
+        medians = [median_of(mine, name) for name in ("pose_anees", "map_anees")]
+        failed, gone = sum(bool(row["raised"]) for row in mine), sum(v > LOST for v in numbers(mine, "pose_anees"))
+        shares[backend] = f"`{backend}` {gone} of {len(mine)}"
+        cells = [f"`{backend}`", str(len(mine)), str(failed), *medians, str(gone)]
+        covered, false = mean_of(mine, "coverage_own_frame"), mean_of(mine, "false_matches")
+        table.append([*cells, f"{covered:.3f}", f"{false:.1f}", str(total(mine, "collisions"))])
+    failed = sum(bool(row["raised"]) for row in rows)
+    verdict = "No run ended by an exception." if not failed else f"Ended by an exception: {failed} runs."
+    return Found(table, f"{verdict} Maps lost: {'; '.join(shares.values())}.")
+
+
+def whole_schools(rows: Sequence[Row]) -> Found:
+    """Return what exploring schools to their end came to, by back end."""
+    head = ["back end", "complete", "coverage: mean, least", "own frame: mean", "pose ANEES: median"]
+    table: Table = [[*head, "map ANEES: mean, median", "false matches a run", "steps: mean", "collisions"]]
+    for backend, mine in grouped(rows, "backend").items():
+        coverage = numbers(mine, "coverage")
+        cells = [f"`{backend}`", completed(mine), f"{np.mean(coverage):.4f}, {min(coverage):.3f}"]
+        cells += [f"{mean_of(mine, 'coverage_own_frame'):.4f}", median_of(mine, "pose_anees")]
+        cells += [typical(mine, "map_anees"), f"{mean_of(mine, 'false_matches'):.1f}", f"{mean_of(mine, 'steps'):.0f}"]
+        table.append([*cells, str(total(mine, "collisions"))])
+    by = grouped(rows, "backend")
+    return Found(table, " ".join(f"`{name}`: {completed(mine)} complete, {_anees(mine)}." for name, mine in by.items()))
+
+
+def courts(rows: Sequence[Row]) -> Found:
+    """Return what courts come to, where a robot begins without a wall in sight."""
+    table: Table = [["court", "runs", "floor seen: least, mean", "coverage, own frame: mean", "collisions"]]
+    for world, mine in grouped(rows, "world").items():
+        swept = [row["swept"] for row in mine]
+        own = f"{mean_of(mine, 'coverage_own_frame'):.3f}"
+        cells = [f"`{world}`", str(len(mine)), f"{min(swept):.3f}, {np.mean(swept):.3f}", own]
+        table.append([*cells, str(total(mine, "collisions"))])
+    early = sum(row["status"] == "complete" and row["swept"] < 0.99 for row in rows)
+    return Found(table, f"{early} of {len(rows)} runs ended too early. 3,000 steps do not finish such a building.")
+
+
+def navigation(rows: Sequence[Row]) -> Found:
+    """Return both navigations beside each other, over the plans that both have driven."""
+    by = {name: {row["file"]: row for row in mine} for name, mine in grouped(rows, "navigation").items()}
+    both = sorted(set.intersection(*(set(mine) for mine in by.values())))
+    head = ["navigation", "runs", "complete", "path: sum", "steps: sum", "planning, mean of a step", "collisions"]
+    table: Table = [head]
+    for name, mine in by.items():
+        pairs = [mine[file] for file in both]
+        cells = [f"`{name}`", str(len(pairs)), completed(pairs), f"{total(pairs, 'path_length_m'):.0f} m"]
+        planning = f"{mean_of(pairs, 'planning_ms_mean'):.1f} ms"
+        table.append([*cells, str(total(pairs, "steps")), planning, str(total(pairs, "collisions"))])
+    ratio = [by["visibility"][file]["path_length_m"] / by["floor"][file]["path_length_m"] for file in both]
+    share = float(np.exp(np.mean(np.log(ratio))))
+    return Found(
+        table, f"Sequences of walls are {share:.2f} times as long as the way over the floor, and all complete."
+    )
