@@ -21,6 +21,7 @@ from ..scenario import TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
 from ..scoring.records import Log
 from ..scoring.summary import odometry_path, odometry_poses, pose_nees
+from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
@@ -89,7 +90,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         return files
     smoothed, recorded = result.smoothed, result.recorded
     if smoothed is not None:
-        files["trajectory_smoothed.tum"] = lambda: trajectory(result, log, smoothed.poses_world)
+        files["trajectory_smoothed.tum"] = lambda: tum(*smoothed_path(result, log, smoothed))
     if recorded is None:
         files["trajectory_true.tum"] = lambda: trajectory(result, log, log.true_world)
     else:
@@ -272,6 +273,17 @@ def path_of(
     if recorded is None:
         return log.time_s, poses_world
     scans = recorded.poses_of_scans(poses_world)
+    return recorded.scan_time_s[: len(scans)], scans
+
+
+def smoothed_path(
+    result: TrialResult, log: Log, smoothed: Smoothed
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
+    """Return the same of the smoothed path: a scan between two keyframes knows both."""
+    recorded = result.recorded
+    if recorded is None:
+        return log.time_s, smoothed.poses_world
+    scans = recorded.smoothed_poses_of_scans(smoothed.poses_world)
     return recorded.scan_time_s[: len(scans)], scans
 
 

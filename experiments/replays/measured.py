@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from slam.estimation.backend import PathKeeper
 
-from ..artifacts.results import path_of
+from ..artifacts.results import path_of, smoothed_path
 from ..scoring.records import Log
 from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalised_relations, pair_covs_of
 from ..scoring.without_truth.references import References, scored_by
@@ -28,7 +28,7 @@ def held_against(result: TrialResult, references: References) -> TrialResult:
         return result
     scores = scored_by(references, *path_of(result, log, log.estimated_world))
     if smoothed is not None:
-        of_all = scored_by(references, *path_of(result, log, smoothed.poses_world))
+        of_all = scored_by(references, *smoothed_path(result, log, smoothed))
         scores |= {f"{name}_smoothed": value for name, value in of_all.items()}
     return replace(result, summary=result.summary | scores | _normalised(result, log, references))
 

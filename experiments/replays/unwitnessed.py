@@ -101,4 +101,6 @@ def _own_log(log: Log) -> RecordedLog:
 def every_scan(recording: Recording) -> RecordedLog:
     """Return a recording as a log of which every scan is a keyframe."""
     steps = len(recording)
-    return RecordedLog(recording, recording.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(3))
+    return RecordedLog(
+        recording, recording.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(steps), np.zeros(3)
+    )

@@ -51,6 +51,8 @@ class RecordedLog:
     """The last keyframe at or before each scan."""
     motion_since: Float[np.ndarray, "n 3"]
     """By the wheels, from that keyframe to the scan, m m rad."""
+    share_since: Float[np.ndarray, " n"]
+    """Of the wheels' way from that keyframe to the next one, turns counted as `KeyframesConfig` does; 0 to 1."""
     scanner_on_robot: Float[np.ndarray, "3"]
     """The scanner's pose on the robot, m m rad."""
     trouble: str = ""
@@ -62,8 +64,25 @@ class RecordedLog:
         Scans after the last keyframe given are left out.
         """
         of = self.keyframe_of_scan[self.keyframe_of_scan < len(keyframes_world)]
-        pairs = zip(keyframes_world[of], self.motion_since[: len(of)], strict=True)
-        return np.array([compose(pose, motion) for pose, motion in pairs]).reshape(-1, 3)
+        return _moved(keyframes_world[of], self.motion_since[: len(of)])
+
+    def smoothed_poses_of_scans(self, keyframes_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "n 3"]:
+        """Return the same where each keyframe is known by what came after it: so are the scans before it then.
+
+        What the wheels were wrong by from one keyframe to the next they were wrong by evenly along their way.
+        """
+        of = self.keyframe_of_scan[self.keyframe_of_scan < len(keyframes_world)]
+        found = [compose(inverse(a), b) for a, b in pairwise(keyframes_world)]
+        off = np.array([*found, np.zeros(3)]).reshape(-1, 3)
+        off[:-1] -= self.recording.odometry[1 : len(keyframes_world)]
+        off[:, 2] = wrap(off[:, 2])
+        since = self.motion_since[: len(of)] + self.share_since[: len(of), None] * off[of]
+        return _moved(keyframes_world[of], since)
+
+
+def _moved(poses: Float[np.ndarray, "n 3"], motions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Return each pose after the motion beside it."""
+    return np.array([compose(pose, motion) for pose, motion in zip(poses, motions, strict=True)]).reshape(-1, 3)
 
 
 def gather(scans: Iterator[RawScan], config: KeyframesConfig) -> RecordedLog:
@@ -93,6 +112,9 @@ class _Gathered:
         self._times: list[float] = []
         self._of_scan: list[int] = []
         self._since: list[np.ndarray] = []
+        self._ways: list[float] = []
+        """By the wheels up to each scan, in keyframes' worth of way and turn."""
+        self._before: np.ndarray | None = None
         self._moved: np.ndarray | None = None
         """Where the wheels were at the last scan that had moved far enough; `every` counts these."""
         self._until_next = 1
@@ -135,6 +157,10 @@ class _Gathered:
                 self._until_next = self.config.every
                 self.keyframes.append(scan)
                 self._poses.append(pose)
+        off = np.zeros(3) if self._before is None else compose(inverse(self._before), pose)
+        self._before = pose
+        worth = float(np.hypot(*off[:2])) / self.config.least_m + abs(float(off[2])) / self.config.least_rad
+        self._ways.append(worth + (self._ways[-1] if self._ways else 0.0))
         self._times.append(scan.time_s)
         self._of_scan.append(len(self.keyframes) - 1)
         self._since.append(compose(inverse(self._poses[-1]), pose))
@@ -159,9 +185,17 @@ class _Gathered:
             odometry,
             wheels_cov(odometry, c),
         )
+        of = np.array(self._of_scan)
         return RecordedLog(
-            recording, np.array(self._times), np.array(self._of_scan), np.array(self._since), self._on_robot, trouble
-        )
+            recording, np.array(self._times), of, np.array(self._since), _shares(np.array(self._ways), of),
+            self._on_robot, trouble,
+        )  # fmt: skip
+
+
+def _shares(ways: Float[np.ndarray, " n"], of: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return how far along the way to the next keyframe each scan was taken; 0 after the last one."""
+    at = np.append(ways[np.searchsorted(of, np.arange(of[-1] + 1))], np.inf)
+    return np.asarray((ways - at[of]) / (at[of + 1] - at[of]))
 
 
 def wheels_cov(odometry: Float[np.ndarray, "s 3"], config: KeyframesConfig) -> Float[np.ndarray, "s 3 3"]:

@@ -81,6 +81,22 @@ def test_the_scans_between_keyframes_are_where_the_wheels_say(tmp_path):
     assert len(log.poses_of_scans(start[None])) == np.count_nonzero(log.keyframe_of_scan == 0)
 
 
+def test_what_the_wheels_were_wrong_by_between_two_known_keyframes_is_spread_along_their_way(tmp_path):
+    """The wheels report a tenth too little and turn too far, evenly: all scans between keyframes come out right."""
+    true = np.column_stack([0.04 * np.arange(60), np.zeros(60), np.zeros(60)])
+    wheels = np.column_stack([0.9 * true[:, 0], np.zeros(60), 0.01 * np.arange(60)])
+    log = read(tmp_path, [flaser(*pose, time_s=k) for k, pose in enumerate(wheels)])
+    of_keyframe = np.searchsorted(log.keyframe_of_scan, np.arange(len(log.recording)))
+    assert 4 < len(of_keyframe) < 30
+    found, behind = log.smoothed_poses_of_scans(true[of_keyframe]), log.poses_of_scans(true[of_keyframe])
+    last = of_keyframe[-1]
+    np.testing.assert_allclose(found[:last], true[:last], atol=2e-3)
+    assert np.abs(behind[:last] - true[:last])[:, 2].max() > 0.01
+    np.testing.assert_array_equal(found[last:], behind[last:])
+    np.testing.assert_array_equal(found[of_keyframe], true[of_keyframe])
+    assert len(log.smoothed_poses_of_scans(true[:1])) == np.count_nonzero(log.keyframe_of_scan == 0)
+
+
 def test_what_is_mapped_is_a_recording_that_a_log_of_our_own_may_hold(tmp_path):
     r = read(tmp_path, [flaser(0.2 * k, theta=0.3 * k) for k in range(5)]).recording
     arrays = {name: getattr(r, name) for name in ("time_s", "bearings_rad", "ranges_m", "sigma_m", "odometry")}
