@@ -93,7 +93,7 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
         if floor is not None and not localisation.is_lost:
             floor.see(update.map, scan)
         decides = time.thread_time()
-        seen = np.unique(update.walls_of_segments[update.walls_of_segments >= 0]).tolist()
+        seen = sorted({wall for wall in update.walls_of_segments.tolist() if wall >= 0})
         if not localisation.is_lost:
             graph.observe(update.map, update.chains, followed_wall(update.map), seen)
         around = Surroundings(

@@ -69,7 +69,8 @@ class MapKeeper:
         owners = np.full(len(segments), -1, dtype=np.int64)
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
-        fresh = np.setdiff1d(matches.unmatched, matches.doubtful, assume_unique=True)
+        doubtful = set(matches.doubtful.tolist())
+        fresh = np.array([row for row in matches.unmatched.tolist() if row not in doubtful], dtype=np.int64)
         few, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
         believed = few[self._candidates.see(self.backend.belief.pose_world, segments.take(few))]
         fresh = np.sort(np.concatenate([fresh, believed]))
@@ -78,10 +79,10 @@ class MapKeeper:
             begun = segments.take(fresh)
             cov = begun.cov + cov_of_bows(begun, self.config.walls.reliability.straightness)
             owners[fresh] = self.backend.grow(begun.lines, cov, centres)
-        known = np.unique(owners[sides][owners[sides] >= 0])
+        known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:
-            self.landmarks.change_points.keep_apart(*known.tolist())
-        return owners, np.union1d(owners[believed], known)
+            self.landmarks.change_points.keep_apart(*known)
+        return owners, np.array(sorted({*owners[believed].tolist(), *known}), dtype=np.int64)
 
     def _observed(
         self, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"], believed: Int[np.ndarray, " b"]

@@ -164,7 +164,7 @@ class FloorMemory:
         if old is not None:
             touched_world = to_world(old.touched_robot, old.pose_world)
             driven_world = np.vstack([to_world(old.way_robot, old.pose_world), way_world])
-            driven_world = np.unique(np.round(driven_world, 2), axis=0)
+            driven_world = np.array(sorted(set(map(tuple, np.round(driven_world, 2).tolist()))))
         if self._redrawing is not None:
             self._redrawing.late.append((pose, scan, way_world))
         view = beside(walls, pose[None], [scan], self._config.walls, distances_m[None])[0]

@@ -83,7 +83,7 @@ class Explorer:
     """Holds the present task and the ledger of what was given up."""
 
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
-        self._strategy = strategy
+        self.strategy = strategy
         self._start, self._config = start_world, config
         self._step = -1
         self.start_over()
@@ -103,12 +103,14 @@ class Explorer:
     @strategy.setter
     def strategy(self, strategy: Strategy) -> None:
         self._strategy, self._task = strategy, None
+        # Asked once: what a protocol asks of a class takes longer than most strategies.
+        self._watchful = strategy if isinstance(strategy, Watchful) else None
 
     def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
         """Return what to do next; at the end, which ends are left."""
         self._step += 1
-        if isinstance(self._strategy, Watchful):
-            self._strategy.watch(around)
+        if self._watchful is not None:
+            self._watchful.watch(around)
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
         self._keep_within(around, ends)

@@ -6,17 +6,16 @@ likelihood of f falls into three terms: with w = G' H' S^-1 e, of variance a (1 
 a. So a scan leaves three pairs (a, w), and a window of them tells the likeliest f, and how sure it is that f is not 1.
 """
 
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.backend import Joint, Observations
-from ..geometry.matrix_kernels import whitening
-from ..geometry.poses import rotation
+from ..geometry.compiled import plain
 from ..robot import Odometry
 from .joint_compatibility import NO_NIS, Nis, seen_halfway
+from .kernels import motion_kernels
 
 
 @dataclass(frozen=True)
@@ -53,19 +52,13 @@ def surprise(
     if not len(observed.ids):
         return NO_NIS, None
     seen = seen_halfway(joint, ids, observed)
-    W = whitening(seen.S)
-    e, HG = W @ seen.e, W @ (seen.H_pose.reshape(-1, 3) @ motion_root)
-    a, axes = np.linalg.eigh(HG.T @ HG)
-    innovation = MotionInnovation(np.clip(a, 0.0, 1.0), axes.T @ (HG.T @ e))
-    return Nis(float(e @ e), len(e)), innovation
+    squared, a, w = motion_kernels.surprise(seen.e, seen.H_pose.reshape(-1, 3), seen.S, motion_root)
+    return Nis(squared, len(seen.e)), MotionInnovation(a, w)
 
 
 def motion_root(odometry: Odometry, heading_rad: float) -> Float[np.ndarray, "3 3"]:
     """Return G of a motion, world frame, that ended in a heading; its covariance may be singular."""
-    variances, axes = np.linalg.eigh(odometry.cov)
-    G = np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
-    G[:2] = rotation(heading_rad - odometry.motion[2]) @ G[:2]
-    return G
+    return motion_kernels.motion_root(plain(odometry.cov), float(heading_rad - odometry.motion[2]))
 
 
 class MotionNoise:
@@ -74,7 +67,11 @@ class MotionNoise:
     def __init__(self, config: MotionNoiseConfig = MotionNoiseConfig()) -> None:
         self.factor = 1.0
         self._config = config
-        self._seen: deque[MotionInnovation] = deque(maxlen=config.window)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin the window anew."""
+        self._gains, self._scans = np.zeros((self._config.window, len(FACTORS))), 0
 
     def believed(self, odometry: Odometry) -> Odometry:
         """Return odometry with the noise that it is taken to have."""
@@ -82,17 +79,17 @@ class MotionNoise:
 
     def see(self, innovation: MotionInnovation) -> None:
         """Weigh one scan more; changes `factor` where all in the window leave no doubt."""
-        self._seen.append(innovation)
-        gains = gains_of(np.array([one.a for one in self._seen]), np.array([one.w for one in self._seen]))
+        self._gains[self._scans % self._config.window] = gains_of(innovation)
+        self._scans += 1
+        gains = self._gains.sum(axis=0)
         best = int(np.argmax(gains))
         if gains[best] > -np.log(self._config.chance):
             factor = max(1.0, self.factor * float(FACTORS[best]))
             if factor != self.factor:
                 self.factor = factor
-                self._seen.clear()
+                self._forget()
 
 
-def gains_of(a: Float[np.ndarray, "n 3"], w: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " f"]:
-    """Return by how much each of `FACTORS` raises the log-likelihood of n scans over that of the believed noise."""
-    c = FACTORS[:, None, None] ** 2 - 1.0
-    return np.asarray(0.5 * np.sum(c * w**2 / (1.0 + c * a) - np.log1p(c * a), axis=(1, 2)))
+def gains_of(innovation: MotionInnovation) -> Float[np.ndarray, " f"]:
+    """Return by how much each of `FACTORS` raises the log-likelihood of one scan over that of the believed noise."""
+    return motion_kernels.gains(innovation.a, innovation.w, FACTORS)

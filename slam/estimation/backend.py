@@ -6,6 +6,7 @@ wall where it was seen, not to the world's origin. The anchor c = 0 is the paper
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -62,11 +63,13 @@ class Belief:
     query: Callable[[Int[np.ndarray, " m"]], Joint]
     """How the back end answers `joint`; raises `StaleBeliefError` once it has moved on."""
 
-    @property
+    @cached_property
     def lines_world(self) -> Float[np.ndarray, "n 2"]:
-        """The lines in the paper's Hessian form (alpha, r), world frame."""
+        """The lines in the paper's Hessian form (alpha, r), world frame. Read-only."""
         r = self.means[:, 1] + np.vecdot(normals(self.means[:, 0]), self.anchors)
-        return np.stack([self.means[:, 0], r], axis=-1)
+        lines = np.stack([self.means[:, 0], r], axis=-1)
+        lines.flags.writeable = False
+        return lines
 
     def rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return where the ids stand in `ids`; raises KeyError for an id that is not in the map."""

@@ -61,12 +61,17 @@ class Extents:
             whole=0,
         )
 
-    def map(self, belief: Belief, crooked: Bool[np.ndarray, " n"]) -> StochasticMap:
-        """Return the belief together with the extents."""
+    def map(
+        self,
+        belief: Belief,
+        crooked: Bool[np.ndarray, " n"],
+        off_line_cov: Float[np.ndarray, "n 2 2"] | None = None,
+    ) -> StochasticMap:
+        """Return the belief together with the extents, and how far walls may be from their lines."""
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
         tentative = observations < self._config.trusted_observations
         whole = self._records.columns["whole"] >= self._config.trusted_observations
-        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole)
+        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
     def see(
         self,
@@ -94,7 +99,7 @@ class Extents:
         scans = self._config.contradictions
         uncover(used, owners, segments.ends, segments.end_kinds, rows, *lines, *kept, margin, scans)
         observations, last_seen = columns["observations"], columns["last_seen"]
-        observations[np.unique(rows)] += 1
+        observations[rows] += 1  # of a wall with two segments, too, by one: the sum is taken before it is stored
         observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)
         last_seen[rows] = self._scans
         self._weigh(belief, scan, segments, owners)

@@ -1,6 +1,6 @@
 """All that is known of the walls of one map beside their lines: observed, merged and removed in one place."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int
@@ -44,10 +44,10 @@ class Landmarks:
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
-        walls = self.extents.map(belief, self.reliability.are_crooked(self.records.ids))
         across, turned = self.reliability.misfits(self.records.ids)
         straightness = float(self._straightness.edge_m), float(self._straightness.face_m)
-        return replace(walls, off_line_cov=off_line_cov(walls.extents, across, turned, *straightness))
+        cov = off_line_cov(self.records.columns["extents"], across, turned, *straightness)
+        return self.extents.map(belief, self.reliability.are_crooked(self.records.ids), cov)
 
     def observe(
         self,
@@ -64,6 +64,8 @@ class Landmarks:
         self.records.rows(belief.ids)
         self.reliability.see(segments, owners, belief.pose_world)
         forgotten = self.extents.see(belief, scan, segments, owners, believed)
+        if not len(forgotten):
+            return Observed(owners, forgotten)
         self.records.remove(forgotten)
         return Observed(np.where(np.isin(owners, forgotten), -1, owners), forgotten)
 

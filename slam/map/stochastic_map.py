@@ -1,7 +1,7 @@
 """The map: a belief about lines, and how far along each line its wall has been seen."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -41,16 +41,8 @@ class StochasticMap:
         """The map of a back end's own belief, with one that states how far walls may be from their lines as well."""
         if self.off_line_cov is None:
             return self
-        belief, blocks = self.belief, self.off_line_cov
-
-        def query(ids: Int[np.ndarray, " m"]) -> Joint:
-            joint, rows = belief.query(ids), np.arange(len(ids))
-            cov = joint.cov.copy()
-            lines = cov[POSE:, POSE:].reshape(len(ids), 2, len(ids), 2)
-            lines[rows, :, rows] += blocks[belief.rows(ids)]
-            return replace(joint, cov=cov)
-
-        return replace(self, belief=replace(belief, query=query))
+        query = partial(_joint_off_lines, self.belief, self.off_line_cov)
+        return replace(self, belief=replace(self.belief, query=query))
 
     @property
     def established(self) -> Bool[np.ndarray, " n"]:
@@ -73,3 +65,12 @@ class StochasticMap:
     def distances_m(self) -> Float[np.ndarray, " n"]:
         """How far each wall is from where the belief puts the robot."""
         return wall_kernels.distances(self.belief.pose_world[:2], self.ends_world)
+
+
+def _joint_off_lines(belief: Belief, off_line_cov: Float[np.ndarray, "n 2 2"], ids: Int[np.ndarray, " m"]) -> Joint:
+    """Return the joint Gaussian of a belief, with how far its n walls may be from their lines added."""
+    joint, rows = belief.query(ids), np.arange(len(ids))
+    cov = joint.cov.copy()
+    lines = cov[POSE:, POSE:].reshape(len(ids), 2, len(ids), 2)
+    lines[rows, :, rows] += off_line_cov[belief.rows(ids)]
+    return replace(joint, cov=cov)

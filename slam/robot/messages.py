@@ -122,12 +122,12 @@ class Scan:
             return sigmas
         return np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
 
-    @property
+    @cached_property
     def step_rad(self) -> float:
         """The angle between neighbouring beams."""
         return float((self.bearings_rad[-1] - self.bearings_rad[0]) / (len(self.bearings_rad) - 1))
 
-    @property
+    @cached_property
     def is_full_turn(self) -> bool:
         """Whether the first beam follows the last one (a 360 degree scanner)."""
         return bool(len(self.bearings_rad) * self.step_rad > 2 * np.pi - 0.5 * self.step_rad)

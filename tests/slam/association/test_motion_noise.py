@@ -58,7 +58,7 @@ def test_the_gain_in_likelihood_is_that_of_the_dense_gaussians(seed):
     HG = seen.H_pose.reshape(-1, 3) @ G
     stated = multivariate_normal.logpdf(seen.e, cov=seen.S)
     wider = [multivariate_normal.logpdf(seen.e, cov=seen.S + (f**2 - 1.0) * HG @ HG.T) for f in FACTORS]
-    np.testing.assert_allclose(gains_of(innovation.a[None], innovation.w[None]), np.array(wider) - stated, rtol=1e-6)
+    np.testing.assert_allclose(gains_of(innovation), np.array(wider) - stated, rtol=1e-6)
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
@@ -99,9 +99,12 @@ def test_wheels_that_slip_more_are_found_out_within_fifty_scans_and_by_how_much(
         np.testing.assert_allclose(noise.believed(Odometry(np.ones(3), np.eye(3))).cov, noise.factor**2 * np.eye(3))
 
 
-def test_the_root_of_a_motion_stands_in_the_world():
+@pytest.mark.parametrize("axes", [[0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2], []])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_the_root_of_a_motion_stands_in_the_world(axes, mixed):
+    """Of a motion whose noise has all axes or only some of them, its own or any."""
     rng = np.random.default_rng(1)
-    root = rng.standard_normal((3, 2))
+    root = (rng.standard_normal((3, 3)) if mixed else np.diag([2.0, 0.5, 1.0]))[:, axes]
     odometry = Odometry(np.array([0.1, 0.0, 0.3]), root @ root.T)
     G = motion_root(odometry, 1.0)
     R = np.eye(3)
