@@ -173,6 +173,8 @@ rules: setup
 	$(BIN)/python -m studies.rules.report
 
 rules-held: setup
+	$(BIN)/python -m studies.rules.held --plain --slowest-s 4 --tries 40 --out studies/rules/held.jsonl \
+	    --tests tests/slam/association tests/slam/odometry tests/experiments/replays tests/sim/logs tests/explore/goals
 	$(BIN)/python -m studies.rules.held --out studies/rules/held.jsonl
 	$(BIN)/python -m studies.rules.report
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numba import config
 
+HERE = Path(__file__).parents[2]
 MARKS = "«»"
 """Around the expression that is the rule."""
 
@@ -102,17 +102,26 @@ def put_in(source: str, switches: Sequence[Switch]) -> str:
     return source
 
 
+def source_of(module: str) -> str:
+    """Return a module's source as it stands in this checkout, without loading it or its package; '' for none."""
+    path = HERE.joinpath(*module.split(".")).with_suffix(".py")
+    return path.read_text() if path.exists() else ""
+
+
 def fitting(switches: Iterable[Switch]) -> list[Switch]:
-    """Return the switches whose rule stands once in the source that Python would load; name the others on stderr."""
+    """Return the switches whose rule stands once in its module; name the others on stderr."""
     found = []
     for switch in switches:
-        spec = find_spec(switch.module)
-        origin = spec.origin if spec is not None else None
-        if origin is not None and Path(origin).read_text().count(switch.source) == 1:
+        if source_of(switch.module).count(switch.source) == 1:
             found.append(switch)
         else:
             print(f"{switch.name} is not in {switch.module} any more: see studies/rules/", file=sys.stderr)
     return found
+
+
+def is_kernel(switch: Switch) -> bool:
+    """Return whether a rule stands in a compiled loop."""
+    return "@compiled" in source_of(switch.module)
 
 
 class _Loader(SourceFileLoader):
@@ -145,11 +154,13 @@ class _Finder(MetaPathFinder):
 def install(switches: Iterable[Switch]) -> None:
     """Put the switches into modules that are loaded from now on; raises RuntimeError where one is loaded already.
 
-    Kernels run as the plain Python that they are: machine code could not ask what is off.
+    Where one stands in a kernel, all kernels run as the plain Python that they are: machine code could not ask what is
+    off.
     """
-    os.environ["NUMBA_DISABLE_JIT"] = "1"
-    config.DISABLE_JIT = True  # type: ignore[attr-defined]
     chosen = list(switches)
+    if any(map(is_kernel, chosen)):
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        config.DISABLE_JIT = True  # type: ignore[attr-defined]
     early = {switch.module for switch in chosen} & sys.modules.keys()
     if early:
         raise RuntimeError(f"expected no module with switches to be loaded yet, found {sorted(early)}")

@@ -1,13 +1,12 @@
 """Loops of simulated drives with drift are closed, aliases are refused, and a wrong closure is taken back."""
 
 from dataclasses import replace
-from itertools import pairwise
+from functools import cache
 
 import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
 from slam.association.second_looks.closures import Closure, Drive, held, settled
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.correlation_kernels import best_in_blocks, largest_ahead, mean_at
@@ -15,71 +14,22 @@ from slam.association.second_looks.loop_search import LoopSearch
 from slam.association.second_looks.submap_match import Window, place_on
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
+from tests.slam.association.drives import drifting, followed, motions_of, off_m, returns_at, round_the_ring
 
 CONFIG = SecondLooksConfig()
 PLACES = CONFIG.closures
-NICHES = [(2, -0.8, 3, 0), (7, -0.5, 8.5, 0), (11.9, 3, 13, 4), (4, 8, 5.5, 8.6), (9, 8, 10, 9), (-0.7, 5, 0, 6)]
-RING = shapely.box(0, 0, 12, 8).difference(shapely.box(2, 2, 10, 6)).union(
-    shapely.union_all([shapely.box(*niche) for niche in NICHES])
-)  # fmt: skip
-"""A corridor around a block, 2 m wide, with niches of which no two are alike."""
 
 
-def faces_of(polygon):
-    polygon = shapely.orient_polygons(polygon)
-    rings = [polygon.exterior, *polygon.interiors]
-    corners = [shapely.get_coordinates(ring) for ring in rings]
-    return np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in corners])
-
-
-def round_the_ring(step_m=0.4, laps=1.4):
-    """Poses along the middle of the corridor."""
-    corners = shapely.LinearRing([(1, 1), (11, 1), (11, 7), (1, 7)])
-    along = np.arange(0.0, laps * corners.length, step_m)
-    at = shapely.get_coordinates([corners.interpolate(s % corners.length) for s in along])
-    ahead = shapely.get_coordinates([corners.interpolate((s + 0.3) % corners.length) for s in along])
-    heading = np.arctan2(*(ahead - at).T[::-1])
-    return np.column_stack([at, heading])
-
-
-def returns_at(poses, seed=0, reach_m=3.9):
-    finder = RangeFinder(faces_of(RING), LidarConfig())
-    rng = np.random.default_rng(seed)
-    found = []
-    for pose in poses:
-        ranges = finder.cast(pose)[0] + 0.01 * rng.standard_normal(len(finder.bearings_rad))
-        near = ranges < reach_m
-        bearings = finder.bearings_rad[near]
-        found.append(ranges[near, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
-    return found
-
-
-def drifting(true, turn_a_step=0.004, seed=3):
-    rng = np.random.default_rng(seed)
-    motions = np.array([compose(inverse(a), b) for a, b in pairwise(true)])
-    return motions + rng.normal(0.0, [0.005, 0.005, 0.002], motions.shape) + [0.0, 0.0, turn_a_step]
-
-
-def followed(start, motions):
-    poses = [start]
-    for motion in motions:
-        poses.append(compose(poses[-1], motion))
-    return np.array(poses)
-
-
-def off_m(poses, true):
-    return np.hypot(*(poses - true)[:, :2].T)
-
-
-@pytest.fixture(scope="module")
+@cache
 def ring():
+    """A drive of 1.4 laps and its search; no fixture, so that a test without a rule searches without it."""
     true = round_the_ring()
     motions = drifting(true)
     return true, motions, LoopSearch(true[0], motions, Returns(returns_at(true), PLACES), CONFIG)
 
 
-def test_a_loop_is_closed_although_the_path_came_apart_by_far_more_than_any_gate(ring):
-    true, motions, search = ring
+def test_a_loop_is_closed_although_the_path_came_apart_by_far_more_than_any_gate():
+    true, motions, search = ring()
     assert off_m(followed(true[0], motions), true).max() > 1.5
     assert len(search.closures) >= 4
     for each in search.closures:
@@ -102,8 +52,8 @@ def test_a_turn_that_nobody_reported_is_found():
     assert off_m(settled(search.poses, search.drive, search.closures, CONFIG), true).max() < 0.15
 
 
-def test_one_finding_alone_closes_nothing(ring):
-    true, motions, _ = ring
+def test_one_finding_alone_closes_nothing():
+    true, motions, _ = ring()
     alone = replace(CONFIG, closures=replace(PLACES, every_m=5.0))
     once = LoopSearch(true[0], motions, Returns(returns_at(true), PLACES), alone)
     assert once._found
@@ -136,7 +86,7 @@ def test_equal_rooms_close_no_loop():
     away = np.column_stack([np.full(24, 0.6), 1.0 - np.abs(np.arange(24) - 12.0) + 12.0, np.zeros(24)])
     back = np.column_stack([0.2 + 0.3 * np.arange(4), np.full(4, 1.0), np.zeros(4)])
     poses = np.concatenate([true, away, back, back])
-    motions = np.array([compose(inverse(a), b) for a, b in pairwise(poses)])
+    motions = motions_of(poses)
     nothing, both = np.zeros((0, 2)), np.concatenate([room(0.0), room(1.6)])
     points = [to_robot(both if k < 8 else nothing if k < 32 else room(0.0), poses[k]) for k in range(len(poses))]
     small = replace(PLACES, least_points=50)
@@ -146,8 +96,8 @@ def test_equal_rooms_close_no_loop():
     assert LoopSearch(poses[0], motions, Returns(one, small), replace(CONFIG, closures=small))._found
 
 
-def test_a_wrong_closure_is_taken_back_where_others_contradict_it(ring):
-    true, motions, search = ring
+def test_a_wrong_closure_is_taken_back_where_others_contradict_it():
+    true, motions, search = ring()
     wrong = Closure(20, 100, np.array([0.1, 0.2, 0.3]))
     closures = [wrong, *search.closures]
     misled = settled(followed(true[0], motions), Drive(motions), [wrong], CONFIG)

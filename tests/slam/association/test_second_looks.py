@@ -6,11 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from slam.association.second_looks.closures import Drive
+from slam.association.second_looks.closures import Closure, Drive
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.landmarks import associated, firm, joined
-from slam.association.second_looks.second_looks import second_looks
+from slam.association.second_looks.loop_search import LoopSearch
+from slam.association.second_looks.second_looks import _with_walls, second_looks
 from slam.association.second_looks.solve import begun, normal_equations, of_links, of_sightings, solved
+from slam.association.second_looks.submaps import Returns
 from slam.association.second_looks.walls import merged, spans, surveyed
 from slam.extraction.segments import Segments
 from slam.geometry.lines import lines_to_world, through
@@ -35,13 +37,13 @@ def segments_at(pose, rng, walls=WALLS):
     )  # fmt: skip
 
 
-def drive(count=60, seed=1, walls=WALLS):
-    """True poses round a room, and what odometry makes of them: a drift of half a metre."""
+def drive(count=60, seed=1, walls=WALLS, worse=1.0):
+    """True poses round a room, and what odometry makes of them: a drift of a fifth of a metre, or times as much."""
     rng = np.random.default_rng(seed)
     turn = np.linspace(0.0, 4.0 * np.pi, count)
     true = np.column_stack([3 + 2 * np.cos(turn), 2.6 + np.sin(turn), wrap(turn)])
     motions = np.array([compose(inverse(a), b) for a, b in pairwise(true)])
-    motions += rng.normal(0.0, [0.01, 0.01, 0.004], (count - 1, 3))
+    motions += worse * rng.normal(0.0, [0.01, 0.01, 0.004], (count - 1, 3))
     poses = [true[0]]
     for motion in motions:
         poses.append(compose(poses[-1], motion))
@@ -62,6 +64,15 @@ def test_a_drift_goes_that_no_filter_had_a_say_in():
     assert after.max() < 0.02
     assert np.abs(wrap(found[:, 2] - true[:, 2])).max() < 0.005
     np.testing.assert_allclose(found[0], drifted[0], atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_a_drift_of_far_more_than_the_last_gate_goes(seed):
+    true, drifted, motions, segments = drive(seed=seed, worse=3.0)
+    assert np.hypot(*(drifted - true)[:, :2].T).max() > 4.0 * CONFIG.gates_m[-1] > CONFIG.gates_m[0]
+    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(true))
+    assert np.hypot(*(survey.poses - true)[:, :2].T).max() < 0.04
+    assert len(survey.walls) == len(WALLS)
 
 
 def test_one_scan_after_a_slip_that_nobody_told_does_not_bend_the_others():
@@ -211,3 +222,73 @@ def test_a_drive_without_a_wall_follows_its_motions():
     _, drifted, motions, segments = drive(5)
     nothing = [each.take(np.zeros(0, dtype=np.int64)) for each in segments]
     np.testing.assert_allclose(looked(drifted, motions, nothing), drifted, atol=1e-9)
+
+
+@pytest.mark.parametrize(("beams", "degrees", "taken"), [(5, 1.0, 0), (6, 1.0, 2), (6, 2.9, 2), (6, 3.1, 0)])
+def test_segments_of_few_beams_or_of_unclear_direction_are_left_out(beams, degrees, taken):
+    rng = np.random.default_rng(0)
+    seen = segments_at(drive(2)[0][0], rng, np.array([[[2, 1], [4, 1]], [[2, 3], [4, 3]]], float))
+    cov = seen.cov.copy()
+    cov[:, 0, 0] = np.deg2rad(degrees) ** 2
+    assert len(firm(0, replace(seen, beam_counts=np.full(2, beams), cov=cov), CONFIG)) == taken
+
+
+def test_of_two_lines_a_segment_is_of_the_nearer():
+    true, _, _, _ = drive(4)
+    rng = np.random.default_rng(0)
+    near, far = np.array([[2, 1], [4, 1]], float), np.array([[2, 1.2], [4, 1.2]], float)
+    shown = [np.array([far, near]), np.array([far, near]), np.array([far, near]), near[None] + [0.0, 0.04]]
+    narrow = joined([firm(k, segments_at(true[k], rng, shown[k]), CONFIG) for k in range(4)])
+    begun_at = associated(narrow, true, 0.1, CONFIG)
+    np.testing.assert_array_equal(begun_at, [0, 1, 0, 1, 0, 1, 1])
+    later = joined([firm(k, segments_at(true[k], rng, shown[k]), CONFIG) for k in (0, 3)])
+    few = replace(CONFIG, least_sightings=1)
+    np.testing.assert_array_equal(associated(later, true, 0.19, few), [0, 1, 1])
+
+
+def test_one_sighting_is_no_surer_than_a_real_wall_is_straight():
+    """Off by as much as real walls are, a sighting without any noise of its own is off by one standard deviation."""
+    true, _, _, sightings, owner = problem()
+    exact = replace(sightings, sigma_rad=np.zeros(len(sightings)), sigma_m=np.zeros(len(sightings)))
+    start = begun(true, exact, owner)
+    before = of_sightings(start, exact, owner, CONFIG).errors
+    for column, floor in enumerate([CONFIG.floor_rad, CONFIG.floor_m]):
+        lines = start.lines.copy()
+        lines[:, column] -= floor
+        errors = of_sightings(replace(start, lines=lines), exact, owner, CONFIG).errors
+        np.testing.assert_allclose((errors - before)[:, column], 1.0, atol=1e-6)
+
+
+def test_the_two_faces_of_a_thin_wall_and_pieces_apart_on_one_line_stay_walls_of_their_own():
+    true, _, _, _ = drive(4)
+    walls = np.array([[[2, 1], [4, 1]], [[4, 1.1], [2, 1.1]], [[6, 1], [8, 1]]], float)
+    rng = np.random.default_rng(0)
+    sightings = joined([firm(k, segments_at(pose, rng, walls), CONFIG) for k, pose in enumerate(true)])
+    owner = np.tile([0, 1, 2], 4)
+    start = begun(true, sightings, owner)
+    np.testing.assert_array_equal(merged(start, spans(start, sightings, owner), owner, CONFIG), owner)
+
+
+def test_pieces_of_a_wall_that_later_scans_join_are_one_wall_in_the_end():
+    true, drifted, motions, segments = drive(30)
+    rng = np.random.default_rng(2)
+    whole, left, right = (
+        np.array([[a, b]], float) for a, b in (([6, 0], [0, 0]), ([6, 0], [3.5, 0]), ([2.5, 0], [0, 0]))
+    )
+    shown = [left] * 8 + [right] * 8 + [whole] * 14
+    segments = [
+        segments_at(pose, rng, np.concatenate([wall, WALLS[1:]])) for pose, wall in zip(true, shown, strict=True)
+    ]
+    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(true))
+    assert len(survey.walls) == len(WALLS)
+
+
+def test_a_closure_that_only_walls_contradict_is_taken_back():
+    true, _, motions, segments = drive()
+    wrong = compose(inverse(true[5]), true[35]) + np.array([0.0, 0.6, 0.0])
+    search = LoopSearch(true[0], motions, Returns([np.zeros((0, 2))] * len(true), CONFIG.closures), CONFIG)
+    search.closures.append(Closure(5, 35, wrong))
+    sightings = joined([firm(k, each, CONFIG) for k, each in enumerate(segments)])
+    survey = _with_walls(search, sightings, CONFIG)
+    assert survey.closures == 0
+    assert np.hypot(*(survey.poses - true)[:, :2].T).max() < 0.02
