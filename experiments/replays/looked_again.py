@@ -5,6 +5,7 @@ from typing import Any
 
 from explore.certificate import certify
 from explore.step import Step
+from slam.association.second_looks.closures import Drive
 from slam.association.second_looks.second_looks import Survey, second_looks
 from slam.evaluation.doubles import doubles
 from slam.extraction.extract import extract
@@ -33,7 +34,8 @@ def looked_again(result: TrialResult) -> TrialResult:
     on_body = result.scenario.config.robot.scanner
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
-    survey = second_looks(log.estimated_world[0], log.odometry[1:], segments, returns, mission.second_looks)
+    drive = Drive(log.odometry[1:], log.odometry_cov[1:])
+    survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks)
     return _mapped(result, log, last, survey)
 
 

@@ -20,15 +20,10 @@ class ScanMatchingConfig:
     scan would match the gaps between the beams of the one before."""
     kernel_m: float = 0.06
     """How fast the likelihood falls with the distance from a point, as a standard deviation."""
-    least_m: float = 0.15
-    """The search goes at least so far to each side of where the wheels say, or by `share` of the motion."""
-    least_rad: float = float(np.deg2rad(6.0))
-    """The same for the turn."""
-    share: float = 0.5
+    gate_sigmas: float = 3.0
+    """The search goes so many standard deviations of the wheels to each side of where they say."""
     step_rad: float = float(np.deg2rad(1.0))
     """Between two turns that are tried; places are tried cell by cell."""
-    penalty: float = 0.02
-    """Score that a place at the rim of the search must be better by than one where the wheels say."""
     slip_score: float = 0.5
     """A match whose points score less on the mean is no match: the wheels have slipped, and the search goes wide."""
     slip_rad: float = float(np.deg2rad(54.0))

@@ -64,20 +64,25 @@ class ScanMatcher:
     def _matched(self, points: Float[np.ndarray, "n 2"], guess: Float[np.ndarray, "3"], wheels: Odometry) -> Odometry:
         c = self._config
         before = thinned(np.concatenate(self._points), 0.5 * c.cell_m)
-        half_m = max(c.least_m, c.share * float(np.hypot(*wheels.motion[:2])))
-        half_rad = max(c.least_rad, c.share * abs(float(wheels.motion[2])))
-        farthest = float(np.hypot(*points.T).max())
-        field = self._field(before, guess, farthest + half_m, half_m)
-        pose, score = self._best(field, points, Window(guess, half_m, half_rad, c.step_rad, c.penalty))
         wheels_cov = wheels.cov + np.diag([1e-8, 1e-8, 1e-10])
-        if score < c.slip_score:
-            found, better = self._best(field, points, Window(guess, half_m, c.slip_rad, c.step_rad, c.penalty))
-            if better >= c.slip_score:
-                pose, score = found, better
-                wheels_cov = wheels_cov + np.diag([half_m**2, half_m**2, c.slip_rad**2])
-                self.slips += 1
         R = np.eye(3)
         R[:2, :2] = rotation(self._pose[2])
+        half_m = max(c.gate_sigmas * float(np.sqrt(np.trace(wheels_cov[:2, :2]) / 2)), c.cell_m)
+        half_rad = max(c.gate_sigmas * float(np.sqrt(wheels_cov[2, 2])), c.step_rad)
+        farthest = float(np.hypot(*points.T).max())
+        field = self._field(before, guess, farthest + half_m, half_m)
+        # So much log-likelihood is one unit of the score: both fall alike about the best place.
+        worth = c.independent * len(points) * (c.kernel_m / c.sigma_m) ** 2
+        P = R @ np.linalg.inv(wheels_cov) @ R.T / worth
+        pose, score = self._best(field, points, Window(guess, half_m, half_rad, c.step_rad, P))
+        if score < c.slip_score:
+            slipped = wheels_cov + np.diag([half_m**2, half_m**2, c.slip_rad**2])
+            P = R @ np.linalg.inv(slipped) @ R.T / worth
+            found, better = self._best(field, points, Window(guess, half_m, c.slip_rad, c.step_rad, P))
+            if better >= c.slip_score:
+                pose, score = found, better
+                wheels_cov = slipped
+                self.slips += 1
         prior = np.linalg.inv(wheels_cov)
         normals, known = surface_normals(points, c.surface_m)
         earlier = sorted_into_buckets(before, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)

@@ -16,8 +16,8 @@ class Window(NamedTuple):
     half_m: float
     half_rad: float
     step_rad: float
-    penalty: float
-    """What a pose at the rim loses, growing with the square of the distance from the guess."""
+    precision: Float[np.ndarray, "3 3"]
+    """Of the guess, in units of the score: a pose loses half the square of its distance by it."""
 
 
 @compiled
@@ -27,18 +27,21 @@ def correlate(
     """Return the best pose of a window, to a cell and a step of the turn, and its mean likelihood."""
     reach = max(int(np.ceil(window.half_m / field.cell_m)), 1)
     turns = max(int(np.ceil(window.half_rad / window.step_rad)), 1)
+    P = window.precision
     best, best_pose, likelihood = -np.inf, window.guess.copy(), 0.0
     for turn in range(-turns, turns + 1):
-        found = _shifted(field, points_robot, window.guess, turn * window.step_rad, reach)
+        z = turn * window.step_rad
+        found = _shifted(field, points_robot, window.guess, z, reach)
         for dy in range(-reach, reach + 1):
             for dx in range(-reach, reach + 1):
-                far = (dx * dx + dy * dy) / (reach * reach) + (turn / turns) ** 2
-                value = found[dy + reach, dx + reach] - window.penalty * far
+                x, y = field.cell_m * dx, field.cell_m * dy
+                off = P[0, 0] * x * x + P[1, 1] * y * y + P[2, 2] * z * z
+                off += 2.0 * (P[0, 1] * x * y + P[0, 2] * x * z + P[1, 2] * y * z)
+                value = found[dy + reach, dx + reach] - 0.5 * off
                 if value > best:
                     best, likelihood = value, found[dy + reach, dx + reach]
-                    best_pose[0] = window.guess[0] + field.cell_m * dx
-                    best_pose[1] = window.guess[1] + field.cell_m * dy
-                    best_pose[2] = window.guess[2] + turn * window.step_rad
+                    best_pose[0], best_pose[1] = window.guess[0] + x, window.guess[1] + y
+                    best_pose[2] = window.guess[2] + z
     return best_pose, likelihood
 
 

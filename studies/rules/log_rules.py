@@ -75,7 +75,7 @@ PLACES = (
     Switch("submaps.joined", "slam.association.second_looks.submaps",
            "thinned(«joined(each, c.cell_m, c.gap_m)», 0.5 * c.cell_m)",
            "each", "neighbouring returns of one surface have a surface between them"),
-    Switch("closures.slips", CLOSED, "sigmas[«np.array(self.slipped, dtype=np.int64) - 1»] =",
+    Switch("closures.slips", CLOSED, "covs[«np.array(self.slipped, dtype=np.int64) - 1»] =",
            "on()[:0]", "a motion in which the robot slipped holds little"),
     Switch("closures.doubts", CLOSED, "for doubt in «config.closures.doubts»:",
            "config.closures.doubts[-1:]", "closures count all at first, then only as they agree"),

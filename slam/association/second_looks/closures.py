@@ -8,7 +8,10 @@ from jaxtyping import Float
 
 from .config import ClosuresConfig, SecondLooksConfig
 from .landmarks import NO_SIGHTINGS
-from .solve import Links, of_links, solved, without_lines
+from .solve import Links, of_links, solved, whiteners, without_lines
+
+LEAST_COV = np.diag([1e-8, 1e-8, 1e-10])
+"""Wheels may state that they never go sideways."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +28,17 @@ class Drive:
     """The motions from each scan to the next, robot frame, and the scans before which the robot slipped."""
 
     motions: Float[np.ndarray, "t 3"]
+    covs: Float[np.ndarray, "t 3 3"]
+    """Of each motion, as it is stated."""
     slipped: Sequence[int] = ()
 
     def links(self, doubt: float, config: SecondLooksConfig) -> Links:
         """Return the motions as links that count less from so many standard deviations on; slips hold little."""
-        sigmas = np.tile([config.odometry_m, config.odometry_m, config.odometry_rad], (len(self.motions), 1))
-        sigmas[np.array(self.slipped, dtype=np.int64) - 1] = [*[config.closures.slip_m] * 2, config.closures.slip_rad]
+        slip = np.diag(np.square([*[config.closures.slip_m] * 2, config.closures.slip_rad]))
+        covs = self.covs / config.understated + LEAST_COV
+        covs[np.array(self.slipped, dtype=np.int64) - 1] = slip
         at = np.arange(len(self.motions))
-        return Links(at, at + 1, self.motions, sigmas, doubt)
+        return Links(at, at + 1, self.motions, whiteners(covs), doubt)
 
 
 def closure_links(closures: Sequence[Closure], doubt: float, config: ClosuresConfig) -> Links:
@@ -41,7 +47,7 @@ def closure_links(closures: Sequence[Closure], doubt: float, config: ClosuresCon
         np.array([each.old for each in closures], dtype=np.int64),
         np.array([each.new for each in closures], dtype=np.int64),
         np.array([each.motion for each in closures]).reshape(-1, 3),
-        np.tile([config.sigma_m, config.sigma_m, config.sigma_rad], (len(closures), 1)),
+        np.tile(np.diag(1.0 / np.array([config.sigma_m, config.sigma_m, config.sigma_rad])), (len(closures), 1, 1)),
         doubt,
     )
 

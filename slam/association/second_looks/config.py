@@ -103,10 +103,9 @@ class SecondLooksConfig:
     """Real walls are not straighter than this ..."""
     floor_m: float = 0.02
     """... nor smoother."""
-    odometry_m: float = 0.015
-    """Standard deviation of the matched motion between two scans, across both axes ..."""
-    odometry_rad: float = 0.004
-    """... and of its turn."""
+    understated: float = 4.0
+    """So many times as much as matching states is known of a motion: it says less, since a filter uses its scan again.
+    By the paths of Intel it is three to five times as much."""
     doubt: float = 2.0
     """From so many standard deviations on an observation counts less and less (Cauchy's weight)."""
     iterations: int = 6

@@ -28,13 +28,15 @@ class LoopSearch:
     def __init__(
         self,
         start_world: Float[np.ndarray, "3"],
-        motions: Float[np.ndarray, "t 3"],
+        drive: Drive,
         returns: Returns,
         config: SecondLooksConfig,
     ) -> None:
+        motions = drive.motions
         self.poses = np.tile(start_world, (len(motions) + 1, 1))
         self.closures: list[Closure] = []
-        self._motions, self._returns, self._config = motions.copy(), returns, config
+        self._motions, self._covs = motions.copy(), drive.covs
+        self._returns, self._config = returns, config
         self._slipped: list[int] = []
         self._found: list[Closure] = []
         """What the searches found, believed or not."""
@@ -49,7 +51,7 @@ class LoopSearch:
     @property
     def drive(self) -> Drive:
         """The motions, those of slips as closures tell them."""
-        return Drive(self._motions, self._slipped)
+        return Drive(self._motions, self._covs, self._slipped)
 
     def _go_to(self, scan: int) -> None:
         c = self._config.closures
@@ -152,5 +154,5 @@ class LoopSearch:
             slip, moved = between[-1], compose(put, inverse(self.poses[new]))
             self.poses[slip : new + 1] = [compose(moved, pose) for pose in self.poses[slip : new + 1]]
             self._motions[slip - 1] = compose(inverse(self.poses[slip - 1]), self.poses[slip])
-        so_far = Drive(self._motions[:new], self._slipped)
+        so_far = Drive(self._motions[:new], self._covs[:new], self._slipped)
         self.poses[: new + 1] = settled(self.poses[: new + 1], so_far, self.closures, self._config)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from ...estimation.backend import Joint
 from ...extraction.segments import Segments
 from ...map.stochastic_map import StochasticMap
-from .closures import closure_links, held, settled
+from .closures import Drive, closure_links, held, settled
 from .config import SecondLooksConfig
 from .landmarks import Sightings, associated, firm, joined
 from .loop_search import LoopSearch
@@ -38,17 +38,17 @@ class Survey:
 
 def second_looks(
     start_world: Float[np.ndarray, "3"],
-    motions: Float[np.ndarray, "t 3"],
+    drive: Drive,
     segments: Sequence[Segments],
     returns: Sequence[Float[np.ndarray, "_ 2"]],
     config: SecondLooksConfig = DEFAULTS,
 ) -> Survey:
     """Return the poses and walls that agree best with all motions between scans and the segments of all scans.
 
-    `motions` lead from each pose to the next (robot frame, m m rad), one less than poses; `segments` and `returns` are
-    those of each scan, robot frame. The first pose stays where it is.
+    The drive has one motion less than poses; `segments` and `returns` are those of each scan, robot frame. The first
+    pose stays where it is.
     """
-    search = LoopSearch(start_world, motions, Returns(returns, config.closures), config)
+    search = LoopSearch(start_world, drive, Returns(returns, config.closures), config)
     sightings = joined([firm(k, each, config) for k, each in enumerate(segments)])
     return _with_walls(search, sightings, config)
 

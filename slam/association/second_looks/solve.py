@@ -64,7 +64,8 @@ class Links:
     second: Int[np.ndarray, " k"]
     motions: Float[np.ndarray, "k 3"]
     """The second pose in the frame of the first, m m rad."""
-    sigmas: Float[np.ndarray, "k 3"]
+    whiteners: Float[np.ndarray, "k 3 3"]
+    """What turns the errors of each into independent ones of one standard deviation."""
     doubt: float
     """From so many standard deviations on a link counts less and less (Cauchy's weight)."""
 
@@ -113,7 +114,13 @@ def of_links(poses: Float[np.ndarray, "s 3"], links: Links) -> Terms:
     J[:, 0, 3], J[:, 0, 4], J[:, 1, 3], J[:, 1, 4] = c, s, -s, c
     J[:, 2, 2], J[:, 2, 5] = -1.0, 1.0
     columns = np.concatenate([3 * at[:, None] + np.arange(3) for at in (links.first, links.second)], axis=1)
-    return Terms(errors / links.sigmas, J / links.sigmas[:, :, None], columns)
+    return Terms(np.matvec(links.whiteners, errors), links.whiteners @ J, columns)
+
+
+def whiteners(covs: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """Return matrices W with W cov W^T = 1."""
+    inverses: np.ndarray = np.linalg.inv(np.linalg.cholesky(covs))
+    return inverses
 
 
 def of_sightings(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"], config: SecondLooksConfig) -> Terms:

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
+from slam.association.second_looks.closures import Drive
 from slam.geometry.poses import compose, inverse
 
 NICHES = [(2, -0.8, 3, 0), (7, -0.5, 8.5, 0), (11.9, 3, 13, 4), (4, 8, 5.5, 8.6), (9, 8, 10, 9), (-0.7, 5, 0, 6)]
@@ -57,6 +58,15 @@ def drifting(true, turn_a_step=0.004, seed=3):
     rng = np.random.default_rng(seed)
     motions = motions_of(true)
     return motions + rng.normal(0.0, [0.005, 0.005, 0.002], motions.shape) + [0.0, 0.0, turn_a_step]
+
+
+STATED = np.array([0.03, 0.03, 0.008])
+"""What matching typically states of a motion: sigmas, m m rad."""
+
+
+def driven(motions, slipped=()):
+    """Motions with what matching typically states of them."""
+    return Drive(motions, np.tile(np.diag(STATED) ** 2, (len(motions), 1, 1)), slipped)
 
 
 def followed(start, motions):

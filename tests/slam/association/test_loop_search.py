@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import shapely
 
-from slam.association.second_looks.closures import Closure, Drive, held, settled
+from slam.association.second_looks.closures import Closure, held, settled
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.correlation_kernels import best_in_blocks, largest_ahead, mean_at
 from slam.association.second_looks.loop_search import LoopSearch
 from slam.association.second_looks.submap_match import Window, place_on
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
-from tests.slam.association.drives import drifting, followed, motions_of, off_m, returns_at, round_the_ring
+from tests.slam.association.drives import drifting, driven, followed, motions_of, off_m, returns_at, round_the_ring
 
 CONFIG = SecondLooksConfig()
 PLACES = CONFIG.closures
@@ -25,7 +25,7 @@ def ring():
     """A drive of 1.4 laps and its search; no fixture, so that a test without a rule searches without it."""
     true = round_the_ring()
     motions = drifting(true)
-    return true, motions, LoopSearch(true[0], motions, Returns(returns_at(true), PLACES), CONFIG)
+    return true, motions, LoopSearch(true[0], driven(motions), Returns(returns_at(true), PLACES), CONFIG)
 
 
 def test_a_loop_is_closed_although_the_path_came_apart_by_far_more_than_any_gate():
@@ -47,7 +47,7 @@ def test_a_turn_that_nobody_reported_is_found():
     motions = drifting(true, 0.0)
     corner = int(np.argmax(np.abs(motions[:, 2]))) + 1
     motions[corner - 1, 2] -= 1.0
-    search = LoopSearch(true[0], motions, Returns(returns_at(true), PLACES), CONFIG)
+    search = LoopSearch(true[0], driven(motions), Returns(returns_at(true), PLACES), CONFIG)
     assert search.drive.slipped == [corner]
     assert off_m(settled(search.poses, search.drive, search.closures, CONFIG), true).max() < 0.15
 
@@ -55,7 +55,7 @@ def test_a_turn_that_nobody_reported_is_found():
 def test_one_finding_alone_closes_nothing():
     true, motions, _ = ring()
     alone = replace(CONFIG, closures=replace(PLACES, every_m=5.0))
-    once = LoopSearch(true[0], motions, Returns(returns_at(true), PLACES), alone)
+    once = LoopSearch(true[0], driven(motions), Returns(returns_at(true), PLACES), alone)
     assert once._found
     assert once.closures == []
 
@@ -90,19 +90,19 @@ def test_equal_rooms_close_no_loop():
     nothing, both = np.zeros((0, 2)), np.concatenate([room(0.0), room(1.6)])
     points = [to_robot(both if k < 8 else nothing if k < 32 else room(0.0), poses[k]) for k in range(len(poses))]
     small = replace(PLACES, least_points=50)
-    search = LoopSearch(poses[0], motions, Returns(points, small), replace(CONFIG, closures=small))
+    search = LoopSearch(poses[0], driven(motions), Returns(points, small), replace(CONFIG, closures=small))
     assert search.closures == []
     one = [to_robot(room(0.0), poses[k]) if k < 8 else each for k, each in enumerate(points)]
-    assert LoopSearch(poses[0], motions, Returns(one, small), replace(CONFIG, closures=small))._found
+    assert LoopSearch(poses[0], driven(motions), Returns(one, small), replace(CONFIG, closures=small))._found
 
 
 def test_a_wrong_closure_is_taken_back_where_others_contradict_it():
     true, motions, search = ring()
     wrong = Closure(20, 100, np.array([0.1, 0.2, 0.3]))
     closures = [wrong, *search.closures]
-    misled = settled(followed(true[0], motions), Drive(motions), [wrong], CONFIG)
+    misled = settled(followed(true[0], motions), driven(motions), [wrong], CONFIG)
     assert held([wrong], misled, PLACES) == [wrong]
-    found = settled(misled, Drive(motions), closures, CONFIG)
+    found = settled(misled, driven(motions), closures, CONFIG)
     assert held(closures, found, PLACES) == search.closures
     right = settled(search.poses, search.drive, search.closures, CONFIG)
     assert off_m(found, right).max() < 0.05

@@ -14,7 +14,7 @@ from slam.association.second_looks.loop_search import LoopSearch
 from slam.association.second_looks.solve import normal_equations, without_lines
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse, wrap
-from tests.slam.association.drives import along, followed, motions_of, off_m, returns_at
+from tests.slam.association.drives import STATED, along, driven, followed, motions_of, off_m, returns_at
 
 CONFIG = SecondLooksConfig()
 PLACES = CONFIG.closures
@@ -52,11 +52,11 @@ def as_stated(true, seed):
     """Motions off by noise as large as second looks take it to be."""
     rng = np.random.default_rng([10, seed])
     motions = motions_of(true)
-    return motions + rng.normal(0.0, [CONFIG.odometry_m, CONFIG.odometry_m, CONFIG.odometry_rad], motions.shape)
+    return motions + rng.normal(0.0, STATED / np.sqrt(CONFIG.understated), motions.shape)
 
 
 def searched(true, motions, building, seed):
-    return LoopSearch(true[0], motions, Returns(returns_at(true, seed, building=building), PLACES), CONFIG)
+    return LoopSearch(true[0], driven(motions), Returns(returns_at(true, seed, building=building), PLACES), CONFIG)
 
 
 def errors_of(closures, true):

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from slam.association.second_looks.closures import Closure, Drive
+from slam.association.second_looks.closures import Closure, Drive, settled
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.landmarks import associated, firm, joined
 from slam.association.second_looks.loop_search import LoopSearch
@@ -17,6 +17,7 @@ from slam.association.second_looks.walls import merged, spans, surveyed
 from slam.extraction.segments import Segments
 from slam.geometry.lines import lines_to_world, through
 from slam.geometry.poses import compose, inverse, to_robot, wrap
+from tests.slam.association.drives import driven
 
 WALLS = np.array([[[6, 0], [0, 0]], [[0, 0], [0, 4]], [[0, 4], [6, 4]], [[6, 4], [6, 0]], [[2, 1.5], [4, 1.5]]], float)
 CONFIG = SecondLooksConfig()
@@ -52,7 +53,7 @@ def drive(count=60, seed=1, walls=WALLS, worse=1.0):
 
 def looked(poses, motions, segments):
     """Poses by lines alone: without returns no place is sought."""
-    return second_looks(poses[0], motions, segments, [np.zeros((0, 2))] * len(poses)).poses
+    return second_looks(poses[0], driven(motions), segments, [np.zeros((0, 2))] * len(poses)).poses
 
 
 def test_a_drift_goes_that_no_filter_had_a_say_in():
@@ -70,7 +71,7 @@ def test_a_drift_goes_that_no_filter_had_a_say_in():
 def test_a_drift_of_far_more_than_the_last_gate_goes(seed):
     true, drifted, motions, segments = drive(seed=seed, worse=3.0)
     assert np.hypot(*(drifted - true)[:, :2].T).max() > 4.0 * CONFIG.gates_m[-1] > CONFIG.gates_m[0]
-    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(true))
+    survey = second_looks(drifted[0], driven(motions), segments, [np.zeros((0, 2))] * len(true))
     assert np.hypot(*(survey.poses - true)[:, :2].T).max() < 0.04
     assert len(survey.walls) == len(WALLS)
 
@@ -127,7 +128,7 @@ def test_derivatives_are_those_of_differences(of):
 
     def terms(unknowns):
         if of == "motions":
-            return of_links(unknowns.poses, Drive(motions).links(CONFIG.doubt, CONFIG))
+            return of_links(unknowns.poses, driven(motions).links(CONFIG.doubt, CONFIG))
         return of_sightings(unknowns, sightings, owner, CONFIG)
 
     at = terms(start)
@@ -142,11 +143,28 @@ def test_derivatives_are_those_of_differences(of):
         np.testing.assert_allclose(slope, told, atol=1e-4)
 
 
+def test_a_motion_holds_as_far_as_it_is_stated_and_least_where_it_is_stated_least():
+    """A corridor told the motion across it alone: what closes the loop is found in the motion along it."""
+    motions = np.array([[1.0, 0.0, 0.0]] * 4)
+    covs = np.tile(np.diag([0.01, 0.01, 0.01]) ** 2, (4, 1, 1))
+    turned = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    covs[2] = turned @ np.diag([0.6, 0.01, 0.01]) ** 2 @ turned.T
+    links = Drive(motions, covs).links(CONFIG.doubt, CONFIG)
+    errors = of_links(np.zeros((5, 3)), links).errors
+    stated = np.einsum("ki,kij,kj->k", motions, np.linalg.inv(covs), motions)
+    np.testing.assert_allclose((errors**2).sum(axis=1), CONFIG.understated * stated, rtol=1e-2)
+    closed = [Closure(0, 4, np.array([3.92, -0.06, 0.0]))]
+    poses = settled(np.column_stack([np.arange(5.0), np.zeros((5, 2))]), Drive(motions, covs), closed, CONFIG)
+    steps = np.diff(poses[:, :2], axis=0)
+    np.testing.assert_allclose(steps[2], [0.92, -0.06], atol=0.01)
+    np.testing.assert_allclose(np.delete(steps, 2, axis=0), motions[:3, :2], atol=0.005)
+
+
 def test_the_solution_is_a_least_of_the_weighted_errors():
     _, drifted, motions, sightings, owner = problem()
     found = solved(
         begun(drifted, sightings, owner),
-        [Drive(motions).links(CONFIG.doubt, CONFIG)],
+        [driven(motions).links(CONFIG.doubt, CONFIG)],
         sightings,
         owner,
         SecondLooksConfig(iterations=30),
@@ -154,7 +172,7 @@ def test_the_solution_is_a_least_of_the_weighted_errors():
 
     def cost(unknowns):
         parts = (
-            of_links(unknowns.poses, Drive(motions).links(CONFIG.doubt, CONFIG)),
+            of_links(unknowns.poses, driven(motions).links(CONFIG.doubt, CONFIG)),
             of_sightings(unknowns, sightings, owner, CONFIG),
         )
         return sum(np.sum(np.log1p(np.sum(part.errors**2, axis=1) / CONFIG.doubt**2)) for part in parts)
@@ -169,7 +187,7 @@ def test_the_solution_is_a_least_of_the_weighted_errors():
 
 def test_walls_stand_where_the_room_has_them_and_reach_as_far():
     _, drifted, motions, segments = drive()
-    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(drifted))
+    survey = second_looks(drifted[0], driven(motions), segments, [np.zeros((0, 2))] * len(drifted))
     assert len(survey.walls) == len(WALLS)
     ends = survey.walls.ends_world
     for wall in WALLS:
@@ -184,7 +202,7 @@ def test_walls_stand_where_the_room_has_them_and_reach_as_far():
 
 def test_the_covariance_is_that_of_the_whole_information_and_the_floor():
     true, _, motions, sightings, owner = problem()
-    links = [Drive(motions).links(CONFIG.doubt, CONFIG)]
+    links = [driven(motions).links(CONFIG.doubt, CONFIG)]
     found = solved(begun(true, sightings, owner), links, sightings, owner, CONFIG)
     information, _ = normal_equations(found, links, sightings, owner, CONFIG)
     walls, joint = surveyed(found, information, sightings, owner, CONFIG)
@@ -279,14 +297,14 @@ def test_pieces_of_a_wall_that_later_scans_join_are_one_wall_in_the_end():
     segments = [
         segments_at(pose, rng, np.concatenate([wall, WALLS[1:]])) for pose, wall in zip(true, shown, strict=True)
     ]
-    survey = second_looks(drifted[0], motions, segments, [np.zeros((0, 2))] * len(true))
+    survey = second_looks(drifted[0], driven(motions), segments, [np.zeros((0, 2))] * len(true))
     assert len(survey.walls) == len(WALLS)
 
 
 def test_a_closure_that_only_walls_contradict_is_taken_back():
     true, _, motions, segments = drive()
     wrong = compose(inverse(true[5]), true[35]) + np.array([0.0, 0.6, 0.0])
-    search = LoopSearch(true[0], motions, Returns([np.zeros((0, 2))] * len(true), CONFIG.closures), CONFIG)
+    search = LoopSearch(true[0], driven(motions), Returns([np.zeros((0, 2))] * len(true), CONFIG.closures), CONFIG)
     search.closures.append(Closure(5, 35, wrong))
     sightings = joined([firm(k, each, CONFIG) for k, each in enumerate(segments)])
     survey = _with_walls(search, sightings, CONFIG)

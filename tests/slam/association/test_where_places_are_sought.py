@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from slam.association.second_looks import loop_search
-from slam.association.second_looks.closures import Closure, Drive, settled
+from slam.association.second_looks.closures import Closure, settled
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.loop_search import LoopSearch
 from slam.association.second_looks.submap_match import Place, apart
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse
-from tests.slam.association.drives import followed
+from tests.slam.association.drives import driven, followed
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 """Returns and places are stood in for."""
@@ -45,7 +45,7 @@ class StandIn:
 
 
 def search(motions=THERE_AND_BACK, returns=None, config=CONFIG):
-    return LoopSearch(np.zeros(3), motions, returns or StandIn(), config)
+    return LoopSearch(np.zeros(3), driven(motions), returns or StandIn(), config)
 
 
 def put(old, new, off=(0.0, 0.0, 0.0), poses=None):
@@ -223,7 +223,7 @@ def test_a_motion_in_which_the_robot_slipped_gives_way_to_closures():
     true, told = followed(np.zeros(3), THERE_AND_BACK), followed(np.zeros(3), motions)
     closures = [Closure(81 - new, new, TURN) for new in (55, 60, 65, 70, 75)]
     off = [
-        np.hypot(*(settled(told, Drive(motions, slips), closures, CONFIG) - true)[:, :2].T).max()
+        np.hypot(*(settled(told, driven(motions, slips), closures, CONFIG) - true)[:, :2].T).max()
         for slips in ([31], [])
     ]
     assert off[0] < 0.1

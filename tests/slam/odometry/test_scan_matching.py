@@ -7,9 +7,11 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.evaluation.consistency import nees
 from slam.geometry.poses import compose, inverse, wrap
+from slam.odometry import scan_matching
 from slam.odometry.config import ScanMatchingConfig
 from slam.odometry.matched_robot import MatchedRobot
 from slam.odometry.scan_matching import ScanMatcher
+from slam.odometry.search_kernels import Window
 from slam.robot import MotionCommand, Odometry, Robot, Scan
 
 ROOM = shapely.box(0, 0, 5, 3.5).difference(shapely.box(2, 2, 2.8, 3.5)).difference(shapely.box(4, 0, 5, 0.6))
@@ -78,6 +80,20 @@ def test_along_a_bare_corridor_the_wheels_have_their_say_and_across_it_the_scans
     for each in told:
         assert each.cov[0, 0] > 0.7 * WHEELS_COV[0, 0]
         assert each.cov[1, 1] < 0.2 * WHEELS_COV[1, 1]
+
+
+def test_among_equal_niches_the_one_near_where_the_wheels_say_is_taken(monkeypatch):
+    """Scans 1 m apart see another part of the corridor each: the less the robot moved, the more they have in common."""
+    niches = [shapely.box(x, 2, x + 0.2, 2.3) for x in np.arange(-8.0, 8.0, 0.5)]
+    corridor = shapely.union_all([CORRIDOR, *niches])
+    poses = np.column_stack([1.0 * np.arange(6), np.full(6, 0.9), np.zeros(6)])
+    wheels = np.tile([0.06, 0.03, 0.03], (5, 1))
+    _, told, true = matched(poses, corridor, wheels)
+    assert np.abs(errors_of(told, true)).max() < 0.05
+    monkeypatch.setattr(scan_matching, "Window", lambda *args: Window(*args[:-1], np.zeros((3, 3))))
+    wide = ScanMatchingConfig(gate_sigmas=12.0)
+    _, told, true = matched(poses, corridor, wheels, config=wide)
+    assert np.abs(errors_of(told, true)).max() > 0.4
 
 
 @pytest.mark.parametrize("slip_deg", [50.0, -45.0])
