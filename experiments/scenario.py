@@ -32,7 +32,8 @@ P0_SIGMAS: dict[str, tuple[float, float]] = {
 }
 """Standard deviations of the start: position m (each axis), heading rad."""
 
-
+DRIVER = "graph"
+"""The back end that explores unless another is named: it loses the fewest maps of schools (`make schools`)."""
 STRATEGY_OF_REPLAYS = "none"
 """Nobody decides where a recorded robot goes."""
 

@@ -15,9 +15,9 @@ STEPS_SPREAD = 0.6, 2.5
 """Of these runs the shortest and the longest, less 2 %, over what STEPS says."""
 DRIVING_S = 0.25, 0.42
 """Driving time of one step in them."""
-COMPUTING_S = 0.01, 0.06
-"""Computing time of one step: in 312 runs in schools on an idle machine, and on one that does other things, too."""
-SLOW = {"graph": 3.5, "graph-batch": 3.5}
+COMPUTING_S = 0.005, 0.03
+"""Computing time of one step: in runs in schools on an idle machine, and on one that does other things, too."""
+SLOW = {"graph": 1.6, "graph-batch": 1.6}
 """Back ends whose steps take longer than those of filters, by how much."""
 
 

@@ -17,7 +17,7 @@ from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
 from ..artifacts.settings import NAVIGATION, nested, parse_setting, read_settings, trial_of
-from ..scenario import P0, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, P0, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import print_summary, progress
@@ -63,7 +63,7 @@ class Explore:
 
     world: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="WORLD")] = None
     """A name (see `chainslam worlds`) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
-    backend: str = "full-ekf"
+    backend: str = DRIVER
     """The estimator (see `chainslam backends`)."""
     strategy: str = "nearest-robot"
     """Where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at step 200."""
@@ -132,7 +132,10 @@ class Explore:
             given["mission.free_space.fence"] = fence_of(self.fence)
         options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
         base = {} if self.config is None else read_settings(self.config)
-        trial = trial_of(preset_of(self.preset), robot_of(self.robot), base, *map(parse_setting, self.set), options)
+        default = {"backend": DRIVER}
+        trial = trial_of(
+            default, preset_of(self.preset), robot_of(self.robot), base, *map(parse_setting, self.set), options
+        )
         if not trial.world:
             raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
         return trial

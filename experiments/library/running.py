@@ -22,7 +22,7 @@ from ..replays.real_log import RealOptions
 from ..replays.replay import Association
 from ..replays.sources import RECORDED
 from ..replays.unwitnessed import run_unwitnessed, unwitnessed
-from ..scenario import P0, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, P0, TrialConfig, build, check, load_world
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError, choose
 from .runs import Home, Run
@@ -33,7 +33,7 @@ Watch = Callable[[Step], None]
 def explore(
     world: str | Path | Robot,
     *,
-    backend: str = "full-ekf",
+    backend: str = DRIVER,
     strategy: str = "nearest-robot",
     seed: int = 1,
     p0: P0 = "small",
