@@ -69,12 +69,12 @@ def test_a_config_comes_back_with_every_setting_changed(tmp_path):
 
 def test_an_option_wins_over_set_and_set_over_config(tmp_path):
     path = tmp_path / "mine.json"
-    path.write_text(json.dumps({"world": "hall", "seed": 5, "backend": "graph", "max_steps": 7, "p0": "large"}))
-    asked = Explore(config=path, set=("seed=6", "backend=block-ekf"), backend="fej-ekf")
+    path.write_text(json.dumps({"world": "hall", "seed": 5, "backend": "block-ekf", "max_steps": 7, "p0": "large"}))
+    asked = Explore(config=path, set=("seed=6", "backend=full-ekf"), backend="fej-ekf")
     assert (asked.trial.world, asked.trial.seed, asked.trial.backend) == ("hall", 6, "fej-ekf")
     assert (asked.trial.max_steps, asked.trial.p0) == (7, "large")
     # Named on the command line with the value that it has anyway.
-    assert Explore(config=path, given=frozenset({"backend", "seed"})).trial.backend == "full-ekf"
+    assert Explore(config=path, given=frozenset({"backend", "seed"})).trial.backend == "graph"
     assert Explore(config=path, sweep=False).trial.mission.explorer.sweep is False
 
 

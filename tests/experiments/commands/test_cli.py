@@ -62,7 +62,7 @@ def test_explore_leaves_its_folder_and_one_table(capsys, tmp_path):
 def test_a_world_is_called_by_its_name_though_that_is_an_emoji(capsys, tmp_path):
     assert main(["explore", "random:1234", "--max-steps", "2", "--out", str(tmp_path / "[/run]")]) == 0
     said = capsys.readouterr().out
-    assert "random:1234: full-ekf" in said
+    assert "random:1234: graph" in said
     assert "[/run]" in said
 
 

@@ -26,7 +26,7 @@ def test_the_help_says_what_a_value_is_and_what_holds_without_it(capsys, monkeyp
         main(["explore", "--help"])
     told = capsys.readouterr().out
     for words in ("--seed N ", "(default: 1)", "--max-path METRES", "--set KEY=VALUE", "--out DIR", "--rrd FILE",
-                  "--start X Y [HEADING]", "(default: on)", "(default: off)", "(default: full-ekf)",
+                  "--start X Y [HEADING]", "(default: on)", "(default: off)", "(default: graph)",
                   "--p0 {zero,small,large}"):  # fmt: skip
         assert words in told
     assert "driving and scanning, not computing" in " ".join(told.replace("│", "").split())

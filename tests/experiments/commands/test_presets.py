@@ -60,7 +60,7 @@ def test_an_option_goes_before_set_and_that_before_a_file_and_that_before_the_pr
     assert trial(*sets, "--backend", "full-ekf").backend == "full-ekf"
     assert trial(*PRESET, "--sweep", "--navigation", "floor").mission.explorer.sweep is True
     assert trial(*PRESET, "--navigation", "floor").mission.explorer.following.navigation == "floor"
-    assert trial() == TrialConfig("paper-fig9")
+    assert trial() == TrialConfig("paper-fig9", "graph")
 
 
 @pytest.mark.parametrize("command", ["explore", "compare"])

@@ -84,7 +84,7 @@ def test_a_file_is_opened_and_so_are_those_of_a_folder(home, opened, tmp_path):
 @pytest.mark.parametrize(
     ("place", "folder", "backends"),
     [
-        ("run", "run", {"full-ekf"}),
+        ("run", "run", {"graph"}),
         ("replays/graph/log.npz", "replays/graph", {"graph"}),
         ("replays", "replays", {"block-ekf", "graph"}),
         ("campaign", "campaign", {"block-ekf", "graph"}),

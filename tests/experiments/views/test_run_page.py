@@ -28,8 +28,8 @@ def test_a_run_is_told_on_one_page_that_fetches_nothing(run):
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert page.count("<img") == 6
     assert f"{100 * summary['coverage']:.3g} % of the reachable contour mapped" in page
-    assert "full-ekf: stopped after" in page
-    assert "chainslam explore paper-fig4 --backend full-ekf --strategy nearest-robot --seed 1" in page
+    assert "graph: stopped after" in page
+    assert "chainslam explore paper-fig4 --backend graph --strategy nearest-robot --seed 1" in page
     assert "pose ANEES" in (run / "tables.tex").read_text()
 
 

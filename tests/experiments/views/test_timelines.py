@@ -14,7 +14,7 @@ from experiments.views.timelines import TimelineOutput, record_comparison
 from viz.timeline.colours import pale
 
 WORLD, STEPS = "paper-fig4", 70
-EXPLORE = ["explore", WORLD, "--max-steps", str(STEPS)]
+EXPLORE = ["explore", WORLD, "--backend", "full-ekf", "--max-steps", str(STEPS)]
 TIMINGS = (*TIMED, "seconds")
 
 pytestmark = pytest.mark.usefixtures("_strict_rerun")
