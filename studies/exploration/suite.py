@@ -5,7 +5,8 @@
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from rich.table import Table
 from experiments.scenario import P0, TrialConfig
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
+from sim.robot import RobotConfig
 from sim.worlds import WORLDS
 
 from ..runner.trials import rows_of
@@ -43,6 +45,10 @@ class Suite:
     """Exact ranges and wheels."""
     max_steps: int = 100_000
     """A trial is stopped after this many scans."""
+    max_path_m: float | None = None
+    """A trial is stopped after this way, m."""
+    slip: float = 1.0
+    """The wheels slip so many times as much, and the robot states so. Rows of another value need a file of their own."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/suite.jsonl")
@@ -57,11 +63,15 @@ class Suite:
             names = tuple(sorted(str(path) for path in self.plans.glob(self.named) if path.is_file()))
             if not names:
                 raise UsageError(f"expected a folder of maps, found no file {self.named} in {self.plans}: check it")
-        return [
-            TrialConfig(name, self.backend, self.strategy, seed, self.p0, self.errorless, self.max_steps)
-            for name in names
-            for seed in range(1, self.seeds + 1)
-        ]
+        robot = RobotConfig()
+        wheels = replace(
+            robot.wheels, slip=self.slip * robot.wheels.slip, lateral_slip=self.slip * robot.wheels.lateral_slip
+        )
+        one = partial(
+            TrialConfig, backend=self.backend, strategy=self.strategy, p0=self.p0, errorless=self.errorless,
+            max_steps=self.max_steps, max_path_m=self.max_path_m, robot=replace(robot, wheels=wheels),
+        )  # fmt: skip
+        return [one(name, seed=seed) for name in names for seed in range(1, self.seeds + 1)]
 
 
 def table(rows: list[dict[str, Any]], by_world: bool) -> Table:
