@@ -48,7 +48,7 @@ class Suite:
     max_path_m: float | None = None
     """A trial is stopped after this way, m."""
     slip: float = 1.0
-    """The wheels slip so many times as much, and the robot states so. Rows of another value need a file of their own."""
+    """The wheels slip so many times as much, and the robot states so. Each value needs a file of rows of its own."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/suite.jsonl")
