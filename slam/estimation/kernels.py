@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ..geometry.compiled import compiled
 from ..geometry.matrix_kernels import wrapped
@@ -64,3 +64,27 @@ def turn_halfway(
         less = along(lines[k, 1], cov[k, 0, 1] / cov[k, 0, 0], e[k, 0] - 0.5 * turn[k]) - H_pose[k, 1, 2]
         H_pose[k, 1, 2] += less
         H_line[k, 1, 0] -= less
+
+
+@compiled
+def stacked(
+    place: Int[np.ndarray, " m"],
+    count: int,
+    H_pose: Float[np.ndarray, "m 2 3"],
+    H_line: Float[np.ndarray, "m 2 2"],
+    R: Float[np.ndarray, "m 2 2"],
+) -> tuple[Float[np.ndarray, "k s"], Float[np.ndarray, "k k"]]:
+    """Return H by the pose and `count` lines, and R, of m observations together; that of row m is of line `place[m]`.
+
+    k = 2 m, s = 3 + 2 `count`.
+    """
+    m = len(place)
+    H, noise = np.zeros((2 * m, 3 + 2 * count)), np.zeros((2 * m, 2 * m))
+    for k in range(m):
+        for i in range(2):
+            for j in range(3):
+                H[2 * k + i, j] = H_pose[k, i, j]
+            for j in range(2):
+                H[2 * k + i, 3 + 2 * place[k] + j] = H_line[k, i, j]
+                noise[2 * k + i, 2 * k + j] = R[k, i, j]
+    return H, noise

@@ -11,8 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from ..geometry.lines import directions, normals
 from ..geometry.poses import J, compose, rotation, wrap
-from .backend import POSE
-from .kernels import innovation_rows, turn_halfway
+from .kernels import innovation_rows, stacked, turn_halfway
 
 
 @dataclass(frozen=True)
@@ -119,14 +118,10 @@ class Linear:
 
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
     """Join the innovations of m observations (several may be of one line) into one measurement."""
-    m = len(rows)
-    each = np.arange(m)
-    lines, place = (rows, each) if len(set(rows.tolist())) == m else np.unique(rows, return_inverse=True)
-    H_lines, R = np.zeros((m, 2, len(lines), 2)), np.zeros((m, 2, m, 2))
-    H_lines[each, :, place, :] = model.H_line
-    R[each, :, each, :] = model.R
-    H = np.concatenate([model.H_pose.reshape(2 * m, POSE), H_lines.reshape(2 * m, 2 * len(lines))], axis=1)
-    return Linear(lines, H, model.e.ravel(), R.reshape(2 * m, 2 * m))
+    each = np.arange(len(rows))
+    lines, place = (rows, each) if len(set(rows.tolist())) == len(rows) else np.unique(rows, return_inverse=True)
+    H, R = stacked(place, len(lines), model.H_pose, model.H_line, model.R)
+    return Linear(lines, H, model.e.ravel(), R)
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,14 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .kernels.chain_kernels import HEAD as HEAD
 from .kernels.chain_kernels import TAIL as TAIL
-from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, successors
+from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, runs, successors
 from .stochastic_map import StochasticMap
 
 
@@ -95,12 +96,11 @@ def connect(
     corners[before] = corner_points(
         lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], float(config.corner_reach_m)
     )
-    runs = _runs(successor)
-    walked = np.array([row for run, _ in runs for row in run])
-    names, corners, starts = ids.tolist(), corners[walked], np.cumsum([0, *(len(run) for run, _ in runs)]).tolist()
+    walked, starts, closed = runs(successor)
+    names, corners, ends = ids[walked].tolist(), corners[walked], ends[walked]
     return tuple(
-        _chain(run, closed, ends, corners[start : start + len(run)], names)
-        for (run, closed), start in zip(runs, starts, strict=False)
+        _chain(tuple(names[start:stop]), is_closed, ends[start:stop], corners[start:stop])
+        for (start, stop), is_closed in zip(pairwise(starts.tolist()), closed.tolist(), strict=True)
     )
 
 
@@ -136,35 +136,12 @@ def _reach(config: ChainConfig) -> Reach:
     )
 
 
-def _runs(successor: Int[np.ndarray, " n"]) -> list[tuple[list[int], bool]]:
-    """Follow the links: rows of each chain in order, and whether it is closed."""
-    has_predecessor = np.zeros(len(successor), dtype=bool)
-    has_predecessor[successor[successor >= 0]] = True
-    following = successor.tolist()
-    done = [False] * len(following)
-    runs: list[tuple[list[int], bool]] = []
-    for start in [*np.flatnonzero(~has_predecessor).tolist(), *range(len(following))]:
-        if done[start]:
-            continue
-        run, row = [], start
-        while row >= 0 and not done[row]:
-            done[row] = True
-            run.append(row)
-            row = following[row]
-        runs.append((run, row == start))
-    return sorted(runs, key=lambda item: min(item[0]))
-
-
 def _chain(
-    run: list[int],
-    closed: bool,
-    ends: Float[np.ndarray, "n 2 2"],
-    corners: Float[np.ndarray, "m 2"],
-    ids: list[int],
+    walls: tuple[int, ...], closed: bool, ends: Float[np.ndarray, "m 2 2"], corners: Float[np.ndarray, "m 2"]
 ) -> Chain:
-    """Return the chain of these rows; `corners` holds where each of its walls meets the next."""
-    walls = tuple(ids[row] for row in run)
+    """Return the chain of these walls; `corners` holds where each of them meets the next."""
     if closed:
         return Chain(walls, corners, ())
-    tail, head = OpenEnd(walls[0], TAIL, ends[run[0], TAIL]), OpenEnd(walls[-1], HEAD, ends[run[-1], HEAD])
-    return Chain(walls, corners[:-1], (tail, head))
+    return Chain(
+        walls, corners[:-1], (OpenEnd(walls[0], TAIL, ends[0, TAIL]), OpenEnd(walls[-1], HEAD, ends[-1, HEAD]))
+    )

@@ -9,7 +9,7 @@ from ..estimation.backend import Belief
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import owners_of_beams
 from ..robot import RobotSpec, Scan, of_robot
-from .kernels.extent_kernels import note_whole, seen_along, stretch, uncover, weigh
+from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import ESTABLISHED, StochasticMap
@@ -88,16 +88,11 @@ class Extents:
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
         rows, seen_often = self._records.rows(owners[used]), self._records.rows(believed)
-        columns, margin = self._records.columns, float(self._config.end_margin_m)
-        extents, spacing, whole = columns["extents"], columns["spacing"], columns["whole"]
-        before, kinds = extents.copy(), segments.end_kinds[used]
-        pieces = segments.ends[used], segments.lines[used], rows
-        along, apart = seen_along(*pieces, belief.pose_world, belief.anchors, belief.means, scan.step_rad)
-        stretch(rows, along, apart, kinds, extents, spacing)
-        note_whole(before, rows, kinds, extents, whole, margin)
-        lines, kept = (belief.pose_world, belief.anchors, belief.means), (extents, spacing, columns["overlaid"])
-        scans = self._config.contradictions
-        uncover(used, owners, segments.ends, segments.end_kinds, rows, *lines, *kept, margin, scans)
+        columns, margin, scans = self._records.columns, float(self._config.end_margin_m), self._config.contradictions
+        extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
+        seen = segments.ends, segments.lines, segments.end_kinds, owners, used, rows
+        kept = extents, columns["spacing"], columns["whole"], columns["overlaid"]
+        take_in(*seen, *lines, scan.step_rad, *kept, margin, scans)
         observations, last_seen = columns["observations"], columns["last_seen"]
         observations[rows] += 1  # of a wall with two segments, too, by one: the sum is taken before it is stored
         observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)
@@ -111,14 +106,12 @@ class Extents:
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
         """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
         columns, config = self._records.columns, self._config
-        walls = self.map(belief, np.zeros(len(self._records), dtype=bool))
-        near = np.flatnonzero(walls.distances_m < scan.range_max_m)
         beams = scan.bearings_rad, scan.ranges_m, scan.passed_m
         owners = owners_of_beams(segments, owners, len(scan.bearings_rad))
         lines = belief.pose_world, belief.anchors, belief.means, self._records.ids
         kept = columns["extents"], columns["spacing"], columns["claimed"], columns["against"]
         seen, limits = columns["last_seen"] == self._scans, (float(config.end_margin_m), config.contradictions)
-        weigh(near, *beams, owners, *lines, seen, *kept, *limits)
+        weigh(float(scan.range_max_m), *beams, owners, *lines, seen, *kept, *limits)
 
     def _merge(self, merger: Merger) -> None:
         """Give the kept wall the extent of both."""

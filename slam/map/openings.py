@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from ..robot import Scan
 from .chains import ChainConfig
 from .kernels import ray_kernels
-from .kernels.chain_kernels import HEAD, TAIL, near_ends, supposed_corners
+from .kernels.ray_kernels import Watch
 from .records import Records
 from .stochastic_map import StochasticMap
 
@@ -34,7 +34,8 @@ class Openings:
     """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through."""
 
     def __init__(self, config: OpeningsConfig, chains: ChainConfig, records: Records | None = None) -> None:
-        self._config, self._chains = config, chains
+        gap_m, reach_m = float(chains.set_aside_reach_m), float(chains.corner_reach_m)
+        self._watch = Watch(gap_m, reach_m, float(config.beyond_m), float(config.margin_m), config.beams)
         self._records = Records() if records is None else records
         self._records.relate("passed", "cut_off")
 
@@ -50,37 +51,23 @@ class Openings:
 
     def see(self, walls: StochasticMap, scan: Scan) -> None:
         """Hold one scan, taken at the map's pose, against gaps and corners of established walls within its range."""
-        config, pose = self._config, walls.belief.pose_world
-        widest_m = self._chains.set_aside_reach_m
-        rows = np.flatnonzero(~walls.tentative & (walls.distances_m < scan.range_max_m + widest_m))
-        ends, ids = walls.ends_world[rows], walls.ids[rows]
-        tails, heads = ends[:, TAIL], ends[:, HEAD]
-        pairs = near_ends(ends, float(widest_m))
-        from_robot, width = heads - pose[:2], tails[pairs[:, 1]] - heads[pairs[:, 0]]
-        is_near = np.hypot(from_robot[:, 0], from_robot[:, 1])[pairs[:, 0]] < scan.range_max_m
-        pairs, width = pairs[is_near], width[is_near]
-        gaps = pairs[np.hypot(width[:, 0], width[:, 1]) > config.beyond_m]
-        if len(gaps):
-            through = passing(heads[gaps[:, 0]], tails[gaps[:, 1]], pose, scan, config.beyond_m, config.margin_m)
-            self.passed.update(self._pairs(ids, gaps, through))
-        lines, reach = walls.belief.lines_world[rows], float(self._chains.corner_reach_m)
-        corners, supposed = supposed_corners(pairs, ends, lines, reach, 2.0 * config.margin_m)
+        watch, belief = self._watch, walls.belief
+        is_watched = ~walls.tentative & (walls.distances_m < scan.range_max_m + watch.widest_m)
+        beams = scan.bearings_rad, scan.passed_m, float(scan.range_max_m)
+        pairs, passed, supposed, cut_off = ray_kernels.between(
+            walls.ends_world, belief.lines_world, is_watched, belief.pose_world, *beams, watch
+        )
+        if passed.any():
+            self.passed.update(_tuples(walls.ids[pairs[passed]]))
         if self.cut_off:
             # Ends that have come to meet where the lines cross suppose nothing any more.
-            self.cut_off.difference_update((h, t) for h, t in ids[pairs[~supposed]].tolist())
-        pairs, corners = pairs[supposed], corners[supposed]
-        if len(pairs):
-            limits = pose, scan, 0.0, config.margin_m, config.margin_m
-            before = passing(heads[pairs[:, 0]], corners, *limits)
-            after = passing(corners, tails[pairs[:, 1]], *limits)
-            self.cut_off.update(self._pairs(ids, pairs, before | after))
+            self.cut_off.difference_update(_tuples(walls.ids[pairs[~supposed]]))
+        if cut_off.any():
+            self.cut_off.update(_tuples(walls.ids[pairs[cut_off]]))
 
-    def _pairs(
-        self, ids: Int[np.ndarray, " n"], pairs: Int[np.ndarray, "g 2"], beams: Bool[np.ndarray, "g k"]
-    ) -> list[tuple[int, int]]:
-        """Return the ids of the pairs of rows that beams enough have passed."""
-        through = pairs[np.count_nonzero(beams, axis=1) >= self._config.beams]
-        return [(int(head), int(tail)) for head, tail in ids[through].tolist()]
+
+def _tuples(pairs: Int[np.ndarray, "k 2"]) -> list[tuple[int, int]]:
+    return [(head, tail) for head, tail in pairs.tolist()]
 
 
 def passing(

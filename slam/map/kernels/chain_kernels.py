@@ -133,6 +133,43 @@ def corner_points(
 
 
 @compiled
+def runs(
+    successor: Int[np.ndarray, " n"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " c"], Bool[np.ndarray, " r"]]:
+    """Follow the links: the rows of all chains, one chain after another in the order of their least rows.
+
+    And where each begins among them, with an end more, and which are closed; those begin with their least row.
+    """
+    n = len(successor)
+    is_first, done = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+    for row in range(n):
+        if successor[row] >= 0:
+            is_first[successor[row]] = False
+    walked, least, bounds, count, at = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros(n + 1, np.int64), 0, 0
+    closed = np.zeros(n, np.bool_)
+    for begin in range(2 * n):
+        # Open chains from their beginnings, then the closed ones.
+        row = begin % n
+        if done[row] or (begin < n and not is_first[row]):
+            continue
+        least[count] = row
+        while row >= 0 and not done[row]:
+            done[row], walked[at] = True, row
+            least[count], at, row = min(least[count], row), at + 1, successor[row]
+        closed[count] = row == begin % n
+        count += 1
+        bounds[count] = at
+    order = np.argsort(least[:count])
+    rows, starts, place = np.empty(n, np.int64), np.zeros(count + 1, np.int64), 0
+    for k in range(count):
+        for at in range(bounds[order[k]], bounds[order[k] + 1]):
+            rows[place] = walked[at]
+            place += 1
+        starts[k + 1] = place
+    return rows, starts, closed[order]
+
+
+@compiled
 def supposed_corners(
     pairs: Int[np.ndarray, "k 2"],
     ends: Float[np.ndarray, "n 2 2"],

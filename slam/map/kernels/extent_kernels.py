@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from ...extraction.segments import EndKind
 from ...geometry.compiled import compiled
 from .ray_kernels import ray_evidence
+from .wall_kernels import distances, ends_world
 
 CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
 CLAIMED_BEAMS = 4
@@ -214,8 +215,36 @@ def kept_piece(
 
 
 @compiled
+def take_in(
+    ends: Float[np.ndarray, "s 2 2"],
+    lines: Float[np.ndarray, "s 2"],
+    end_kinds: Int[np.ndarray, "s 2"],
+    owners: Int[np.ndarray, " s"],
+    used: Int[np.ndarray, " m"],
+    rows: Int[np.ndarray, " m"],
+    pose_world: Float[np.ndarray, "3"],
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    step_rad: float,
+    extents: Float[np.ndarray, "n 2"],
+    spacing: Float[np.ndarray, "n 2"],
+    whole: Int[np.ndarray, " n"],
+    overlaid: Int[np.ndarray, "n 2"],
+    margin_m: float,
+    contradictions: int,
+) -> None:
+    """Stretch walls over the segments of one scan, note which are whole, and uncover corners before their ends."""
+    before, kinds = extents.copy(), end_kinds[used]
+    along, apart = seen_along(ends[used], lines[used], rows, pose_world, anchors, means, step_rad)
+    stretch(rows, along, apart, kinds, extents, spacing)
+    note_whole(before, rows, kinds, extents, whole, margin_m)
+    walls = pose_world, anchors, means
+    uncover(used, owners, ends, end_kinds, rows, *walls, extents, spacing, overlaid, margin_m, contradictions)
+
+
+@compiled
 def weigh(
-    near: Int[np.ndarray, " n"],
+    range_m: float,
     bearings_rad: Float[np.ndarray, " k"],
     ranges_m: Float[np.ndarray, " k"],
     passed_m: Float[np.ndarray, " k"],
@@ -232,7 +261,8 @@ def weigh(
     margin_m: float,
     contradictions: int,
 ) -> None:
-    """Hold walls against the beams: those that pass through them, and those that other walls account for."""
+    """Hold the walls in range against the beams: those that pass through them, and those that other walls have."""
+    near = np.flatnonzero(distances(pose_world[:2], ends_world(anchors, means, extents)) < range_m)
     along, hits, passes = ray_evidence(
         bearings_rad, ranges_m, passed_m, pose_world, anchors[near], means[near], margin_m
     )

@@ -1,5 +1,8 @@
 """Which ends are near and which are joined: against all pairs, one after another."""
 
+from itertools import pairwise
+
+import networkx as nx
 import numpy as np
 import shapely
 from hypothesis import given, settings
@@ -12,6 +15,7 @@ from slam.map.kernels.chain_kernels import (
     joinable,
     near_ends,
     overlap_at_a_bend,
+    runs,
     successors,
     supposed_corners,
 )
@@ -104,3 +108,24 @@ def test_a_corner_is_supposed_where_both_lines_would_meet_nearby(seed):
         np.testing.assert_allclose(corners[k], [meet.x, meet.y], atol=1e-8)
         reach = max(np.linalg.norm(corners[k] - ends[one, HEAD]), np.linalg.norm(corners[k] - ends[other, TAIL]))
         assert supposed[k] == (0.05 < reach <= 0.5)
+
+
+@few
+@given(seed=seeds)
+def test_runs_are_the_connected_parts_of_the_links(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 12))
+    successor, after = np.full(n, -1), rng.permutation(n)
+    linked = rng.random(n) < 0.7
+    successor[linked] = after[linked]
+    successor[successor == np.arange(n)] = -1
+    rows, starts, closed = runs(successor)
+    links = nx.DiGraph([(row, int(successor[row])) for row in range(n) if successor[row] >= 0])
+    links.add_nodes_from(range(n))
+    parts = sorted(nx.weakly_connected_components(links), key=min)
+    assert [set(rows[i:j].tolist()) for i, j in pairwise(starts)] == parts
+    for (i, j), is_closed in zip(pairwise(starts), closed, strict=True):
+        run = rows[i:j].tolist()
+        assert successor[run[:-1]].tolist() == run[1:]
+        assert (successor[run[-1]] == run[0]) == is_closed
+        assert not is_closed or run[0] == min(run)

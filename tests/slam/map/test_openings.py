@@ -13,6 +13,7 @@ from slam.backends import BACKENDS
 from slam.estimation.backend import Belief
 from slam.geometry.lines import normals, through
 from slam.map.chains import HEAD, TAIL, ChainConfig, connect
+from slam.map.kernels.ray_kernels import Watch, between
 from slam.map.openings import Openings, OpeningsConfig, passing
 from slam.map.stochastic_map import StochasticMap
 from slam.mapper import Mapper
@@ -138,3 +139,33 @@ def test_no_beam_cuts_off_a_true_corner_whose_walls_were_seen_short_of_it(seed: 
     gaps = Openings(OpeningsConfig(), ChainConfig())
     gaps.see(map_of(short, pose), replace(scan, ranges_m=scan.ranges_m + rng.normal(0.0, 0.01, 180)))
     assert not gaps.cut_off
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6))
+def test_gaps_and_corners_are_those_of_all_pairs_taken_one_by_one(seed: int) -> None:
+    """Walls are faces with pieces missing; the scan goes through what is missing."""
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(-1.0, 1.0, (8, 2, 2)) + np.array([1.5, 0.0])
+    lines, watched, pose = through(ends), rng.random(8) < 0.8, rng.uniform(-1.0, 1.0, 3)
+    ranges = np.where(rng.random(180) < 0.3, np.inf, rng.uniform(0.5, 4.0, 180))
+    scan, watch = Scan(BEARINGS, ranges, 0.01, 2.5, 0.0), Watch(0.8, 0.6, 0.15, 0.04, 2)
+    beams = BEARINGS, scan.passed_m, 2.5
+    pairs, passed, supposed, cut_off = between(ends, lines, watched, pose, *beams, watch)
+    gap = np.linalg.norm(ends[:, None, HEAD] - ends[:, TAIL], axis=-1)
+    near = (gap <= 0.8) & ~np.eye(8, dtype=bool) & watched[:, None] & watched
+    near &= np.linalg.norm(ends[:, HEAD] - pose[:2], axis=1)[:, None] < 2.5
+    assert pairs.tolist() == np.argwhere(near).tolist()
+    for k, (one, other) in enumerate(pairs):
+        head, tail = ends[one, HEAD][None], ends[other, TAIL][None]
+        is_passed = np.count_nonzero(passing(head, tail, pose, scan, 0.15, 0.04)) >= 2
+        assert passed[k] == (is_passed and gap[one, other] > 0.15)
+        if not supposed[k]:
+            assert not cut_off[k]
+            continue
+        n = normals(lines[[one, other], 0])
+        corner = np.linalg.solve(n, lines[[one, other], 1])[None]
+        beams_through = passing(head, corner, pose, scan, 0.0, 0.04, 0.04) | passing(
+            corner, tail, pose, scan, 0.0, 0.04, 0.04
+        )
+        assert cut_off[k] == (np.count_nonzero(beams_through) >= 2)
