@@ -13,7 +13,7 @@ from jaxtyping import Float
 from ..estimation.backend import Joint
 from ..estimation.gates import gate_level
 from ..geometry.lines import normals
-from ..geometry.poses import J, rotation, to_robot, wrap
+from ..geometry.poses import J, rotation, to_robot, turned, wrap
 
 
 def nees(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, " n"]:
@@ -94,9 +94,7 @@ def pose_errors(
 ) -> Float[np.ndarray, "n 3"]:
     """Return xi (n, 3), m m rad, of X_est = Exp(xi) X_true; raises nothing, but xi jumps at half a turn."""
     turn = wrap(estimated_world[:, 2] - true_world[:, 2])
-    c, s = np.cos(turn), np.sin(turn)
-    x, y = true_world[:, 0], true_world[:, 1]
-    shift = estimated_world[:, :2] - np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    shift = estimated_world[:, :2] - turned(true_world[:, :2], turn)
     # The inverse of V(phi), which carries the translation of Exp: (phi/2) cot(phi/2) on its diagonal.
     half = 0.5 * turn
     diagonal = np.cos(half) / np.sinc(half / np.pi)

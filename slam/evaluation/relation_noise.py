@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 
 from ..estimation.gates import gate_level
-from ..geometry.poses import J
+from ..geometry.poses import J, turned
 from .consistency import nees
 from .relations import Relations, between
 
@@ -139,6 +139,4 @@ def _sigmas(logs: Float[np.ndarray, "2"]) -> Sigmas:
 
 def _composed(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:
     """Return each motion of `first` with the one of `second` after it."""
-    c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
-    x, y = second[:, 0], second[:, 1]
-    return np.column_stack([first[:, 0] + c * x - s * y, first[:, 1] + s * x + c * y, first[:, 2] + second[:, 2]])
+    return np.column_stack([first[:, :2] + turned(second[:, :2], first[:, 2]), first[:, 2] + second[:, 2]])

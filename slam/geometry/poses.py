@@ -27,6 +27,13 @@ def rotation(angle: float) -> Float[np.ndarray, "2 2"]:
     return np.array([[c, -s], [s, c]])
 
 
+def turned(points: Float[np.ndarray, "n *k 2"], angles: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n *k 2"]:
+    """Return n points, or n groups of points, each turned about the origin by its own angle rad."""
+    c, s = (f(angles).reshape(-1, *[1] * (points.ndim - 2)) for f in (np.cos, np.sin))
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
 def compose(pose_world: Float[np.ndarray, "3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     """Return the pose reached from `pose_world` by `motion`, which is given in that pose's frame."""
     position = pose_world[:2] + rotation(pose_world[2]) @ motion[:2]

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from ...extraction.segments import Segments
 from ...geometry.lines import directions, normals
-from ...geometry.poses import wrap
+from ...geometry.poses import turned, wrap
 from .config import SecondLooksConfig
 
 ROOM = 256
@@ -105,9 +105,7 @@ def associated(
 ) -> Int[np.ndarray, " n"]:
     """Return the line of each sighting, numbered from 0; -1 for those of lines that were seen too rarely."""
     poses = poses_world[sightings.scan]
-    c, s = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
-    x, y = sightings.ends[..., 0], sightings.ends[..., 1]
-    ends = np.stack([c * x - s * y, s * x + c * y], axis=-1) + poses[:, None, :2]
+    ends = turned(sightings.ends, poses[:, 2]) + poses[:, None, :2]
     alpha = wrap(sightings.alpha + poses[:, 2])
     lines, owner = _Lines(), np.full(len(sightings), -1, dtype=np.int64)
     least = np.cos(config.turn_rad)

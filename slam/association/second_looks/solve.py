@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from ...geometry.lines import directions, normals
-from ...geometry.poses import wrap
+from ...geometry.poses import turned, wrap
 from .config import SecondLooksConfig
 from .landmarks import Sightings
 
@@ -45,9 +45,7 @@ def begun(poses: Float[np.ndarray, "s 3"], sightings: Sightings, owner: Int[np.n
     count = int(owner.max(initial=-1)) + 1
     at = poses[sightings.scan]
     alpha = sightings.alpha + at[:, 2]
-    c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
-    x, y = sightings.middles.T
-    middles = np.column_stack([c * x - s * y, s * x + c * y]) + at[:, :2]
+    middles = turned(sightings.middles, at[:, 2]) + at[:, :2]
     number = np.maximum(np.bincount(owner, minlength=count), 1)
     mean = [
         np.bincount(owner, values, minlength=count) / number for values in (*middles.T, np.cos(alpha), np.sin(alpha))
@@ -127,9 +125,7 @@ def of_sightings(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"
     """Return how far lines are from their sightings."""
     pose, line, anchor = at.poses[sightings.scan], at.lines[owner], at.anchors[owner]
     n, t = normals(line[:, 0]), directions(line[:, 0])
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    x, y = sightings.middles.T
-    arm = np.column_stack([c * x - s * y, s * x + c * y])
+    arm = turned(sightings.middles, pose[:, 2])
     from_anchor = arm + pose[:, :2] - anchor
     errors = np.column_stack([wrap(sightings.alpha + pose[:, 2] - line[:, 0]), np.vecdot(n, from_anchor) - line[:, 1]])
     J = np.zeros((len(owner), 2, 5))

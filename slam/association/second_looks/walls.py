@@ -9,6 +9,7 @@ from scipy.sparse.linalg import splu
 
 from ...estimation.backend import POSE, Belief, Joint
 from ...geometry.lines import directions, normals
+from ...geometry.poses import turned
 from ...map.stochastic_map import StochasticMap
 from .config import SecondLooksConfig
 from .landmarks import Sightings
@@ -33,9 +34,7 @@ def spans(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"]) -> F
 def _along(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
     """Return where each sighting begins and ends along its line, m from the anchor, the lesser first."""
     pose = at.poses[sightings.scan]
-    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
-    x, y = sightings.ends[..., 0], sightings.ends[..., 1]
-    ends = np.stack([c * x - s * y, s * x + c * y], axis=-1) + pose[:, None, :2] - at.anchors[owner][:, None]
+    ends = turned(sightings.ends, pose[:, 2]) + pose[:, None, :2] - at.anchors[owner][:, None]
     return np.sort(np.vecdot(directions(at.lines[owner, 0])[:, None], ends), axis=1)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from slam.geometry.poses import J, arc, compose, inverse, rotation, to_robot, to_world, wrap, wrap_positive
+from slam.geometry.poses import J, arc, compose, inverse, rotation, to_robot, to_world, turned, wrap, wrap_positive
 
 metres = st.floats(-50.0, 50.0)
 angles = st.floats(-20.0, 20.0)
@@ -24,6 +24,14 @@ def assert_same_pose(one, other, atol=1e-10):
 def matrix(pose):
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("shape", [(7, 2), (7, 3, 2), (0, 2)])
+def test_points_are_turned_each_by_its_own_angle(shape):
+    rng = np.random.default_rng(4)
+    points, by = rng.normal(0.0, 3.0, shape), rng.uniform(-7.0, 7.0, shape[0])
+    for k, found in enumerate(turned(points, by)):
+        np.testing.assert_allclose(found, to_world(points[k], np.array([0.0, 0.0, by[k]])), atol=1e-12)
 
 
 @few
