@@ -5,10 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int
 
-from ...estimation.backend import Belief, Joint, StaleBeliefError, columns_of
-from ...geometry.lines import directions, normals
+from ...estimation.backend import Belief, Joint, StaleBeliefError
 from ...geometry.poses import compose
+from ..frame import Frame
 from .ahead import Ahead
+from .kernels import cov_world, joint_ahead, means_world
 from .record import Record
 from .solver import Solver
 
@@ -28,34 +29,40 @@ def believe(
     ahead = Ahead(compose(frame.pose_world, solver.pose))
     for index in range(solver.last, len(record.motions)):
         ahead.move(record.motions[index], record.motion_covs[index])
-    pose_cov = ahead.pose_cov(solver.pose_cov())
-    means = solver.lines.copy()
-    means[:, 1] -= np.vecdot(normals(means[:, 0]), inner_anchors)
-    means = frame.means_world(means)
-    answers: list[tuple[Int[np.ndarray, " m"], Float[np.ndarray, "s s"]]] = []
+    pose_cov = in_world(frame, ahead.pose, anchors[:0], anchors[:0], ahead.pose_cov(solver.pose_cov()))
+    lines = solver.lines
+    means = means_world(frame.pose_world, lines, inner_anchors)
+    answers: list[tuple[Int[np.ndarray, " m"], Joint]] = []
 
-    def in_world(cov: Float[np.ndarray, "s s"], rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "s s"]:
-        """Add the frame's own error, which no scan lessens."""
-        moves = frame.moving(ahead.pose, means[rows], anchors[rows]) @ frame.root
-        return np.asarray(cov + moves @ moves.T)
+    def ask(rows: Int[np.ndarray, " m"]) -> Joint:
+        joint = joint_ahead(solver.joint_cov(rows), ahead.F, lines[rows], inner_anchors[rows])
+        cov = in_world(frame, ahead.pose, means[rows], anchors[rows], joint)
+        cov[:3, :3] = pose_cov
+        return Joint(np.concatenate([ahead.pose, means[rows].ravel()]), cov, anchors[rows])
 
     def query(wanted: Int[np.ndarray, " m"]) -> Joint:
         if not is_present():
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
         rows = belief.rows(wanted)
         if not answers or not np.all(np.isin(rows, answers[0][0])):
-            cov = in_world(ahead.joint_cov(_joint_cov(solver, rows, inner_anchors)), rows)
-            cov[:3, :3] = belief.pose_cov
-            answers[:] = [(rows, cov)]
-        known, cov = answers[0]
+            answers[:] = [(rows, ask(rows))]
+        known, joint = answers[0]
         order = np.argsort(known)
-        at = order[np.searchsorted(known, rows, sorter=order)]
-        columns = columns_of(at)
-        mean = np.concatenate([belief.pose_world, belief.means[rows].ravel()])
-        return Joint(mean, cov[columns[:, None], columns], anchors[rows])
+        return joint.take(order[np.searchsorted(known, rows, sorter=order)])
 
-    belief = Belief(ahead.pose, in_world(pose_cov, np.zeros(0, dtype=np.int64)), solver.ids, anchors, means, query)
+    belief = Belief(ahead.pose, pose_cov, solver.ids, anchors, means, query)
     return belief
+
+
+def in_world(
+    frame: Frame,
+    pose_world: Float[np.ndarray, "3"],
+    means: Float[np.ndarray, "m 2"],
+    anchors: Float[np.ndarray, "m 2"],
+    cov: Float[np.ndarray, "s s"],
+) -> Float[np.ndarray, "s s"]:
+    """Add the frame's own error to a covariance of a pose and of lines about their anchors, world frame."""
+    return cov_world(frame.pose_world, frame.root, pose_world, means, anchors, cov)
 
 
 def pair_covs(
@@ -73,15 +80,3 @@ def pair_covs(
         elif min(a, b) >= 0:
             covs[k] = solver.isam.pair_cov(a, b)
     return covs
-
-
-def _joint_cov(
-    solver: Solver, rows: Int[np.ndarray, " m"], anchors: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "s s"]:
-    """Return the covariance of the last pose (body frame) and these lines (alpha, d)."""
-    cov = solver.joint_cov(rows)
-    # d = r - n(alpha)·c, so dd = dr - (t·c) dalpha.
-    lever = np.vecdot(directions(solver.lines[rows, 0]), anchors[rows])
-    cov[4::2] -= lever[:, None] * cov[3::2]
-    cov[:, 4::2] -= lever * cov[:, 3::2]
-    return np.asarray(0.5 * (cov + cov.T))

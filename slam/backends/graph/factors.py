@@ -7,11 +7,13 @@ In this embedding the charts are the same for every alpha: a plane's is (-d alph
 (d heading, -, -, -, d x, d y) in the body frame.
 """
 
-from math import cos, sin, sqrt, tan
+from math import atan2, cos, sin, sqrt, tan
 
 import gtsam
 import numpy as np
 from jaxtyping import Float
+
+from .kernels import odometry_noise
 
 POSE_ROWS = (4, 5, 0)
 """Where x, y and heading stand in the chart of a pose, which has 6 rows."""
@@ -26,6 +28,7 @@ Any number gives the same answer, but it is to be one: poses that tilt more free
 until it is known so unevenly that Cholesky refuses it and QR goes astray.
 """
 
+_POSE_BLOCK, _HELD_COV = np.ix_(POSE_ROWS, POSE_ROWS), HELD**2 * np.eye(3)
 _POSES, _LINES = gtsam.symbol("x", 0), gtsam.symbol("l", 0)
 
 
@@ -47,7 +50,7 @@ def pose3(pose: Float[np.ndarray, "3"]) -> gtsam.Pose3:
 def pose_of(value: gtsam.Pose3) -> Float[np.ndarray, "3"]:
     """Return (x, y, heading) of an embedded pose."""
     matrix = value.matrix()
-    return np.array([matrix[1, 3], matrix[2, 3], np.arctan2(matrix[2, 1], matrix[1, 1])])
+    return np.array([matrix[1, 3], matrix[2, 3], atan2(matrix[2, 1], matrix[1, 1])])
 
 
 def plane(alpha: float, r: float) -> Float[np.ndarray, "4"]:
@@ -58,7 +61,7 @@ def plane(alpha: float, r: float) -> Float[np.ndarray, "4"]:
 def line_of(value: gtsam.OrientedPlane3) -> Float[np.ndarray, "2"]:
     """Return (alpha, r) of an embedded line."""
     _, x, y, d = value.planeCoefficients()
-    return np.array([np.arctan2(y, x), -d])
+    return np.array([atan2(y, x), -d])
 
 
 def origin_factor() -> gtsam.PriorFactorPose3:
@@ -70,9 +73,8 @@ def odometry_factor(
     index: int, motion: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]
 ) -> gtsam.BetweenFactorPose3:
     """Say how the robot moved to pose `index`; GTSAM takes the error in the frame after the motion, `cov` before it."""
-    c, s = cos(motion[2]), sin(motion[2])
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    return gtsam.BetweenFactorPose3(pose_key(index - 1), pose_key(index), pose3(motion), _noise(turn @ cov @ turn.T))
+    noise = _noise(odometry_noise(motion, cov))
+    return gtsam.BetweenFactorPose3(pose_key(index - 1), pose_key(index), pose3(motion), noise)
 
 
 def line_factor(
@@ -106,5 +108,5 @@ def line_factor(
 
 def _noise(cov_body: Float[np.ndarray, "3 3"]) -> gtsam.noiseModel.Gaussian:
     cov = OFF_PLANE**2 * np.eye(6)
-    cov[np.ix_(POSE_ROWS, POSE_ROWS)] = cov_body + HELD**2 * np.eye(3)
+    cov[_POSE_BLOCK] = cov_body + _HELD_COV
     return gtsam.noiseModel.Gaussian.Covariance(cov)

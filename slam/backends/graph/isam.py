@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import gtsam
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .config import GraphConfig
 from .factors import LINE_ROWS, POSE_ROWS, line_key, line_of, plane, pose3, pose_key, pose_of
+
+_POSE_BLOCK = np.ix_(POSE_ROWS, POSE_ROWS)
 
 
 class Isam:
@@ -99,9 +102,9 @@ class Isam:
         isam = self._isam
         return Estimates(isam.getLinearizationPoint() if linearisation else isam.calculateBestEstimate())
 
-    def moved(self, keys: Sequence[int]) -> Float[np.ndarray, "n 2"]:
-        """Return by how much lines (by their keys) have moved from where they are linearised, as (alpha, r)."""
-        return -np.asarray(self._isam.getDelta().vector(keys)).reshape(-1, 3)[:, LINE_ROWS]
+    def moved(self, keys: Sequence[int]) -> Float[np.ndarray, " s"]:
+        """Return by how much lines (by their keys) have moved from where they are linearised, in their charts."""
+        return np.asarray(self._isam.getDelta().vector(keys))
 
     def lines(self, keys: Sequence[int]) -> Float[np.ndarray, "n 2"]:
         """Return the points (alpha, r) where lines (by their keys) are linearised."""
@@ -110,7 +113,7 @@ class Isam:
 
     def pose_cov(self, index: int) -> Float[np.ndarray, "3 3"]:
         """Return the covariance of a pose, body frame."""
-        return np.asarray(self._isam.marginalCovariance(pose_key(index))[np.ix_(POSE_ROWS, POSE_ROWS)])
+        return np.asarray(self._isam.marginalCovariance(pose_key(index))[_POSE_BLOCK])
 
     def pair_cov(self, first: int, second: int) -> Float[np.ndarray, "6 6"]:
         """Return the covariance of two poses, each in its body frame."""
@@ -123,9 +126,8 @@ class Isam:
         if len(keys) <= self._config.near:
             self._near = sorted(keys)
         found = self._isam.jointMarginalCovariance([pose_key(index), *keys]).fullMatrix()
-        lines = 6 + 3 * np.arange(len(keys))[:, None] + np.array(LINE_ROWS)
-        rows = np.concatenate([POSE_ROWS, lines.ravel()])
-        cov = np.array(found[np.ix_(rows, rows)])
+        rows = _joint_rows(len(keys))
+        cov = found[rows[:, None], rows]
         cov[:3, 3:] *= -1.0
         cov[3:, :3] *= -1.0
         return cov
@@ -144,6 +146,13 @@ class Estimates:
     def lines(self, ids: Sequence[int]) -> Float[np.ndarray, "n 2"]:
         """Return lines (alpha, r)."""
         return np.array([line_of(self.values.atOrientedPlane3(line_key(line))) for line in ids]).reshape(-1, 2)
+
+
+@lru_cache(maxsize=256)
+def _joint_rows(lines: int) -> Int[np.ndarray, " s"]:
+    """Return where (x, y, heading, alpha_1, r_1, ...) stand in the charts of a pose and so many lines."""
+    charts = 6 + 3 * np.arange(lines)[:, None] + np.array(LINE_ROWS)
+    return np.concatenate([POSE_ROWS, charts.ravel()])
 
 
 def _params(config: GraphConfig) -> gtsam.ISAM2Params:

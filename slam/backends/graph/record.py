@@ -16,6 +16,14 @@ FORMAT = 2
 """Number of the form in which a record is stored; others are refused."""
 
 
+def as_seen(lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]) -> list[Seen]:
+    """Return observations of lines (alpha, r), robot frame, as they are noted."""
+    return [
+        (alpha, r, along, cross, across)
+        for (alpha, r), ((along, cross), (_, across)) in zip(lines.tolist(), cov.tolist(), strict=True)
+    ]
+
+
 @dataclass
 class LineRecord:
     """One line and its observations."""
@@ -82,11 +90,10 @@ class Record:
         motions = len(self.lead) + np.array(self.seen_from, dtype=np.int64)[numbers]
         return np.searchsorted(self.steps, motions)
 
-    def see(self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> int:
+    def see(self, pose: int, line: int, seen: Seen) -> int:
         """Note an observation and return its number."""
         self.seen_from.append(pose)
-        (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
-        self.seen.append((alpha, r, along, cross, across))
+        self.seen.append(seen)
         self.epsilons.append(0.0)
         self.lines[line].observations.append(len(self.seen) - 1)
         return len(self.seen) - 1

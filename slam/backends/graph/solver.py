@@ -9,14 +9,14 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.special import chdtri
 
-from ...geometry.poses import compose, wrap
+from ...geometry.poses import compose
 from .ahead import Ahead
 from .config import GraphConfig
 from .factors import line_factor, line_key, odometry_factor, origin_factor
-from .guess import guess
 from .isam import Isam
+from .kernels import guess, moved_lines
 from .loose import Loose, wrapped
-from .record import Record
+from .record import Record, as_seen
 
 
 class DivergedError(RuntimeError):
@@ -40,6 +40,8 @@ class Solver:
         """
         self._config, self._record = config, record
         self._thresholds = np.array([config.relinearise_angle_rad, config.relinearise_place_m])
+        self._linear = self._thresholds[[1, 1, 0]]
+        """The same of a pose (x, y, heading)."""
         self._beyond = float(chdtri(3, config.diverged_chance))
         """A pose may depart by this much, in chi-square, from where it was expected."""
         self.isam = Isam(config)
@@ -101,21 +103,20 @@ class Solver:
             motion, motion_cov = self._record.motions[self.last - 1], self._record.motion_covs[self.last - 1]
             self.pose = guess(self.pose, motion, motion_cov, self.lines[rows], seen, cov)
             self.isam.move_pose(self.last, self.pose)
-        alpha = self.lines[rows, 0]
-        epsilon = wrap(seen[:, 0] - alpha + self.pose[2]).tolist()
+        heading = float(self.pose[2])
+        lines, alphas, plain = self.ids[rows].tolist(), self.lines[rows, 0].tolist(), as_seen(seen, cov)
         for k in np.lexsort((seen[:, 1], seen[:, 0], rows)).tolist():
-            line = int(self.ids[rows[k]])
-            number = self._record.see(self.last, line, seen[k], cov[k])
-            self.enter_observation(line, number, epsilon[k], float(alpha[k]))
+            number = self._record.see(self.last, lines[k], plain[k])
+            self.enter_observation(lines[k], number, wrapped(plain[k][0] - alphas[k] + heading), alphas[k])
 
     def enter_lines(
         self, ids: Sequence[int], lines: Float[np.ndarray, "m 2"], seen: Float[np.ndarray, "m 2"],
         cov: Float[np.ndarray, "m 2 2"],
     ) -> None:  # fmt: skip
         """Enter new lines of the record, each with its first observation, from the last pose."""
-        for k, (line, (alpha, r)) in enumerate(zip(ids, lines.tolist(), strict=True)):
+        for line, (alpha, r), plain in zip(ids, lines.tolist(), as_seen(seen, cov), strict=True):
             self.isam.enter_line(line, alpha, r)
-            self.enter_observation(line, self._record.see(self.last, line, seen[k], cov[k]), 0.0, alpha)
+            self.enter_observation(line, self._record.see(self.last, line, plain), 0.0, alpha)
         self._show(ids, lines)
 
     def enter_observation(self, line: int, number: int, epsilon: float, alpha: float, again: bool = False) -> None:
@@ -186,15 +187,13 @@ class Solver:
         if not self._keys:
             return
         self._linearised_at[astray] = self.isam.lines([self._keys[row] for row in astray.tolist()])
-        moved = self.isam.moved(self._keys)
-        most = self._config.most_turn_rad
-        if not np.abs(moved[:, 0]).max() <= most or not np.all(np.isfinite(moved[:, 1])):
+        moved, most = self.isam.moved(self._keys), self._config.most_turn_rad
+        lines, self._astray, farthest = moved_lines(self._linearised_at, moved, self._thresholds)
+        if not farthest <= most:
             raise DivergedError(
                 f"expected lines that turn by less than {most:g} rad at once, found one that turns further"
             )
-        self.lines = self._linearised_at + moved
-        self.lines[:, 0] = wrap(self.lines[:, 0])
-        self._astray = np.max(np.abs(moved) / self._thresholds, axis=1)
+        self.lines = lines
 
     def _hold_pose(self) -> None:
         """Hold the pose against its prediction; raises DivergedError where both cannot be.
@@ -202,13 +201,12 @@ class Solver:
         Within a few thresholds of linearisation any solution is as good as its factors, whatever was expected.
         """
         off = self.pose - self._ahead.pose
-        off[2] = wrap(off[2])
-        linear = self._thresholds[[1, 1, 0]]
-        beyond = float(np.sum(np.square(off / linear)))
+        off[2] = wrapped(float(off[2]))
+        beyond = float(np.sum(np.square(off / self._linear)))
         if self._beyond < beyond < np.inf:
             if not len(self._expected_cov):  # The first solution of a graph made anew: nothing was expected.
                 return
-            cov = np.diag(linear**2) + self._ahead.pose_cov(self._expected_cov)
+            cov = np.diag(self._linear**2) + self._ahead.pose_cov(self._expected_cov)
             beyond = float(off @ np.linalg.solve(cov, off))
         if not beyond <= self._beyond:
             raise DivergedError(
