@@ -6,6 +6,7 @@ from typing import Any
 from explore.certificate import certify
 from explore.step import Step
 from slam.association.second_looks.closures import Drive
+from slam.association.second_looks.refuted import Rays
 from slam.association.second_looks.second_looks import Survey, second_looks
 from slam.evaluation.doubles import doubles
 from slam.extraction.extract import extract
@@ -35,7 +36,7 @@ def looked_again(result: TrialResult) -> TrialResult:
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
     drive = Drive(log.odometry[1:], log.odometry_cov[1:])
-    survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks)
+    survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, Rays(scans, on_body))
     return _mapped(result, log, last, survey)
 
 

@@ -55,7 +55,7 @@ NEAR = {
     "submap_match": "where_places_are_sought loop_search",
     "submaps": "where_places_are_sought loop_search",
     "closures": "where_places_are_sought loop_search second_looks",
-    "second_looks": "second_looks",
+    "second_looks": "second_looks refuted",
     "solve": "second_looks",
     "landmarks": "second_looks",
     "walls": "second_looks",

@@ -17,6 +17,7 @@ from .closures import Drive, closure_links, held, settled
 from .config import SecondLooksConfig
 from .landmarks import Sightings, associated, firm, joined
 from .loop_search import LoopSearch
+from .refuted import NO_RAYS, Rays, refuted
 from .solve import begun, normal_equations, solved, without_lines
 from .submaps import Returns
 from .walls import merged, spans, surveyed
@@ -42,18 +43,19 @@ def second_looks(
     segments: Sequence[Segments],
     returns: Sequence[Float[np.ndarray, "_ 2"]],
     config: SecondLooksConfig = DEFAULTS,
+    rays: Rays = NO_RAYS,
 ) -> Survey:
     """Return the poses and walls that agree best with all motions between scans and the segments of all scans.
 
     The drive has one motion less than poses; `segments` and `returns` are those of each scan, robot frame. The first
-    pose stays where it is.
+    pose stays where it is. By `rays`, walls that came and went are left out.
     """
     search = LoopSearch(start_world, drive, Returns(returns, config.closures), config)
     sightings = joined([firm(k, each, config) for k, each in enumerate(segments)])
-    return _with_walls(search, sightings, config)
+    return _with_walls(search, sightings, config, rays)
 
 
-def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig) -> Survey:
+def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig, rays: Rays = NO_RAYS) -> Survey:
     """Return poses and walls after all rounds of association and solution; at last, walls that stand twice are one."""
     c, drive = config.closures, search.drive.links(config.doubt, config)
     unknowns = without_lines(settled(search.poses, search.drive, search.closures, config))
@@ -62,6 +64,9 @@ def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksCon
     for gate_m in [*config.gates_m, None]:
         if gate_m is None:
             of = merged(unknowns, spans(unknowns, seen, of), of, config)
+            unknowns = begun(unknowns.poses, seen, of)
+            gone = refuted(unknowns, spans(unknowns, seen, of), rays, config.gates_m[-1])[of]
+            seen, of = seen.take(~gone), np.unique(of[~gone], return_inverse=True)[1]
         else:
             owner = associated(sightings, unknowns.poses, gate_m, config)
             seen, of = sightings.take(owner >= 0), owner[owner >= 0]

@@ -1,0 +1,40 @@
+"""Walls that came and went: scans from which more beams passed through where one stood than ended on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ...estimation.mounting import scanner_poses
+from ...map.kernels.ray_evidence import ray_evidence
+from ...robot import Scan, ScannerSpec
+from .solve import Unknowns
+
+
+@dataclass(frozen=True)
+class Rays:
+    """All scans of a drive, and where their scanner sits on the robot."""
+
+    scans: Sequence[Scan] = ()
+    scanner: ScannerSpec = field(default_factory=ScannerSpec)
+
+
+NO_RAYS = Rays()
+
+
+def refuted(at: Unknowns, reach: Float[np.ndarray, "l 2"], rays: Rays, margin_m: float) -> Bool[np.ndarray, " l"]:
+    """Return which lines more scans speak against than for.
+
+    A scan speaks for a line if more of its beams end within a margin of it, along its reach, than go on beyond it.
+    Beams that end before it say nothing, nor do those beside its ends.
+    """
+    balance = np.zeros(len(at.lines), dtype=np.int64)
+    low, high = reach[:, :1] + margin_m, reach[:, 1:] - margin_m
+    for scan, pose in zip(rays.scans, scanner_poses(at.poses, rays.scanner), strict=False):
+        seen = ray_evidence(scan, pose, at.anchors, at.lines, margin_m)
+        inside = (seen.along > low) & (seen.along < high)
+        ended = np.count_nonzero(seen.hits & inside, axis=1)
+        passed = np.count_nonzero(seen.passes & inside, axis=1)
+        balance += np.sign(ended - passed)
+    return balance < 0
