@@ -14,6 +14,7 @@ from explore.step import Step
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, recording_of
+from slam.association.second_looks.config import SecondLooksConfig
 from slam.mapper import Mapper
 
 from ..artifacts.saved import read_trial
@@ -26,7 +27,7 @@ from .looked_again import looked_again
 from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
 from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
-_BOW = {"bow_rad": float(np.deg2rad(0.5)), "bow_m": 0.02}
+_BOW = {"bow_rad": SecondLooksConfig.floor_rad, "bow_m": SecondLooksConfig.floor_m}
 REAL_WALLS = {"mission": {"mapper": {"walls": {"reliability": {"straightness": _BOW}}}}}
 """Doors, panels and cupboards of a real building: no wall is nearer to its line than this, in any log."""
 

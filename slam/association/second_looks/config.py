@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...odometry.config import ScanMatchingConfig
+
 
 @dataclass(frozen=True)
 class ClosuresConfig:
@@ -12,21 +14,21 @@ class ClosuresConfig:
     every_m: float = 0.5
     """A search begins wherever the robot has gone so far since the last one."""
     query_m: float = 4.0
-    """The scans of so many last metres are laid onto ..."""
+    """The scans of so many last metres are laid onto others. A closure is believed with another one, sought no farther
+    from it along the path and not right before it. They are laid onto ..."""
     beside_m: float = 5.0
     """... an old scan and those that were taken no farther from it along the path."""
     way_m: float = 6.0
     """Old scans that are nearer than this, by the way over motions and closures, need no closure."""
-    recent: int = 20
+    recent: int = ScanMatchingConfig.keyframes
     """So many last scans are not old: odometry was matched to them."""
     radius_m: float = 1.0
-    """A place is sought so far around where it is believed, ..."""
+    """A place is sought so far around where it is believed, and on old scans that were taken farther away by as much:
+    they see the same walls, ..."""
     radius_share: float = 0.04
     """... and farther by this share of the way since, ..."""
     most_m: float = 6.0
     """... where that makes no more than this in all; ..."""
-    view_m: float = 1.0
-    """Old scans count that were taken farther away by so much: they see the same walls."""
     turn_rad: float = float(np.deg2rad(10.0))
     """... and turned by so much, ..."""
     turn_a_metre: float = float(np.deg2rad(0.3))
@@ -37,20 +39,17 @@ class ClosuresConfig:
     """A scan of which a smaller share of points lies near those before it was taken after a slip: the turn between may
     have been any."""
     fit_scans: int = 8
-    """So many scans before it are looked at, ..."""
-    fits_m: float = 0.2
-    """... and points that are nearer than this lie near."""
+    """So many scans before it are looked at."""
     places: int = 3
     """So many stretches of the old path are tried, the nearest first."""
     cell_m: float = 0.1
-    """Size of a cell of the search."""
-    kernel_m: float = 0.1
-    """How fast the likelihood falls with the distance from an old point, as a standard deviation."""
-    gap_m: float = 0.3
+    """Size of a cell of the search, and the standard deviation by which likelihood falls with the distance from an old
+    point. Points within two of these lie near."""
+    gap_m: float = ScanMatchingConfig.gap_m
     """Neighbouring returns that are nearer to each other are of one surface."""
-    step_rad: float = float(np.deg2rad(1.0))
+    step_rad: float = ScanMatchingConfig.step_rad
     """Between two turns that are tried."""
-    least: float = 0.5
+    least: float = ScanMatchingConfig.slip_score
     """A place must have so large a mean likelihood, ..."""
     rival: float = 0.9
     """... and no other place more than this share of it, ..."""
@@ -60,10 +59,8 @@ class ClosuresConfig:
     """... this, are others."""
     least_points: int = 100
     """With fewer points no place is sought."""
-    pair_m: tuple[float, float] = (1.0, 4.0)
-    """A closure is believed with another one, so far from it along the path, ..."""
     agree_m: float = 0.15
-    """... if both put the robot at the same place, to this, ..."""
+    """Two closures agree if both put the robot at the same place, to this, ..."""
     agree_rad: float = float(np.deg2rad(2.5))
     """... and turned alike, to this."""
     sigma_m: float = 0.05

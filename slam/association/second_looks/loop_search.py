@@ -113,7 +113,7 @@ class LoopSearch:
             radius[(slips == count) & (scans < slip)] += lever
         away = np.hypot(*(self.poses[new, :2] - self.poses[:new, :2]).T)
         may = (scans < new - c.recent) & (ways > c.way_m) | (slips > 0)
-        rows = np.flatnonzero(may & (away < radius + c.view_m) & (radius < c.most_m))
+        rows = np.flatnonzero(may & (away < radius + c.radius_m) & (radius < c.most_m))
         stretches = np.split(rows, np.flatnonzero(np.diff(self._ways[rows]) > c.beside_m) + 1)
         nearest = sorted((int(s[np.argmin(away[s])]) for s in stretches if len(s)), key=lambda row: away[row])
         return [(k, Window(self.poses[new].copy(), float(radius[k]), float(turn[k]))) for k in nearest[: c.places]]
@@ -132,7 +132,7 @@ class LoopSearch:
     def _agree(self, one: Closure, other: Closure) -> bool:
         """Return whether two closures put the robot at the same place, by its motion between them."""
         c = self._config.closures
-        low, high = c.pair_m
+        low, high = 2.0 * c.every_m, c.query_m
         if not low <= self._ways[other.new] - self._ways[one.new] <= high:
             return False
         if any(one.new < k <= other.new for k in self._slipped):

@@ -51,7 +51,7 @@ def place_on(
     """Return the place of a window that lays points, robot frame, best on old surfaces; None where none does."""
     c = config
     far = float(np.hypot(*points.T).max())
-    field = field_of(surface_world, window.guess[:2], far + window.half_m, c.cell_m, c.kernel_m, 2)
+    field = field_of(surface_world, window.guess[:2], far + window.half_m, c.cell_m, c.cell_m, 2)
     turns = int(np.ceil(window.half_rad / c.step_rad))
     angles = window.guess[2] + np.arange(-turns, turns + 1) * c.step_rad
     turned = np.array([points @ rotation(angle).T for angle in angles]) + window.guess[:2]
@@ -67,6 +67,6 @@ def place_on(
     poses = np.column_stack([moved, angles[found[:, 1].astype(np.int64)]])
     best = int(np.argmax(found[:, 0]))
     rival = float(found[apart(poses, poses[best], c), 0].max(initial=0.0))
-    fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.kernel_m, 4)
+    fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.cell_m, 4)
     pose, _ = refine(fine, points, poses[best], 0.5 * c.step_rad, 0.1 * c.cell_m)
     return Place(pose, float(found[best, 0]), rival)

@@ -41,6 +41,6 @@ class Returns:
         if not earlier or not len(self.points[scan]):
             return 1.0
         away, _ = cKDTree(np.concatenate(earlier)).query(
-            to_world(self.points[scan], poses[scan]), distance_upper_bound=self.config.fits_m
+            to_world(self.points[scan], poses[scan]), distance_upper_bound=2.0 * self.config.cell_m
         )
         return float(np.isfinite(away).mean())
