@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import networkx as nx
 import numpy as np
@@ -19,13 +19,19 @@ class VisibilityGraph:
     def __init__(self) -> None:
         self.graph: nx.DiGraph[int] = nx.DiGraph()
         self._neighbours: frozenset[tuple[int, int]] = frozenset()
+        self._present: set[int] = set()
+        self._shape: list[tuple[tuple[int, ...], bool]] = []
 
-    def observe(self, walls: StochasticMap, chains: Iterable[Chain], followed: int | None, seen: Iterable[int]) -> None:
+    def observe(self, walls: StochasticMap, chains: Sequence[Chain], followed: int | None, seen: Iterable[int]) -> None:
         """Bring nodes and neighbours up to the map, and note which walls were seen while one was followed."""
         present = set(walls.ids[~walls.tentative].tolist())
-        self.graph.remove_nodes_from([node for node in self.graph if node not in present])
-        self.graph.add_nodes_from(present)
-        self._connect(pair for chain in chains for pair in neighbours(chain))
+        if present != self._present:
+            self.graph.remove_nodes_from([node for node in self.graph if node not in present])
+            self.graph.add_nodes_from(present)
+            self._present = present
+        if (shape := [(chain.walls, chain.is_closed) for chain in chains]) != self._shape:
+            self._connect(pair for chain in chains for pair in neighbours(chain))
+            self._shape = shape
         if followed is not None and followed in present:
             for wall in seen:
                 if wall in present and wall != followed and not self.graph.has_edge(followed, wall):

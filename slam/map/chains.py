@@ -13,6 +13,9 @@ from .kernels.chain_kernels import TAIL as TAIL
 from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, runs, successors
 from .stochastic_map import StochasticMap
 
+NONE = np.zeros(0, dtype=np.int64)
+"""No pairs."""
+
 
 @dataclass(frozen=True)
 class ChainConfig:
@@ -87,8 +90,9 @@ def connect(
     pairs = near_ends(ends, max(config.reach_m, config.set_aside_reach_m, config.overlap_m))
     both_aside = _both_aside(pairs, ids, set_aside, passed)
     gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(config))
-    for k in np.flatnonzero(allowed) if cut_off else ():
-        allowed[k] = tuple(ids[pairs[k]].tolist()) not in cut_off
+    joins = np.flatnonzero(allowed) if cut_off else NONE
+    for k, pair in zip(joins.tolist(), ids[pairs[joins]].tolist(), strict=True):
+        allowed[k] = tuple(pair) not in cut_off
     successor = successors(pairs, gaps, allowed, len(rows))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
@@ -114,10 +118,14 @@ def _both_aside(
     both_aside = np.zeros(len(pairs), dtype=bool)
     if not set_aside:
         return both_aside
-    aside = np.isin(2 * ids[:, None] + [TAIL, HEAD], [2 * wall + side for wall, side in set_aside])
+    aside, (named, sides) = np.zeros((len(ids), 2), dtype=bool), np.array(list(set_aside)).T
+    rows = np.minimum(np.searchsorted(ids, named), len(ids) - 1)
+    there = ids[rows] == named
+    aside[rows[there], sides[there]] = True
     both_aside |= aside[pairs[:, 0], HEAD] & aside[pairs[:, 1], TAIL]
-    for k in np.flatnonzero(both_aside):
-        both_aside[k] = tuple(ids[pairs[k]].tolist()) not in passed
+    joins = np.flatnonzero(both_aside)
+    for k, pair in zip(joins.tolist(), ids[pairs[joins]].tolist(), strict=True):
+        both_aside[k] = tuple(pair) not in passed
     return both_aside
 
 
