@@ -21,6 +21,11 @@ KINDS = {"float": "fiu", "int": "iu", "bool": "b", "text": "U"}
 TYPES = {"float": np.float64, "int": np.int64, "bool": np.bool_}
 
 
+BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError)
+"""What zipfile raises: for other files and wrong sums, for what cannot be inflated, for contents cut short, for
+encrypted members and unknown compressions, for places before the file's beginning."""
+
+
 class ArchiveError(ValueError):
     """A file that holds other arrays than it should, told in words: what was found."""
 
@@ -60,7 +65,7 @@ def read_archive(
             return _read(archive, needed, welcome or {}, others)
     except ArchiveError:
         raise
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+    except BROKEN as error:
         raise ArchiveError("no archive of arrays, or one that was cut short") from error
 
 
@@ -103,8 +108,6 @@ def _header(stream: Any, name: str) -> _Header:
         shape, in_columns, dtype = read(stream)
     except (ValueError, TypeError, SyntaxError, tokenize.TokenError, MemoryError, RecursionError) as error:
         raise ArchiveError(f"{name} without the header of an array") from error
-    if dtype.hasobject or dtype.kind not in "fiubU":
-        raise ArchiveError(f"{name} of type {dtype}")
     if any(size < 0 for size in shape):
         raise ArchiveError(f"{name} of shape {shape}")
     return _Header(shape, in_columns, dtype, math.prod(shape) * dtype.itemsize)

@@ -103,6 +103,22 @@ def test_a_robot_carried_to_another_building_is_lost_and_keeps_its_map():
     assert drive.off[0] < 0.1
 
 
+def test_a_scan_is_laid_beside_the_walls_near_it_and_beside_all_in_range_where_the_robot_may_be_elsewhere():
+    drive = Drive()
+    mapper, walls, asked = drive.mapper, drive.updates[-1].map, []
+    scan = Scan(drive.finder.bearings_rad, drive.finder.cast(drive.pose)[0], 0.01, CONFIG.range_max_m, 0.0)
+    one = drive.updates[-1].segments.take(np.array([0]))
+    near, anywhere = (mapper._view(scan, one, walls, anywhere=lost).walls.ids for lost in (False, True))
+    assert 0 < len(near) < len(anywhere)
+    assert set(near) < set(anywhere) == set(walls.ids[walls.distances_m < CONFIG.range_max_m])
+    view = mapper._view
+    mapper._view = lambda *of, anywhere=False: asked.append(anywhere) or view(*of, anywhere=anywhere)
+    drive.move(STEP)
+    assert True not in asked
+    drive.move(STEP, [0.0, 0.0, np.deg2rad(-8.0)])
+    assert True in asked
+
+
 def test_where_scans_told_the_motion_the_walls_are_doubted_and_not_the_robot():
     """Walls that were once drawn at a wrong pose contradict each scan from then on; a map that stops keeps them."""
     drive = Drive()

@@ -7,8 +7,11 @@ import pytest
 from rerun.chunk import RrdReader
 
 from experiments.commands.cli import main
+from experiments.replays.real_log import RealOptions, read_real_run
+from experiments.scenario import TrialConfig
 
 ROOM = (6.0, 4.0)
+STRAIGHTNESS = "mission.mapper.walls.reliability.straightness"
 MADE = {
     *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.dxf", "map.png", "steps.csv"),
     *("trajectory_estimated.tum", "trajectory_odometry.tum"),
@@ -107,6 +110,16 @@ def test_the_same_command_leaves_the_same_bytes_and_another_is_refused_in_its_fo
     capsys.readouterr()
     assert main([*words, "--every", "2"]) == 2
     assert "a replay of other options" in capsys.readouterr().err
+
+
+def test_walls_of_a_real_log_bow_and_whoever_knows_better_says_so(tmp_path):
+    log, options = write_log(tmp_path / "room.log", scans=2), RealOptions()
+    for sets, bow_rad in (((), np.deg2rad(0.5)), ((f"{STRAIGHTNESS}.bow_rad=0.0",), 0.0)):
+        trial = read_real_run(log, options, None, sets, {}).trial
+        straightness = trial.mission.mapper.walls.reliability.straightness
+        assert straightness.bow_rad == pytest.approx(bow_rad)
+        assert straightness.bow_m == 0.02
+    assert TrialConfig("a").mission.mapper.walls.reliability.straightness.bow_m == 0.0
 
 
 def test_settings_reach_the_mapper_and_every_second_keyframe_is_mapped(replayed, tmp_path):

@@ -3,6 +3,7 @@
 import io
 import os
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -128,9 +129,71 @@ def test_what_is_no_archive_of_arrays_is_told(tmp_path):
     with pytest.raises(ArchiveError, match="no ranges"):
         read_archive(zipped(tmp_path / "b.npz", [("time.npy", member((0,)))]), LAYOUT)
     os.mkfifo(tmp_path / "pipe")
-    for place in (tmp_path, tmp_path / "pipe", tmp_path / "nowhere"):
-        with pytest.raises(OSError, match=r"folder|plain|No such"):
+    for place, found in (
+        (tmp_path, "a folder"),
+        (tmp_path / "pipe", "no plain file"),
+        (tmp_path / "nowhere", "No such"),
+    ):
+        with pytest.raises(OSError, match=found):
             read_archive(place, LAYOUT)
+
+
+def test_no_array_has_less_than_no_rows(tmp_path):
+    """Its bytes, below zero, would let a larger array through."""
+    text = repr({"descr": "<f8", "fortran_order": False, "shape": (-1,)}).ljust(200).encode()
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    with pytest.raises(ArchiveError, match="of shape"):
+        read_archive(zipped(tmp_path / "a.npz", [("time.npy", content)]), {"time": "float s"})
+
+
+def changed(content, at, value):
+    """The same bytes with two others at a place of the only member's local header and of its entry in the directory."""
+    entry = content.index(b"PK\x01\x02")
+    found = bytearray(content)
+    for first in (at, entry + at + 2):
+        found[first : first + 2] = value.to_bytes(2, "little")
+    return bytes(found)
+
+
+def deflated(tmp_path):
+    return zipped(tmp_path / "a.npz", [("time.npy", member((300,), np.arange(300.0).tobytes()))]).read_bytes()
+
+
+def bad_block(content):
+    """The first block of the deflated member is of a kind that there is not."""
+    found, first = bytearray(content), 30 + len("time.npy")
+    found[first] |= 0b110
+    return bytes(found)
+
+
+def cut_short(content):
+    """More is promised of the member, in the directory and in the array's header, than the file holds."""
+    promised, stored = member((10_000,)), io.BytesIO()
+    with zipfile.ZipFile(stored, "w", zipfile.ZIP_STORED) as file:
+        file.writestr("time.npy", promised)
+    found = bytearray(stored.getvalue())
+    entry = found.index(b"PK\x01\x02")
+    for first in (entry + 20, entry + 24):
+        found[first : first + 4] = (len(promised) + 80_000).to_bytes(4, "little")
+    return bytes(found)
+
+
+BREAKS = {
+    zipfile.BadZipFile: lambda content: b"PK" + content[:20],
+    zlib.error: bad_block,
+    RuntimeError: lambda content: changed(content, 6, 1),
+    NotImplementedError: lambda content: changed(content, 8, 99),
+    EOFError: cut_short,
+}
+
+
+@pytest.mark.parametrize("kind", BREAKS, ids=lambda kind: kind.__name__)
+def test_whatever_zipfile_cannot_read_is_told_in_the_same_words(tmp_path, kind):
+    content = BREAKS[kind](deflated(tmp_path))
+    with pytest.raises(kind), zipfile.ZipFile(io.BytesIO(content)) as file:
+        file.read("time.npy")
+    with pytest.raises(ArchiveError, match="no archive of arrays"):
+        read_archive(content, {"time": "float s"})
 
 
 def test_an_archive_without_its_first_bytes_is_told(tmp_path):
