@@ -59,10 +59,6 @@ class ClosuresConfig:
     """... this, are others."""
     least_points: int = 100
     """With fewer points no place is sought."""
-    agree_m: float = 0.15
-    """Two closures agree if both put the robot at the same place, to this, ..."""
-    agree_rad: float = float(np.deg2rad(2.5))
-    """... and turned alike, to this."""
     sigma_m: float = 0.05
     """Standard deviation of a closure, across both axes ..."""
     sigma_rad: float = float(np.deg2rad(0.7))
@@ -76,6 +72,16 @@ class ClosuresConfig:
     count, at last only those that agree with each other."""
     taken_back: float = 6.0
     """A closure that is off by more standard deviations than this in the end is taken back."""
+
+    @property
+    def agree_m(self) -> float:
+        """Two closures agree if both put the robot at the same place, to this: the last of `doubts` ..."""
+        return self.doubts[-1] * self.sigma_m
+
+    @property
+    def agree_rad(self) -> float:
+        """... and turned alike, to this."""
+        return self.doubts[-1] * self.sigma_rad
 
 
 @dataclass(frozen=True)
