@@ -57,6 +57,9 @@ class Replay:
     (trajectory_smoothed.tum). Back ends that smooth do so anyway."""
     every: int = 1
     """Of a real robot's log, map one of so many keyframes (the scans that are 0.1 m or 5 degrees apart)."""
+    range_noise: float | None = None
+    """Of a real robot's log, the standard deviation of a range in metres; by default 0.02 for all logs, since they do
+    not state it and real walls scatter more than scanners do."""
     relations: Path | None = None
     """Relations between poses that others measured, `t1 t2 x y z roll pitch yaw` on each line: how far is the path
     from them?"""
@@ -122,6 +125,10 @@ class Replay:
         if is_own and self.every != 1:
             raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
         if is_own and knows_truth(self.log):
+            if self.range_noise is not None:
+                raise UsageError(
+                    f"expected --range-noise with a log that states none, found {self.log.name}: leave it out"
+                )
             run = retuned(read_run(self.log), self.config, self.set, robot)
             options = ReplayOptions(
                 self.association, self.perfect_extraction, self.perfect_odometry, self.odometry or "wheels"
@@ -133,7 +140,8 @@ class Replay:
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
         read = read_own_run if is_own else read_real_run
-        told = RealOptions(self.every, self.odometry or ("wheels" if is_own else "scans"), self.second_looks)
+        odometry: OdometrySource = self.odometry or ("wheels" if is_own else "scans")
+        told = RealOptions(self.every, odometry, self.second_looks, self.range_noise)
         real = RealLog(read(self.log, told, self.config, self.set, robot))
         if real.run.log.trouble:
             say(

@@ -32,6 +32,10 @@ REAL_WALLS = {"mission": {"mapper": {"walls": {"reliability": {"straightness": _
 """Doors, panels and cupboards of a real building: no wall is nearer to its line than this, in any log."""
 
 
+FARTHEST_NOISE_M = 1.0
+"""No range finder is as bad."""
+
+
 @dataclass(frozen=True)
 class RealOptions:
     """How a real robot's log is taken."""
@@ -42,6 +46,8 @@ class RealOptions:
     """Who tells the motion between two keyframes."""
     second_looks: bool = False
     """Whether all segments are associated anew once the drive has ended; a back end that smooths has it anyway."""
+    range_noise: float | None = None
+    """Standard deviation of a range, where the scanner's is known; None for what is assumed of all logs."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +75,7 @@ def read_real_run(
     if options.every < 1:
         raise UsageError(f"expected each keyframe or one of so many, found --every {options.every}: give 1 or more")
     try:
-        log = read_recorded_log(path, KeyframesConfig(every=options.every))
+        log = read_recorded_log(path, _keyframes(options))
     except RecordingError as error:
         raise UsageError(str(error)) from error
     plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
@@ -79,6 +85,16 @@ def read_real_run(
     return RealRun(path.name, log, trial, options)
 
 
+def _keyframes(options: RealOptions) -> KeyframesConfig:
+    """Return which scans are mapped and with which noise; raises UsageError for a noise that no scanner has."""
+    plain, noise_m = KeyframesConfig(every=options.every), options.range_noise
+    if noise_m is None:
+        return plain
+    if not 0.0 < noise_m < FARTHEST_NOISE_M:
+        raise UsageError(f"expected a range noise in metres, found --range-noise {noise_m:g}: give 0.001 to 0.1 or so")
+    return replace(plain, sigma_m=noise_m)
+
+
 def read_own_run(
     path: Path, options: RealOptions, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any]
 ) -> RealRun:
@@ -86,6 +102,8 @@ def read_own_run(
 
     Settings, odometry and noise are those of its drive. `robot` holds settings of what the robot states.
     """
+    if options.range_noise is not None:
+        raise UsageError(f"expected --range-noise with a log that states none, found {path.name}: leave it out")
     try:
         recording = recording_of(read_log(path))
     except RecordingError as error:

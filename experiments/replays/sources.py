@@ -73,7 +73,8 @@ class RealLog:
 
     def config(self, backend: str) -> dict[str, Any]:
         """Return the settings of the mapper, and how the log was taken."""
-        return config_record(replayed_real(self.run, backend)) | {REPLAY: {RECORDED: asdict(self.run.options)}}
+        said = {name: value for name, value in asdict(self.run.options).items() if value is not None}
+        return config_record(replayed_real(self.run, backend)) | {REPLAY: {RECORDED: said}}
 
     def go(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
         """Map it."""

@@ -123,11 +123,15 @@ def test_walls_of_a_real_log_bow_and_whoever_knows_better_says_so(tmp_path):
 
 
 def test_settings_reach_the_mapper_and_every_second_keyframe_is_mapped(replayed, tmp_path):
-    words = ["replay", str(replayed / "room.log"), "--out", str(tmp_path), "--every", "2"]
+    words = ["replay", str(replayed / "room.log"), "--out", str(tmp_path), "--every", "2", "--range-noise", "0.01"]
     assert main([*words, "--set", "mission.mapper.matching.gate=0.95"]) == 0
     config, summary = (json.loads((tmp_path / name).read_text()) for name in ("config.json", "summary.json"))
     assert config["trial"]["mission"]["mapper"]["matching"]["gate"] == 0.95
-    assert config["replay"] == {"recorded": {"every": 2, "odometry": "scans", "second_looks": False}}
+    assert config["replay"] == {
+        "recorded": {"every": 2, "odometry": "scans", "second_looks": False, "range_noise": 0.01}
+    }
+    with np.load(tmp_path / "log.npz") as arrays:
+        assert np.all(arrays["sigma_m"] == 0.01)
     whole = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
     assert summary["steps"] == -(-whole // 2)
     assert len(np.loadtxt(tmp_path / "trajectory_estimated.tum")) == 24
@@ -150,6 +154,7 @@ BAD = {
     "empty": ([], b"", "found none of them"),
     "truth": (["--association", "true"], None, "expected a log that knows the truth"),
     "every": (["--every", "0"], None, "found --every 0"),
+    "noise": (["--range-noise", "0"], None, "found --range-noise 0"),
     "settled": (["--set", "seed=4"], None, "'seed'"),
     "back end": (["--backend", "none"], None, "expected a back end out of"),
 }
@@ -168,6 +173,7 @@ def test_what_cannot_be_replayed_is_told_in_one_line(tmp_path, capsys, case):
     assert not (tmp_path / "out" / "summary.json").exists()
 
 
-def test_every_is_refused_for_a_runs_own_log(replayed, capsys):
-    assert main(["replay", str(replayed / "out" / "full-ekf" / "log.npz"), "--every", "2"]) == 2
+@pytest.mark.parametrize("option", [["--every", "2"], ["--range-noise", "0.01"]])
+def test_every_and_noise_are_refused_for_a_runs_own_log(replayed, capsys, option):
+    assert main(["replay", str(replayed / "out" / "full-ekf" / "log.npz"), *option]) == 2
     assert "leave it out" in capsys.readouterr().err
