@@ -2,6 +2,7 @@
 
 import io
 import os
+import tokenize
 import zipfile
 import zlib
 
@@ -105,6 +106,27 @@ def test_absurd_headers_are_told(tmp_path, shape):
         text = repr({"descr": "<f8", "fortran_order": False, "shape": shape}).ljust(200).encode()
     content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
     with pytest.raises(ArchiveError):
+        read_archive(zipped(tmp_path / "a.npz", [("time.npy", content)]), {"time": "float s"})
+
+
+NO_HEADERS = {
+    ValueError: "{}",
+    TypeError: "{1: 2, 'a': 3}",
+    SyntaxError: "  {}\n {}",
+    tokenize.TokenError: "(",
+    RecursionError: "-" * 3000 + "1",
+    MemoryError: "-" * 9000 + "1",
+}
+"""By what numpy raises of them; of the last two it may be either."""
+
+
+@pytest.mark.parametrize("kind", NO_HEADERS, ids=lambda kind: kind.__name__)
+def test_whatever_numpy_cannot_read_of_a_header_is_told_in_the_same_words(tmp_path, kind):
+    text = NO_HEADERS[kind].encode()
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    with pytest.raises((kind, RecursionError, MemoryError)):
+        np.lib.format.read_array(io.BytesIO(content))
+    with pytest.raises(ArchiveError, match="time without the header of an array"):
         read_archive(zipped(tmp_path / "a.npz", [("time.npy", content)]), {"time": "float s"})
 
 
