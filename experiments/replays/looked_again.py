@@ -15,7 +15,6 @@ from slam.geometry.poses import to_world
 from slam.map.chains import connect
 from slam.odometry.scan_matching import returns_within
 
-from ..scoring.records import Log
 from ..scoring.without_truth.certificate import certificate_record
 from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
@@ -37,10 +36,10 @@ def looked_again(result: TrialResult) -> TrialResult:
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
     drive = Drive(log.odometry[1:], log.odometry_cov[1:])
     survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, Rays(scans, on_body))
-    return _mapped(result, log, last, survey)
+    return _mapped(result, last, survey)
 
 
-def _mapped(result: TrialResult, log: Log, last: Step, survey: Survey) -> TrialResult:
+def _mapped(result: TrialResult, last: Step, survey: Survey) -> TrialResult:
     """Return a result with a survey's path and walls, and what these can vouch for."""
     mission = result.scenario.config.mission
     walls = survey.walls

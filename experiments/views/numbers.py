@@ -23,12 +23,12 @@ def number(value: float | int | None, digits: int = 3) -> str:
     return np.format_float_positional(float(short), trim="-") if "e-" in short else short
 
 
-def digits_apart(values: Sequence[float], most: int = 6) -> int:
-    """Return how many significant digits (3 to `most`) tell numbers that differ from one another."""
-    for digits in range(3, most):
+def digits_apart(values: Sequence[float]) -> int:
+    """Return how many significant digits (3 to 6) tell numbers that differ from one another."""
+    for digits in range(3, 6):
         if len({number(value, digits) for value in values}) == len(set(values)):
             return digits
-    return most
+    return 6
 
 
 def percent(value: float | None) -> str:

@@ -22,6 +22,8 @@ STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
 AWAY_M = 1.5
 """... after at least so many metres elsewhere."""
+PITCH_M = 0.05
+"""Points along a path are so far apart at most."""
 ENLARGED = 10.0
 """How much ellipses of the model space are enlarged."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
@@ -30,11 +32,11 @@ GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 Rings = Sequence[Float[np.ndarray, "_ 2"]]
 
 
-def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str, dof: int = 3) -> Figure:
+def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str) -> Figure:
     """Return the NEES of each back end against the step, on a logarithmic axis, with its 95 % band."""
     figure, axes = _figure(title, (7.2, 3.2))
     axes.margins(x=0.01)
-    low, high = chi2_band(dof)
+    low, high = chi2_band(3)
     axes.axhspan(low, high, color=palette.SWEPT, zorder=1, label="95 % band")
     for backend, values in curves.items():
         axes.plot(values, color=palette.of_backend(backend), linewidth=1.1, label=backend, zorder=2)
@@ -49,7 +51,6 @@ def draw_coverage(
     curves: Mapping[str, tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]],
     colours: Mapping[str, str],
     title: str,
-    ways: str = "way driven, m",
 ) -> Figure:
     """Return the share of the reachable contour that is mapped against the metres driven, a curve for each name."""
     figure, axes = _figure(title, (7.2, 3.2))
@@ -58,7 +59,7 @@ def draw_coverage(
         axes.plot(metres, 100.0 * share, color=colours[name], linewidth=1.4, label=literal(name))
     axes.set_ylim(0.0, 102.0)
     axes.grid(color=palette.GRID, linewidth=0.5)
-    axes.set_xlabel(ways)
+    axes.set_xlabel("way driven, m")
     axes.set_ylabel("contour mapped, %")
     axes.legend(frameon=False, fontsize=8, ncols=6, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figure
@@ -152,10 +153,10 @@ def traversals(places: Float[np.ndarray, "p 2"]) -> Int[np.ndarray, " p"]:
     return np.array([1 + int(np.count_nonzero(np.diff(along[rows]) > AWAY_M)) for rows in near])
 
 
-def _dense(places: Float[np.ndarray, "s 2"], pitch_m: float = 0.05) -> Float[np.ndarray, "p 2"]:
-    """Return points along a path, at most `pitch_m` apart."""
+def _dense(places: Float[np.ndarray, "s 2"]) -> Float[np.ndarray, "p 2"]:
+    """Return points along a path, at most `PITCH_M` apart."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
-    at = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / pitch_m)) + 1, 2))
+    at = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / PITCH_M)) + 1, 2))
     return np.stack([np.interp(at, along, places[:, axis]) for axis in (0, 1)], axis=-1)
 
 
