@@ -1,18 +1,16 @@
 """The settings of the seven steps, one group for each part."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 
 from .association.matching import MatchingConfig
 from .association.recovery import RecoveryConfig
+from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
 from .map.candidates import CandidatesConfig
-from .map.chains import ChainConfig
 from .map.change_points import ChangePointsConfig
 from .map.extents import WallsConfig
 from .map.merging import MergingConfig
-from .map.openings import OpeningsConfig
-from .map.vertices import VerticesConfig
-from .robot import RobotSpec, of_robot
+from .robot import RobotSpec, fitted, of_robot
 
 
 @dataclass(frozen=True)
@@ -20,18 +18,25 @@ class MapperConfig:
     """The rules of the seven steps."""
 
     robot: RobotSpec = of_robot()
+    shared: SharedConfig = field(default_factory=SharedConfig)
+    """What more than one of the rules asks for; it reaches all groups below."""
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
-    vertices: VerticesConfig | None = field(default_factory=VerticesConfig)
-    """None where no segment is cut at bends that the map knows, and no wall for them."""
-    chains: ChainConfig = field(default_factory=ChainConfig)
+    vertices: bool = True
+    """Whether segments are cut at bends that the map knows, and walls for them."""
     walls: WallsConfig = field(default_factory=WallsConfig)
     candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
-    openings: OpeningsConfig = field(default_factory=OpeningsConfig)
     change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
     """None where no wall is cut for bends that only all scans together show; they are never looked for either where
-    `vertices` is None."""
+    `vertices` is False."""
     merging: MergingConfig | None = field(default_factory=MergingConfig)
     """None where one wall may stand in the map twice."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
     """None where the robot is taken at its word."""
+
+    def __post_init__(self) -> None:
+        """Let every group know what all share."""
+        for each in fields(self):
+            group = getattr(self, each.name)
+            if is_dataclass(group) and each.name not in ("robot", "shared"):
+                object.__setattr__(self, each.name, fitted(group, self.shared))

@@ -27,8 +27,9 @@ class MapKeeper:
         self.backend = backend
         self.config = config
         change_points = config.change_points or ChangePointsConfig()
-        self.landmarks = Landmarks(config.walls, change_points, config.openings, config.chains)
-        self._candidates = LandmarkCandidates(config.matching.gate, config.matching.angle_rad, config.candidates)
+        self.landmarks = Landmarks(config.walls, change_points)
+        same = config.matching.gate, config.matching.angle_rad
+        self._candidates = LandmarkCandidates(*same, config.extraction.sure_beams, config.candidates)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""
@@ -60,7 +61,7 @@ class MapKeeper:
         """Return the chains of the walls, by what this scan and those before saw between them."""
         openings = self.landmarks.openings
         openings.see(walls, scan)
-        return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.chains)
+        return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.shared)
 
     def _initialised(
         self, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
@@ -96,10 +97,10 @@ class MapKeeper:
     def _ended(self, scan: Scan) -> StochasticMap:
         """Return the map, in which the sides of a bend end where they meet."""
         walls = self.map()
-        if self.config.vertices is None:
+        if not self.config.vertices:
             return walls
         one_wall, sides = self.config.matching.one_wall, self.landmarks.change_points
-        pairs, along = meetings(walls, scan.range_max_m, one_wall, self.config.vertices, sides.cut)
+        pairs, along = meetings(walls, scan.range_max_m, one_wall, self.config.shared, sides.cut)
         if not len(pairs):
             return walls
         self.landmarks.extents.meet(pairs, along)

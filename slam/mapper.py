@@ -12,7 +12,7 @@ from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
 from .association.recovery import Localisation, unstated_motion
-from .association.view import View, near_segments
+from .association.view import View, may_be_off_m, near_segments
 from .config import MapperConfig
 from .estimation.backend import Backend, Belief, Observations
 from .estimation.mounting import belief_of_body, odometry_of_body, odometry_of_scanner
@@ -23,7 +23,7 @@ from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map.vertices import VerticesConfig, mistaken, vertices_within
+from .map.vertices import mistaken, vertices_within
 from .map_keeper import MapKeeper
 from .robot import Odometry, RobotError, Scan
 
@@ -141,11 +141,11 @@ class Mapper:
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
         walls = self._keeper.map()
-        if self.config.vertices is None:
+        if not self.config.vertices:
             return self._pieces(scan), walls
-        segments = self._segments(scan, walls, self.config.vertices)
+        segments = self._segments(scan, walls)
         return segments, self._keeper.without(
-            mistaken(segments, walls, self.config.matching.gate, self.config.vertices), walls
+            mistaken(segments, walls, self.config.matching.gate, self.config.shared), walls
         )
 
     def _localised(self, scan: Scan, segments: Segments, walls: StochasticMap) -> Localised:
@@ -208,8 +208,7 @@ class Mapper:
     def _view(self, scan: Scan, segments: Segments, walls: StochasticMap, anywhere: bool = False) -> View:
         """Return the scan beside the walls that its segments may be of, or `anywhere` in the scanner's range."""
         belief, config = walls.belief, self.config.matching
-        lost_m = 3.0 * float(np.sqrt(np.trace(belief.pose_cov[:2, :2])))
-        near = walls.distances_m < scan.range_max_m + max(config.offset_m, lost_m)
+        near = walls.distances_m < scan.range_max_m + may_be_off_m(belief.pose_cov, config, np.zeros(1))
         if self._method.looks_near and not anywhere:
             in_range = np.flatnonzero(near)
             ends = walls.ends_world[in_range]
@@ -224,19 +223,19 @@ class Mapper:
         cov = as_told(observed.cov[reliable], segments.take(rows[reliable]), self.config.walls.reliability)
         return Observations(observed.ids[reliable], observed.lines[reliable], cov)
 
-    def _segments(self, scan: Scan, walls: StochasticMap, vertices: VerticesConfig) -> Segments:
+    def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""
         segments = self._pieces(scan)
-        bends = self._bends(segments, walls, vertices)
+        bends = self._bends(segments, walls)
         return self._pieces(scan, bends) if len(bends) else segments
 
     def _pieces(self, scan: Scan, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES) -> Segments:
         config = self.config.extraction
         return sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
 
-    def _bends(self, segments: Segments, walls: StochasticMap, vertices: VerticesConfig) -> Float[np.ndarray, " b"]:
+    def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
         cut = self._keeper.landmarks.change_points.cut
-        return vertices_within(segments, walls, self.config.matching.one_wall, vertices, cut)
+        return vertices_within(segments, walls, self.config.matching.one_wall, self.config.shared, cut)
 
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
@@ -246,14 +245,14 @@ class Mapper:
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside the bend; all as it was, and none, while the scan shows a side too poorly.
         """
-        vertices, change_points = self.config.vertices, self._keeper.landmarks.change_points
-        if vertices is None or self.config.change_points is None:
+        change_points = self._keeper.landmarks.change_points
+        if not self.config.vertices or self.config.change_points is None:
             return segments, matches, NONE
         change_point = change_points.see(self.backend.belief, scan, segments, matches.pairs)
         if change_point is None:
             return segments, matches, NONE
         walls = self._keeper.map()
-        pieces = self._pieces(scan, np.append(self._bends(segments, walls, vertices), change_point.bearing_rad))
+        pieces = self._pieces(scan, np.append(self._bends(segments, walls), change_point.bearing_rad))
         clear = np.flatnonzero(are_clear(pieces, self.config.walls.reliability))
         sides = change_points.sides_of(change_point, segments, pieces.take(clear), scan)
         if sides is None:

@@ -21,14 +21,18 @@ TUNED = ("slam", "explore")
 """The rooms whose numbers decide what is mapped and where the robot drives."""
 PLAIN = (0, 1, 2, -1)
 """Numbers in a condition that say "none", "one", "both" or "the last" and are not chosen."""
+LAYOUT = ("POSE", "POSE_ROWS", "LINE_ROWS", "FORMAT", "NANO", "ROOM", "SPARE", "_AT_ONCE", "TINY", "LEAST_SIGMA")
+"""Constants that are no choice: shapes of arrays and files, room that is kept for more, and where arithmetic ends."""
+HALF = 0.5
+"""No choice either, but in a comparison: the middle of two."""
 PREFACE = """# Numbers that one may tune
 
 <!-- made by `make settings` -->
 
 Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, and what a robot states, `XSpec.name`;
-reachable by `--set`), constants, and numbers in conditions. The end of a name is its unit (`_m`, `_rad`, `_s`,
-`_steps`); others are counts or ratios.
-Numbers in conditions that have no words guard the arithmetic or count in geometry (a ring has three corners).
+reachable by `--set`), constants, and numbers in the middle of the code: in conditions, and all others with a point but
+0, 1, 2 and a half. The end of a name is its unit (`_m`, `_rad`, `_s`, `_steps`); others are counts or ratios.
+Numbers in the code that have no words guard the arithmetic or count in geometry (a ring has three corners).
 `make counts` counts them.
 """
 NO_ENTRIES = {"__pycache__", "__init__.py", "py.typed"}
@@ -44,7 +48,7 @@ class Number:
     """`Class.field` or `CONSTANT`; for a literal the condition that it stands in."""
     value: str
     kind: str
-    """`setting`, `constant` or `literal`."""
+    """`setting`, `constant` or `literal`; `layout` for what nobody would tune."""
     says: str
     """The docstring below it; empty where there is none."""
 
@@ -80,7 +84,7 @@ def _settings(file: str, tree: ast.Module) -> list[Number]:
 
 def _constants(file: str, tree: ast.Module) -> list[Number]:
     return [
-        Number(file, line, name, value, "constant", says)
+        Number(file, line, name, value, "layout" if name in LAYOUT else "constant", says)
         for line, name, value, says in _assigned(tree.body)
         if name.isupper()
     ]
@@ -120,13 +124,21 @@ def _is_number(value: ast.expr) -> bool:
 
 
 def _literals(file: str, tree: ast.Module) -> list[Number]:
-    """Return the numbers that stand in comparisons."""
-    return [
-        Number(file, leaf.lineno, ast.unparse(each), str(leaf.value), "literal", "")
-        for each in ast.walk(tree)
-        if isinstance(each, ast.Compare)
-        for leaf in _chosen(each)
-    ]
+    """Return the numbers that stand in comparisons, and those with a point that stand anywhere else in a function."""
+    compared = {
+        leaf: ast.unparse(each) for each in ast.walk(tree) if isinstance(each, ast.Compare) for leaf in _chosen(each)
+    }
+    others = {
+        leaf: ast.unparse(each).splitlines()[0]
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef)
+        for each in ast.walk(function)
+        if isinstance(each, ast.stmt) and not hasattr(each, "body")
+        for leaf in ast.walk(each)
+        if isinstance(leaf, ast.Constant) and type(leaf.value) is float and leaf.value not in (*PLAIN, HALF)
+    }
+    found = sorted((others | compared).items(), key=lambda item: item[0].lineno)
+    return [Number(file, leaf.lineno, place, str(leaf.value), "literal", "") for leaf, place in found]
 
 
 def _chosen(comparison: ast.Compare) -> Iterator[ast.Constant]:
@@ -186,11 +198,14 @@ def main() -> int:
         print(page(numbers), end="")
         return 0
     kinds = ("setting", "constant", "literal")
-    shown = Table("room", *(f"{kind}s" for kind in kinds), "all", "without words", title="Numbers that one may tune")
+    columns = (*(f"{kind}s" for kind in kinds), "all", "without words", "and layout")
+    shown = Table("room", *columns, title="Numbers that one may tune")
     for room in TUNED:
-        own = [each for each in numbers if each.file.startswith(f"{room}/")]
+        everything = [each for each in numbers if each.file.startswith(f"{room}/")]
+        own = [each for each in everything if each.kind in kinds]
         mute = sum(not each.says for each in own if each.kind != "literal")
-        shown.add_row(room, *(str(sum(each.kind == kind for each in own)) for kind in kinds), str(len(own)), str(mute))
+        each_kind = (str(sum(each.kind == kind for each in own)) for kind in kinds)
+        shown.add_row(room, *each_kind, str(len(own)), str(mute), str(len(everything) - len(own)))
     console.print(shown)
     folders = entries(asked.root)
     fullest = sorted(folders.items(), key=lambda item: -item[1])[:8]

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 10,
+    CONFIG: 11,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -31,7 +31,7 @@ Format 2 had one setting more (`older.DROPPED`), format 3 no `matching.method`, 
 format 5 the body and the step stood at several places (`MOVED`), until format 6 no robot was ever lost
 (`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
 (`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
-Until format 9 some settings said what another says.
+Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -53,24 +53,22 @@ def fault(said: Any, name: str, older: bool = True) -> str:
 
 
 RENAMED: dict[str, str | None] = {
-    "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.extraction.sure_gap_m",
-    "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.extraction.corner_leap_m",
+    "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.shared.door_m",
+    "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.shared.within_m",
     "mission.max_steps": None,
     "mission.explorer.sweeping.near_m": "mission.explorer.near_m",
     "mission.explorer.following.looks": "mission.explorer.following.viewpoints",
     "mission.mapper.bends": "mission.mapper.vertices",
     "mission.mapper.bends.young_sightings": None,
-    "mission.mapper.chains.bend_sightings": None,
+    "mission.mapper.chains": None,
     "mission.mapper.duplicates": "mission.mapper.merging",
     "mission.mapper.duplicates.gate": None,
     "mission.mapper.faint": "mission.mapper.candidates",
-    "mission.mapper.gaps": "mission.mapper.openings",
-    "mission.mapper.gaps.widest_m": None,
-    "mission.mapper.gaps.corner_m": None,
+    "mission.mapper.gaps": None,
     "mission.mapper.kinks": "mission.mapper.change_points",
     "mission.mapper.torn": None,
     "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
-    "mission.mapper.walls.trusted_sightings": "mission.mapper.walls.trusted_observations",
+    "mission.mapper.walls.trusted_sightings": None,
     "mission.mapper.walls.established_sightings": None,
     "robot.drive.step_max_m": "robot.step_m",
     "robot.drive.turn_max_rad": "robot.turn_rad",
@@ -88,30 +86,69 @@ DROPPED = {
     "mission.mapper.change_points.most_rad",
     "mission.mapper.ambiguity.turn_rad",
     "mission.mapper.ambiguity.across_m",
+    "mission.mapper.candidates.apart_m",
     "mission.mapper.candidates.gate",
-    "mission.mapper.chains.vertex_observations",
+    "mission.mapper.candidates.looks",
+    "mission.mapper.candidates.spare_beams",
     "mission.mapper.change_points.agrees_sigmas",
     "mission.mapper.change_points.ends",
+    "mission.mapper.change_points.gate_sigmas",
     "mission.mapper.change_points.least_rad",
     "mission.mapper.extraction.corner_beams",
+    "mission.mapper.extraction.corner_leap_m",
     "mission.mapper.extraction.loose_cost",
+    "mission.mapper.extraction.noise_sigmas",
+    "mission.mapper.extraction.open_gate_sigmas",
+    "mission.mapper.extraction.settling_rounds",
+    "mission.mapper.extraction.sure_gap_m",
+    "mission.mapper.matching.apart_m",
+    "mission.mapper.matching.beside_m",
+    "mission.mapper.matching.clear",
+    "mission.mapper.matching.doubt",
+    "mission.mapper.matching.offset_m",
+    "mission.mapper.matching.short_m",
+    "mission.mapper.matching.whole_m",
+    "mission.mapper.merging.across_m",
+    "mission.mapper.merging.hidden_overlap_m",
     "mission.mapper.merging.hidden_share",
     "mission.mapper.merging.overlap_m",
+    "mission.mapper.merging.turn_rad",
+    "mission.mapper.merging.turn_sigma_rad",
     "mission.mapper.openings.across_m",
+    "mission.mapper.openings.beams",
+    "mission.mapper.openings.beyond_m",
     "mission.mapper.openings.least_m",
+    "mission.mapper.openings.margin_m",
     "mission.mapper.recovery.contradicted",
+    "mission.mapper.recovery.inside_m",
+    "mission.mapper.recovery.noise.chance",
     "mission.mapper.vertices.across_m",
+    "mission.mapper.vertices.beside_m",
+    "mission.mapper.vertices.cut_reach_m",
     "mission.mapper.vertices.known",
+    "mission.mapper.vertices.largest_rad",
     "mission.mapper.vertices.least_rad",
+    "mission.mapper.vertices.past_m",
+    "mission.mapper.vertices.past_shown_m",
+    "mission.mapper.vertices.reach_m",
+    "mission.mapper.vertices.sharpest_rad",
     "mission.mapper.vertices.shown",
+    "mission.mapper.vertices.slight_rad",
     "mission.mapper.vertices.young_observations",
+    "mission.mapper.walls.contradictions",
+    "mission.mapper.walls.end_margin_m",
     "mission.mapper.walls.established_observations",
+    "mission.mapper.walls.least_m",
     "mission.mapper.walls.pass_margin_m",
     "mission.mapper.walls.reliability.bend_rad",
     "mission.mapper.walls.reliability.crooked_m",
+    "mission.mapper.walls.reliability.few_heading_rad",
+    "mission.mapper.walls.reliability.straightness.face_m",
+    "mission.mapper.walls.trusted_observations",
 }
 """Settings of older formats whose rules are no more, or that said what another says: the first until format 2, the
-others until format 9."""
+others until format 9 or 10."""
+VERTICES = "mission.mapper.vertices"
 EXPLORER = "mission.explorer."
 FOLLOWING = f"{EXPLORER}following."
 RADIUS, STEP, TURN = "robot.radius_m", "robot.step_m", "robot.turn_rad"
@@ -180,6 +217,8 @@ def today(key: str, value: Any, robot: RobotSpec) -> tuple[str, Any] | None:
     `robot` is what the robot of that time stated.
     """
     now = renamed(key)
+    if now == VERTICES and value is None:
+        return now, False
     if now is None or now not in MOVED:
         return None if now is None else (now, value)
     name, move = MOVED[now]

@@ -44,7 +44,7 @@ METHODS: dict[str, MethodPreset] = {
         mapper=(
             (MATCHING, "paper"),
             ("mission.mapper.merging", None),
-            ("mission.mapper.vertices", None),
+            ("mission.mapper.vertices", False),
             ("mission.mapper.change_points", None),
         ),
         driving=((NAVIGATION, "visibility"), (SWEEP, False)),

@@ -43,7 +43,7 @@ def _mapped(result: TrialResult, last: Step, survey: Survey) -> TrialResult:
     """Return a result with a survey's path and walls, and what these can vouch for."""
     mission = result.scenario.config.mission
     walls = survey.walls
-    step = replace(last, map=walls, chains=connect(walls, config=mission.mapper.chains))
+    step = replace(last, map=walls, chains=connect(walls, shared=mission.mapper.shared))
     paths, sweep = mission.explorer.following.paths, mission.explorer.sweep
     certificate = certify(step, result.ending.outcome, paths, sweep, survey.poses[:, :2])
     told: dict[str, Any] = {

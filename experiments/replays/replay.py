@@ -43,7 +43,6 @@ from .oracles import PerfectExtraction, TrueAssociation, Witness, of_true_lines,
 
 Association = Literal["own", "true"]
 OdometrySource = Literal["wheels", "scans"]
-_NEVER, _NEVER_M = 10**9, 1e9
 OPEN_TO_REPLAYS = ("mission", "backend_options")
 """The settings that a replay may have of its own; the log has settled all others."""
 
@@ -215,5 +214,4 @@ def heard_by(odometry: OdometrySource, robot: Robot, config: TrialConfig) -> Rob
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
     """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
-    walls = replace(config.walls, patience_m=_NEVER_M, contradictions=_NEVER, least_m=-1.0, claims=_NEVER)
-    return replace(config, walls=walls, merging=None)
+    return replace(config, walls=replace(config.walls, housekeeping=False), merging=None)

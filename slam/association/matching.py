@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Joint, Observations
 from ..estimation.gates import gate_level, pair_levels
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
 from .kernels.matching_kernels import matched, refused
@@ -24,39 +25,31 @@ MatchingMethod = Literal["joint", "paper"]
 class MatchingConfig:
     """When a segment and a wall are one."""
 
+    shared: SharedConfig = of_shared()
     method: MatchingMethod = "joint"
-    """All segments of a scan together, or each alone as in the paper, by `gate` and `apart_m` only (`methods`)."""
+    """All segments of a scan together, or each alone by `gate` and `shared.short_m`, as in the paper (`methods`)."""
     gate: float = 0.99
-    """Probability level of the chi-square gate."""
-    doubt: float = 0.999999
-    """A segment beyond the gate but within this level of a wall that it overlaps is neither fused nor made a wall."""
+    """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to
+    be clear."""
     angle_rad: float = 1.05
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
-    offset_m: float = 0.5
-    """Nor are lines that stand further apart than this at the seen piece, unless the robot is as lost as that."""
-    overlap_m: float = 0.02
-    """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
-    apart than a wall is thick."""
-    short_m: float = 0.3
-    """Shorter segments are too poor in direction for the gate alone: they are in doubt also beside a wall."""
-    beside_m: float = 0.08
-    """Distance from a wall, across it, within which a short segment of which it covers half is not a new wall."""
     beside_rad: float = 0.35
-    """Largest difference in direction, beyond three sigmas of the short segment's, for the same."""
-    density: float = 0.1
-    """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
-    sight is matched beyond the gate too where a new one would be less likely."""
+    """Largest turn of a short segment that lies along a wall, beyond what is not known of its direction."""
     one_wall: float = 0.9999
     """Probability level within which two landmarks of the map may be one wall, so that either will do; where they lie
     along each other they are made one. One true pair in 10,000 is refused, and stays, since each observation goes to
     the landmark that it fits better, which keeps them apart."""
-    clear: float = 9.0
-    """A match is clear when any other wall would cost so much more (squared Mahalanobis distance)."""
-    whole_m: float = 0.2
-    """A short wall of which both ends were seen is none of which a segment shows more by this: a face beside it, or a
-    step behind it, passes the gate of a direction that is hardly known."""
-    apart_m: float = 0.3
-    """Of method `paper`: largest distance between a segment and its wall, half the width of a narrow door."""
+    overlap_m: float = 0.02
+    """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
+    apart than a wall is thick."""
+    density: float = 0.1
+    """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
+    sight is matched beyond the gate too where a new one would be less likely."""
+
+    @property
+    def doubt(self) -> float:
+        """Level up to which a wall is not ruled out: a segment of it is not made a wall, nor fused beyond the gate."""
+        return 1.0 - self.shared.chance
 
 
 @dataclass(frozen=True)
@@ -136,19 +129,19 @@ def match(
 
 @lru_cache
 def _limits(config: MatchingConfig) -> Limits:
+    shared = config.shared
     return Limits(
         gate_level(config.gate, 2),
         gate_level(config.doubt, 2),
         gate_level(config.one_wall, 2),
         float(np.cos(config.angle_rad)),
-        float(config.offset_m),
         float(config.overlap_m),
-        float(config.short_m),
-        float(config.beside_m),
         float(config.beside_rad),
         float(config.density),
-        float(config.clear),
-        float(config.whole_m),
+        float(shared.beside_m),
+        float(shared.face_m),
+        float(shared.short_m),
+        float(shared.far_m),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.backend import Joint, Observations
+from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.compiled import plain
 from ..robot import Odometry
 from .joint_compatibility import NO_NIS, Nis, seen_halfway
@@ -22,10 +23,10 @@ from .kernels import motion_kernels
 class MotionNoiseConfig:
     """When the stated noise of the wheels is no longer believed."""
 
+    shared: SharedConfig = of_shared()
     window: int = 50
-    """Scans that are weighed together."""
-    chance: float = 1e-6
-    """Honest wheels are taken for worse so rarely, by the likelihood ratio."""
+    """Scans that are weighed together. Honest wheels are taken for worse by chance alone (`shared.chance`), by the
+    likelihood ratio."""
 
 
 FACTORS = np.array([0.5, 0.7, 1.5, 2.0, 3.0, 4.0, 6.0])
@@ -83,7 +84,7 @@ class MotionNoise:
         self._scans += 1
         gains = self._gains.sum(axis=0)
         best = int(np.argmax(gains))
-        if gains[best] > -np.log(self._config.chance):
+        if gains[best] > -np.log(self._config.shared.chance):
             factor = max(1.0, self.factor * float(FACTORS[best]))
             if factor != self.factor:
                 self.factor = factor

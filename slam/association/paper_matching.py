@@ -39,7 +39,7 @@ def match_alone(
     cov = np.ascontiguousarray(joint.cov)
     d2 = pair_distances(seen.e, seen.H_pose, seen.H_line, seen.R, line, cov).reshape(count, lines)
     apart = segment_distances(to_world(segments.ends, pose), _ends_world(walls.extents, anchors, means))
-    passes = (d2 <= gate_level(config.gate, 2)) & (apart <= config.apart_m)
+    passes = (d2 <= gate_level(config.gate, 2)) & (apart <= config.shared.short_m)
     matched = passes.any(axis=1)
     rows = np.flatnonzero(matched)
     best = _nearest(d2[rows], passes[rows])
@@ -89,7 +89,7 @@ def _refusals(
     """Return why the likeliest wall of each segment that has none was refused."""
     level, reasons = gate_level(config.gate, 2), {}
     for row in unmatched.tolist():
-        near = apart[row] <= config.apart_m
+        near = apart[row] <= config.shared.short_m
         best = int(np.argmin(np.where(near, d2[row], np.inf) if near.any() else d2[row]))
         wall = ids[best]
         reasons[row] = (

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..estimation.backend import Joint
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
 from ..map.kernels.ray_evidence import ray_evidence
@@ -30,6 +31,7 @@ from .view import View
 class RecoveryConfig:
     """How far a robot may have moved without saying so, what proves that it did, and when it is lost."""
 
+    shared: SharedConfig = of_shared()
     shift_m: float = 0.3
     """Standard deviation of the place after a motion that was not reported."""
     turn_rad: float = float(np.deg2rad(15.0))
@@ -40,9 +42,7 @@ class RecoveryConfig:
     """... and so large a share of all. The robot is lost if more than this share of the beams towards known walls goes
     through them, ..."""
     least_beams: int = 20
-    """... of so many at least, ..."""
-    inside_m: float = 0.2
-    """... towards walls so far from their ends and the beams so far past them."""
+    """... of so many at least, towards walls a short face from their ends and the beams as far past them."""
     noise: MotionNoiseConfig | None = field(default_factory=MotionNoiseConfig)
     """None where the wheels are never taken for worse than they state."""
     place: PlaceSearchConfig = field(default_factory=PlaceSearchConfig)
@@ -117,10 +117,9 @@ def _nearby(view: View, matches: Matches, config: RecoveryConfig) -> Float[np.nd
 def is_contradicted(scan: Scan, walls: StochasticMap, config: RecoveryConfig) -> bool:
     """Return whether most of the beams towards known walls go through them."""
     belief = walls.belief
-    evidence = ray_evidence(scan, belief.pose_world, belief.anchors, belief.means, config.inside_m)
-    inside = (evidence.along > walls.extents[:, :1] + config.inside_m) & (
-        evidence.along < walls.extents[:, 1:] - config.inside_m
-    )
+    inside_m = config.shared.face_m
+    evidence = ray_evidence(scan, belief.pose_world, belief.anchors, belief.means, inside_m)
+    inside = (evidence.along > walls.extents[:, :1] + inside_m) & (evidence.along < walls.extents[:, 1:] - inside_m)
     through, met = np.any(evidence.passes & inside, axis=0), np.any(evidence.hits & inside, axis=0)
     towards = np.count_nonzero(through | met)
     return bool(towards >= config.least_beams and np.count_nonzero(through) > config.least_share * towards)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..estimation.backend import Joint, Observations
+from ..estimation.gates import gate_level
 from ..extraction.segments import Segments
 from ..geometry.lines import segment_distances
 from ..geometry.poses import to_world
@@ -60,8 +61,15 @@ class View:
         )
 
 
-SIGMAS = 6.0
-"""A wall is looked for as far as the pose may be off by so many sigma: beyond the level of doubt."""
+def may_be_off_m(
+    pose_cov: Float[np.ndarray, "3 3"], config: MatchingConfig, away_m: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return how far what is seen so far away may lie from where it is believed, m.
+
+    By what the pose may be off up to the level of doubt, and far enough for walls that are known less well.
+    """
+    sigmas_m = np.sqrt(np.trace(pose_cov[:2, :2])) + away_m * np.sqrt(pose_cov[2, 2])
+    return config.shared.far_m + np.sqrt(gate_level(config.doubt, 2)) * sigmas_m
 
 
 def near_segments(
@@ -78,6 +86,5 @@ def near_segments(
     if not len(segments) or not len(ends_world):
         return np.zeros(len(ends_world), dtype=bool)
     away_m = np.hypot(segments.ends[..., 0], segments.ends[..., 1]).max(axis=1)
-    lost_m = SIGMAS * (np.sqrt(np.trace(pose_cov[:2, :2])) + away_m * np.sqrt(pose_cov[2, 2]))
     apart = segment_distances(to_world(segments.ends, pose_world), ends_world)
-    return np.asarray(np.any(apart < max(config.offset_m, config.apart_m) + lost_m[:, None], axis=0))
+    return np.asarray(np.any(apart < may_be_off_m(pose_cov, config, away_m)[:, None], axis=0))

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from ..estimation.backend import Joint
 from ..estimation.gates import gate_level
 from ..geometry.lines import normals
+from ..geometry.numerics import TINY
 from ..geometry.poses import J, rotation, to_robot, turned, wrap
 
 
@@ -61,7 +62,7 @@ def effective_samples(values: Float[np.ndarray, " n"]) -> float:
     pairs = (rho[: n - n % 2] / rho[0]).reshape(-1, 2).sum(axis=1)
     ends = np.flatnonzero(pairs <= 0)
     total = 2.0 * float(pairs[: ends[0] if len(ends) else len(pairs)].sum()) - 1.0
-    return float(np.clip(n / max(total, 1e-9), 1.0, n))
+    return float(np.clip(n / max(total, TINY), 1.0, n))
 
 
 def pooled_band(runs: Sequence[Float[np.ndarray, " _"]], dof: int, confidence: float = 0.95) -> tuple[float, float]:

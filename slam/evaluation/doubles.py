@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..geometry.lines import directions, normals, through
+from ..geometry.numerics import TINY
 from ..geometry.poses import wrap
 
 TURN_RAD = float(np.deg2rad(5.0))
@@ -41,6 +42,6 @@ def _across_at(
 ) -> Float[np.ndarray, " m"]:
     """Return how far off along the normal of `alpha` each line is, where it passes `along_m` along `alpha`'s line."""
     t, across = ends @ directions(alpha), ends @ normals(alpha)
-    length = np.where(np.abs(t[:, 1] - t[:, 0]) > 1e-9, t[:, 1] - t[:, 0], 1e-9)
+    length = np.where(np.abs(t[:, 1] - t[:, 0]) > TINY, t[:, 1] - t[:, 0], TINY)
     share = (along_m - t[:, 0]) / length
     return np.asarray(across[:, 0] + share * (across[:, 1] - across[:, 0]))

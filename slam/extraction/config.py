@@ -4,18 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..estimation.shared import SharedConfig, of_shared
+
 
 @dataclass(frozen=True)
 class ExtractionConfig:
     """How a scan becomes segments, and how far their ends are believed.
 
+    A beam off a line by more than an outlier is better left loose (`shared`); so is the last one where no lines cross:
+    another surface begins there.
+
     Costs, gains and sigmas were chosen on half of the plans, by recall, mixed lines and NEES
     (docs/results.md, "Extraction"); "beams" are steps of the scan, one per 2 degrees.
     """
 
-    noise_sigmas: float = 4.0
-    """What a range is off by more is no noise: the surface breaks off, or the beam is not the line's; one of 16,000
-    beams is that far off by chance. Ranges below it are none."""
+    shared: SharedConfig = of_shared()
     gap_beams: int = 3
     """A wall does not go on across more beam steps than this without a return: at 4 m they are 0.4 m, a narrow door."""
     grazing_rad: float = float(np.deg2rad(6.0))
@@ -35,14 +38,5 @@ class ExtractionConfig:
     sure_beams: int = 5
     """A segment of fewer beams is tentative: the 95th percentile of NEES is four times what it should be with 3 beams,
     1.4 times with 4."""
-    settling_rounds: int = 4
-    """Cuts move to where their two lines fit best at most so often; most stay at once."""
-    open_gate_sigmas: float = 3.0
-    """A beam so far off a line is better left loose; so is the last one where no lines cross: another surface begins
-    there."""
     doubt_sigmas: float = 2.5
     """The last beam before a joint is left out where the other line predicts it within this: it may be either's."""
-    sure_gap_m: float = 0.35
-    """Where neighbouring beams meet a wall farther apart than this, a door could hide between them."""
-    corner_leap_m: float = 0.07
-    """A corner farther than this beyond the last beam was not seen: something may hide between two beams."""

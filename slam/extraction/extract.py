@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..geometry.compiled import plain
+from ..geometry.numerics import LEAST_SIGMA
 from ..robot import Scan
 from .config import ExtractionConfig
 from .kernels.returns_kernels import Rules
@@ -19,8 +20,6 @@ DEFAULT = ExtractionConfig()
 NO_VERTICES = np.zeros(0)
 _FAR_M = 1e4
 """Farther returns are not used: in inverse range they are noise."""
-_LEAST_SIGMA_M = 1e-6
-"""Taken for the noise of beams that state none: the fit divides by it."""
 
 
 def extract(
@@ -45,7 +44,7 @@ def beams_of_scan(
     are used m, and whether the first beam follows the last.
     """
     farthest_m = float(min(scan.range_max_m, _FAR_M))
-    sigmas_m = np.maximum(scan.sigmas_m, _LEAST_SIGMA_M)
+    sigmas_m = np.maximum(scan.sigmas_m, LEAST_SIGMA)
     bearings_rad, ranges_m = plain(scan.bearings_rad), plain(scan.ranges_m)
     return bearings_rad, ranges_m, sigmas_m, float(scan.sigma_share), farthest_m, scan.is_full_turn
 
@@ -54,7 +53,7 @@ def beams_of_scan(
 def rules_of(config: ExtractionConfig) -> Rules:
     """Return the numbers of the settings as the kernels take them."""
     return Rules(
-        noise_sigmas=float(config.noise_sigmas),
+        noise_sigmas=float(config.shared.noise_sigmas),
         gap_beams=config.gap_beams,
         grazing_rad=float(config.grazing_rad),
         scales=np.array(config.scales),
@@ -63,7 +62,6 @@ def rules_of(config: ExtractionConfig) -> Rules:
         segment_cost=float(config.segment_cost),
         least_beams=config.least_beams,
         sure_beams=config.sure_beams,
-        settling_rounds=config.settling_rounds,
-        open_gate_sigmas=float(config.open_gate_sigmas),
+        outlier_sigmas=float(config.shared.outlier_sigmas),
         doubt_sigmas=float(config.doubt_sigmas),
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
 from .segments import Segments
 from .straightness_kernels import faces_cov
@@ -20,10 +21,10 @@ from .straightness_kernels import faces_cov
 class StraightnessConfig:
     """How far short faces are off their lines, sigma."""
 
+    shared: SharedConfig = of_shared()
     edge_m: float = 0.01
-    """The shortest; 0 where every segment is known to be of one face."""
-    face_m: float = 0.2
-    """A face of this length is half as far off, a longer one falls with the fourth power: two thicknesses of a wall."""
+    """The shortest; one as long as `shared.face_m` is half as far off, a longer one falls with the fourth power. 0
+    where every segment is known to be of one face."""
     bow_rad: float = 0.0
     """How far the direction of a wall of any length is off, where one scan sees another part of it than the next ..."""
     bow_m: float = 0.0
@@ -32,7 +33,7 @@ class StraightnessConfig:
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    edges = faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.face_m))
+    edges = faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.shared.face_m))
     return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
 
 

@@ -38,8 +38,8 @@ def sure_pieces(segments: Segments, scan: Scan, config: ExtractionConfig) -> Seg
         segments.end_kinds,
         scan.bearings_rad[segments.beams],
         scan.step_rad,
-        float(config.sure_gap_m),
-        float(config.corner_leap_m),
+        float(config.shared.door_m),
+        float(config.shared.within_m),
     )
     return replace(segments, ends=ends, end_kinds=end_kinds)
 

@@ -7,20 +7,20 @@ from jaxtyping import Bool, Float
 
 from .compiled import compiled
 
-PARALLEL = 0.05
-"""Sine of the angle, 3 degrees, below which two lines are taken for parallel: an error of one in place moves their
-crossing by twenty times as much."""
+GRAZING = 0.05
+"""Sine of the angle, 3 degrees, below which two lines, or a beam and a line, are taken for parallel: an error of one in
+place moves their crossing by twenty times as much."""
 
 
 @compiled
 def intersect(
     one: Float[np.ndarray, "k 2"], other: Float[np.ndarray, "k 2"]
 ) -> tuple[Float[np.ndarray, "k 2"], Bool[np.ndarray, " k"]]:
-    """Return where pairs of lines cross, and which are too near to parallel (`PARALLEL`)."""
+    """Return where pairs of lines cross, and which are too near to parallel (`GRAZING`)."""
     points, parallel = np.empty((len(one), 2)), np.empty(len(one), np.bool_)
     for k in range(len(one)):
         det = math.sin(other[k, 0] - one[k, 0])
-        parallel[k] = abs(det) < PARALLEL
+        parallel[k] = abs(det) < GRAZING
         safe = 1.0 if parallel[k] else det
         points[k, 0] = (one[k, 1] * math.sin(other[k, 0]) - other[k, 1] * math.sin(one[k, 0])) / safe
         points[k, 1] = (other[k, 1] * math.cos(one[k, 0]) - one[k, 1] * math.cos(other[k, 0])) / safe

@@ -7,6 +7,7 @@ direction of travel with the free side on the left is t = J n.
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .numerics import TINY
 from .poses import wrap
 
 
@@ -55,7 +56,7 @@ def distance_to_segments(
 ) -> Float[np.ndarray, "m n"]:
     """Return the distance from each point to each segment."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.maximum(np.vecdot(along, along), 1e-18)
+    squared = np.maximum(np.vecdot(along, along), TINY**2)
     offset = points[:, None, :] - start
     share = np.clip(np.vecdot(offset, along) / squared, 0.0, 1.0)
     gap = offset - share[..., None] * along

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.gates import gate_level
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import RobotSpec, of_robot
 from .kernels.few_beams_kernels import Rules, see
@@ -17,15 +18,13 @@ from .kernels.few_beams_kernels import Rules, see
 
 @dataclass(frozen=True)
 class CandidatesConfig:
-    """When a line of few beams is believed."""
+    """When a line of few beams is believed: seen from several places, half a step of the robot from one another.
+
+    From one place the same beams make the same line again.
+    """
 
     robot: RobotSpec = of_robot()
-    looks: int = 2
-    """Places from which it must have been seen ..."""
-    apart_m: float = 0.07
-    """... so far from one another: from one place the same beams make the same line again."""
-    spare_beams: int = 3
-    """All looks together saw so many beams more than the two apiece that any line goes through."""
+    shared: SharedConfig = of_shared()
     longest_m: float = 0.18
     """Longer ones are not believed: a face of that length shows five beams from near by, and what shows three or four
     is mostly a line from one wall's corner to the next wall."""
@@ -44,14 +43,20 @@ class CandidatesConfig:
 class LandmarkCandidates:
     """The lines of few beams that may become walls."""
 
-    def __init__(self, gate: float, angle_rad: float, config: CandidatesConfig = CandidatesConfig()) -> None:
-        """Lines of which two observations are farther apart than this gate, or turn by more, are never one."""
+    def __init__(
+        self, gate: float, angle_rad: float, sure_beams: int, config: CandidatesConfig = CandidatesConfig()
+    ) -> None:
+        """Lines of which two observations are farther apart than this gate, or turn by more, are never one.
+
+        All looks together see as many beams more than the two apiece that any line goes through as one segment does
+        that is sure.
+        """
         self._rules = Rules(
             gate_level(gate, 2),
             float(np.cos(angle_rad)),
-            config.looks,
-            float(config.apart_m),
-            config.spare_beams,
+            config.shared.scans,
+            0.5 * config.robot.step_m,
+            sure_beams - 2,
             float(config.longest_m),
             config.patience_steps,
             float(config.slack_m),

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ..estimation.shared import SharedConfig
 from .kernels.chain_kernels import HEAD as HEAD
 from .kernels.chain_kernels import TAIL as TAIL
 from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, runs, successors
@@ -15,29 +16,6 @@ from .stochastic_map import StochasticMap
 
 NONE = np.zeros(0, dtype=np.int64)
 """No pairs."""
-
-
-@dataclass(frozen=True)
-class ChainConfig:
-    """When the head of one wall and the tail of another are one corner."""
-
-    reach_m: float = 0.1
-    """Largest distance between two ends that are joined while the robot still explores them."""
-    set_aside_reach_m: float = 0.35
-    """The same for two ends that exploration looked at closely and set aside."""
-    straight_rad: float = float(np.deg2rad(5.0))
-    """Walls that turn less than this into each other make no corner ..."""
-    straight_reach_m: float = 0.07
-    """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
-    the wall between, as far apart as that is thick."""
-    overlap_m: float = 1.0
-    """Largest overlap of the two sides of a bend, both established: within the noise each reaches past it ..."""
-    beside_m: float = 0.04
-    """... where it lies no farther than this from the other: four sigmas of a beam."""
-    bend_rad: tuple[float, float] = (float(np.deg2rad(1.0)), float(np.deg2rad(30.0)))
-    """What such a bend turns: less, and it may be one wall entered twice; more, and beams tell where it is."""
-    corner_reach_m: float = 0.3
-    """A corner is the intersection of the two lines where that lies this near to both ends, else their middle."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +52,7 @@ def connect(
     set_aside: Collection[tuple[int, int]] = (),
     passed: Collection[tuple[int, int]] = (),
     cut_off: Collection[tuple[int, int]] = (),
-    config: ChainConfig = ChainConfig(),
+    shared: SharedConfig = SharedConfig(),
 ) -> tuple[Chain, ...]:
     """Join heads to tails, nearest first, and return the chains in the order of their oldest wall.
 
@@ -87,9 +65,9 @@ def connect(
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
-    pairs = near_ends(ends, max(config.reach_m, config.set_aside_reach_m, config.overlap_m))
+    pairs = near_ends(ends, max(shared.thickness_m, shared.door_m, shared.long_m))
     both_aside = _both_aside(pairs, ids, set_aside, passed)
-    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(config))
+    gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(shared))
     joins = np.flatnonzero(allowed) if cut_off else NONE
     for k, pair in zip(joins.tolist(), ids[pairs[joins]].tolist(), strict=True):
         allowed[k] = tuple(pair) not in cut_off
@@ -98,7 +76,7 @@ def connect(
     after = successor[before]
     corners = np.full((len(rows), 2), np.nan)
     corners[before] = corner_points(
-        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], float(config.corner_reach_m)
+        lines[before], lines[after], ends[before, HEAD], ends[after, TAIL], float(shared.short_m)
     )
     walked, starts, closed = runs(successor)
     names, corners, ends = ids[walked].tolist(), corners[walked], ends[walked]
@@ -130,17 +108,16 @@ def _both_aside(
 
 
 @lru_cache
-def _reach(config: ChainConfig) -> Reach:
-    least, most = np.cos(config.bend_rad).tolist()
+def _reach(shared: SharedConfig) -> Reach:
     return Reach(
-        float(config.reach_m),
-        float(config.set_aside_reach_m),
-        float(np.cos(config.straight_rad)),
-        float(config.straight_reach_m),
-        float(config.overlap_m),
-        float(config.beside_m),
-        least,
-        most,
+        float(shared.thickness_m),
+        float(shared.door_m),
+        float(np.cos(shared.straight_rad)),
+        float(shared.within_m),
+        float(shared.long_m),
+        float(shared.beams_m),
+        float(np.cos(shared.known_rad)),
+        float(np.cos(shared.sharp_rad)),
     )
 
 

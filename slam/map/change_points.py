@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..estimation.backend import Belief
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import beam_step
 from ..robot import Scan
@@ -26,16 +27,18 @@ Sums = Float[np.ndarray, "2 p"]
 
 @dataclass(frozen=True)
 class ChangePointsConfig:
-    """When a wall is known to bend."""
+    """When a wall is known to bend.
 
+    Beams farther off the line than noise is belong to something else; so may the last one on either end.
+    """
+
+    shared: SharedConfig = of_shared()
     pitch_m: float = 0.25
     """Bends are looked for at places so far apart along a wall: half of it from the bend, a turn of a degree is off by
     2 mm."""
     sigmas: float = 6.0
     """The turn differs from zero by so many of its own: hundreds of walls, each at dozens of places, are asked
     thousands of times."""
-    gate_sigmas: float = 4.0
-    """Beams farther off the line belong to something else; so may the last one on either end."""
     least_beams: int = 4
     """A scan counts at a place where it has so many beams on either side."""
 
@@ -83,7 +86,7 @@ class ChangePoints:
         rows, lines = belief.rows(walls), segments.lines[pairs[:, 0]]
         feet = feet_along(lines, belief.pose_world, belief.anchors[rows], belief.means[rows, 0])
         beams = scan.bearings_rad, scan.ranges_m, np.ascontiguousarray(scan.sigmas_m)
-        met = beams_on_lines(segments.beams[pairs[:, 0]], lines, feet, *beams, float(config.gate_sigmas))
+        met = beams_on_lines(segments.beams[pairs[:, 0]], lines, feet, *beams, float(config.shared.noise_sigmas))
         place, place_of = places_between(met[0], met[3], float(config.pitch_m))
         if not len(place):
             return None

@@ -1,11 +1,13 @@
 """How far along its line each wall has been seen, how often, and whether it deserves trust."""
 
 from dataclasses import dataclass, field
+from sys import maxsize
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Belief
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import owners_of_beams
 from ..robot import RobotSpec, Scan, of_robot
@@ -14,27 +16,29 @@ from .records import Merger, Records
 from .reliability import ReliabilityConfig
 from .stochastic_map import ESTABLISHED, StochasticMap
 
+NOBODY = np.zeros(0, dtype=np.int64)
+"""Ids of no walls."""
+
 
 @dataclass(frozen=True)
 class WallsConfig:
-    """When a wall is trusted, and when it is forgotten."""
+    """When a wall is trusted, and when it is forgotten.
+
+    A wall is tentative until two scans saw it with enough beams, and cut back once two in turn have shown beams passing
+    through it: beams that go on beyond it by a wall's thickness, and as far from its ends. A wall cut back to less than
+    ends are known to is forgotten.
+    """
 
     robot: RobotSpec = of_robot()
-    trusted_observations: int = 2
-    """A wall is tentative until it was seen this often with enough beams."""
+    shared: SharedConfig = of_shared()
     patience_m: float = 2.25
     """A tentative wall is forgotten once it was not observed for the steps that so long a way takes."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
     """Which observations may move the estimate."""
-    contradictions: int = 2
-    """A wall is cut back once so many scans have shown beams passing through it."""
-    end_margin_m: float = 0.1
-    """A beam that goes on this far beyond a line has passed through it; those that pass this near to an end do not
-    count: ends and corners are known no better."""
-    least_m: float = 0.05
-    """A wall cut back to less than this is forgotten."""
     claims: int = 6
     """A wall is forgotten when so many scans in turn gave all its beams to other walls, unless it is established."""
+    housekeeping: bool = True
+    """Whether walls are cut back and forgotten; where it is known whose each segment is, nothing needs mending."""
 
     @property
     def patience_steps(self) -> int:
@@ -69,8 +73,8 @@ class Extents:
     ) -> StochasticMap:
         """Return the belief together with the extents, and how far walls may be from their lines."""
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
-        tentative = observations < self._config.trusted_observations
-        whole = self._records.columns["whole"] >= self._config.trusted_observations
+        tentative = observations < self._config.shared.scans
+        whole = self._records.columns["whole"] >= self._config.shared.scans
         return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
     def see(
@@ -88,29 +92,33 @@ class Extents:
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
         rows, seen_often = self._records.rows(owners[used]), self._records.rows(believed)
-        columns, margin, scans = self._records.columns, float(self._config.end_margin_m), self._config.contradictions
+        columns, shared = self._records.columns, self._config.shared
+        scans = shared.scans if self._config.housekeeping else maxsize
         extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
         seen = segments.ends, segments.lines, segments.end_kinds, owners, used, rows
         kept = extents, columns["spacing"], columns["whole"], columns["overlaid"]
-        take_in(*seen, *lines, scan.step_rad, *kept, margin, scans)
+        take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m), scans)
         observations, last_seen = columns["observations"], columns["last_seen"]
         observations[rows] += 1  # of a wall with two segments, too, by one: the sum is taken before it is stored
-        observations[seen_often] = np.maximum(observations[seen_often], self._config.trusted_observations)
+        observations[seen_often] = np.maximum(observations[seen_often], shared.scans)
         last_seen[rows] = self._scans
+        if not self._config.housekeeping:
+            return NOBODY
         self._weigh(belief, scan, segments, owners)
         stale = self._scans - last_seen > self._config.patience_steps
-        shaky = stale & (observations < self._config.trusted_observations)
+        shaky = stale & (observations < shared.scans)
         shaky |= (columns["claimed"] >= self._config.claims) & (observations < ESTABLISHED)
-        return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < self._config.least_m)]
+        return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
 
     def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
         """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
-        columns, config = self._records.columns, self._config
+        columns, shared = self._records.columns, self._config.shared
         beams = scan.bearings_rad, scan.ranges_m, scan.passed_m
         owners = owners_of_beams(segments, owners, len(scan.bearings_rad))
         lines = belief.pose_world, belief.anchors, belief.means, self._records.ids
         kept = columns["extents"], columns["spacing"], columns["claimed"], columns["against"]
-        seen, limits = columns["last_seen"] == self._scans, (float(config.end_margin_m), config.contradictions)
+        limits = float(shared.thickness_m), float(shared.far_m), shared.scans
+        seen = columns["last_seen"] == self._scans
         weigh(float(scan.range_max_m), *beams, owners, *lines, seen, *kept, *limits)
 
     def _merge(self, merger: Merger) -> None:

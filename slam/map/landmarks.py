@@ -9,11 +9,10 @@ from ..estimation.backend import Belief
 from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
-from .chains import ChainConfig
 from .change_points import ChangePoints, ChangePointsConfig
 from .extents import Extents, WallsConfig
 from .kernels.reliability_kernels import off_line_cov
-from .openings import Openings, OpeningsConfig
+from .openings import Openings
 from .records import Records
 from .reliability import Reliability
 from .stochastic_map import StochasticMap
@@ -32,20 +31,18 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(
-        self, walls: WallsConfig, change_points: ChangePointsConfig, gaps: OpeningsConfig, chains: ChainConfig
-    ) -> None:
+    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig) -> None:
         self.records = Records()
         self.extents = Extents(walls, self.records)
         self.reliability = Reliability(walls.reliability, self.records)
         self._straightness = walls.reliability.straightness
         self.change_points = ChangePoints(change_points, self.records)
-        self.openings = Openings(gaps, chains, self.records)
+        self.openings = Openings(walls.shared, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
         across, turned = self.reliability.misfits(self.records.ids)
-        straightness = float(self._straightness.edge_m), float(self._straightness.face_m)
+        straightness = float(self._straightness.edge_m), float(self._straightness.shared.face_m)
         cov = off_line_cov(self.records.columns["extents"], across, turned, *straightness)
         return self.extents.map(belief, self.reliability.are_crooked(self.records.ids), cov)
 

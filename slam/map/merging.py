@@ -12,31 +12,28 @@ from jaxtyping import Bool, Int
 
 from ..estimation.backend import Joint
 from ..estimation.gates import gate_level
+from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions, normals
+from ..geometry.numerics import LEAST_SIGMA
 from .kernels import merging_kernels
 from .stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True)
 class MergingConfig:
-    """When two landmarks of a map may be one wall."""
+    """When two landmarks of a map may be one wall.
 
-    turn_rad: float = float(np.deg2rad(5.0))
-    """Largest difference in direction; the other face of a wall differs by pi."""
-    across_m: float = 0.05
-    """Largest distance of the shorter one from the other's line, at both its ends: a wall's thickness or a niche is
-    0.1 m deep, however little is known about where the two stand. And the least by which they overlap along it: two
-    rooms' walls on one line stand 0.1 m apart, and where the robot sees nothing but such walls it knows its place along
-    them, and so their ends, to a few centimetres only."""
-    turn_sigma_rad: float = float(np.deg2rad(1.0))
-    """The turn from one to the other is known to this, sigma: the direction of half a metre seen twice is known to a
-    degree or two, and a wall that turns by as much would be made straight for good."""
+    They lie no farther apart than ends are known, at both ends of the shorter one, and overlap by as much: a niche is a
+    wall's thickness deep, however little is known about where the two stand, and two rooms' walls on one line stand as
+    far apart. The turn between them is known to a degree: a wall that turns by as much would be made straight for good.
+    """
+
+    shared: SharedConfig = of_shared()
     hidden_m: float = 0.01
     """Two faces on one side no farther apart than this, at both ends of the shorter one, are one to a laser whose
     beams are as far off: the nearer hides the farther. With 0.02 m eight mergers in 121 apartments were false, none
-    by the gate alone: an landmark across a step of 2 cm from wall to wall lies near both."""
-    hidden_overlap_m: float = 1.0
-    """They overlap by at least this."""
+    by the gate alone: a landmark across a step of 2 cm from wall to wall lies near both. They overlap over a long
+    way."""
 
 
 def duplicate_of(
@@ -64,7 +61,7 @@ def duplicate_of(
             continue
         two = joint.take(rows)
         turn = two.cov[3, 3] + two.cov[5, 5] - 2.0 * two.cov[3, 5]
-        if turn <= config.turn_sigma_rad**2 and (is_hidden or same_line(two, one_wall)):
+        if turn <= config.shared.known_rad**2 and (is_hidden or same_line(two, one_wall)):
             return pair[0], pair[1]
     return None
 
@@ -78,13 +75,12 @@ def lying_along(
     """
     lengths, alpha = walls.extents[:, 1] - walls.extents[:, 0], walls.belief.means[:, 0].copy()
     ours, trusted = np.array(sorted(touched), dtype=np.int64), ~walls.tentative
-    turn_cosine, across_m = float(np.cos(config.turn_rad)), float(config.across_m)
+    turn_cosine, across_m = float(np.cos(config.shared.straight_rad)), float(config.shared.resolution_m)
     pairs, beside = merging_kernels.lying_along(
         walls.ids, ours, trusted, alpha, walls.ends_world, lengths, turn_cosine, across_m
     )
     length, across, overlap = beside.T
-    hidden = (across <= config.hidden_m) & (length >= config.hidden_overlap_m)
-    hidden &= overlap >= config.hidden_overlap_m
+    hidden = (across <= config.hidden_m) & (np.minimum(length, overlap) >= config.shared.long_m)
     return walls.ids[pairs], hidden
 
 
@@ -95,5 +91,5 @@ def same_line(joint: Joint, gate: float) -> bool:
     lever = directions(alpha_b) @ shift
     e = np.array([np.sin(alpha_b - alpha_a), d_b + normals(alpha_b) @ shift - d_a])
     D = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, lever, 1.0]])
-    S = D @ joint.cov[3:, 3:] @ D.T + 1e-12 * np.eye(2)
+    S = D @ joint.cov[3:, 3:] @ D.T + LEAST_SIGMA**2 * np.eye(2)
     return bool(np.cos(alpha_b - alpha_a) > 0 and e @ np.linalg.solve(S, e) <= gate_level(gate, 2))

@@ -3,39 +3,28 @@
 And which corners they have cut off: where two walls would meet if both went on, there is none.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ..estimation.shared import SharedConfig
 from ..robot import Scan
-from .chains import ChainConfig
 from .kernels import ray_kernels
 from .kernels.ray_kernels import Watch
 from .records import Records
 from .stochastic_map import StochasticMap
 
 
-@dataclass(frozen=True)
-class OpeningsConfig:
-    """When a gap counts as passed."""
-
-    beyond_m: float = 0.15
-    """A beam passes a gap if it goes on this far beyond it, ... Narrower gaps are not watched, since ends are known no
-    better; nor are those that no chain would join."""
-    margin_m: float = 0.04
-    """... this far from the two ends. Beams cut a corner off that cross what is supposed of either wall, so far from
-    its ends, and reach as far behind it, across the wall: four sigmas of a beam."""
-    beams: int = 2
-    """So many beams of one scan are needed."""
-
-
 class Openings:
-    """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through."""
+    """Remembers (wall whose head, wall whose tail) bounds a gap that beams went through.
 
-    def __init__(self, config: OpeningsConfig, chains: ChainConfig, records: Records | None = None) -> None:
-        gap_m, reach_m = float(chains.set_aside_reach_m), float(chains.corner_reach_m)
-        self._watch = Watch(gap_m, reach_m, float(config.beyond_m), float(config.margin_m), config.beams)
+    A beam passes a gap if it goes on beyond it, four sigmas of a beam away from both ends. Narrower gaps are not
+    watched, nor are those wider than a door, which no chain would join. Beams cut a corner off that cross what is
+    supposed of either wall, so far from its ends, and reach as far behind it, across the wall.
+    """
+
+    def __init__(self, shared: SharedConfig = SharedConfig(), records: Records | None = None) -> None:
+        gap_m, reach_m = float(shared.door_m), float(shared.short_m)
+        self._watch = Watch(gap_m, reach_m, float(shared.beyond_m), float(shared.beams_m), shared.scans)
         self._records = Records() if records is None else records
         self._records.relate("passed", "cut_off")
 

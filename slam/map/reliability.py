@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.special import gammaincc
 
 from ..estimation.gates import gate_level
+from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
 from ..geometry.poses import wrap
@@ -19,21 +20,18 @@ from .kernels import reliability_kernels
 from .kernels.reliability_kernels import add_directions, add_fits, in_conflict
 from .records import Merger, Records
 
-NOISE_SIGMAS = 3.0
-"""What is within so many standard errors of the noise is no misfit of a wall's own."""
-
 
 @dataclass(frozen=True)
 class ReliabilityConfig:
     """When a direction is clear, and when a wall is not straight."""
 
+    shared: SharedConfig = of_shared()
     heading_rad: float = 0.15
     """A segment with a larger sigma of direction, that of short faces included (`straightness`), is matched and stored
     but moves no estimate: where a line's direction keeps changing by many degrees, so does the direction in which it
-    fixes the robot, and every change adds information that was never measured."""
-    few_heading_rad: float = float(np.deg2rad(1.0))
-    """The same for a segment of fewer than five beams: along a wall seen at a grazing angle they are as good as they
-    say, above this they hold beams of other walls too often."""
+    fixes the robot, and every change adds information that was never measured. One of fewer than five beams moves the
+    estimate only where its turn is known (`shared.known_rad`): along a wall seen at a grazing angle they are as good as
+    they say, above this they hold beams of other walls too often."""
     excess: float = 1.2
     """Chi-square over degrees of freedom of all fits: misfits of 0.45 times the noise. Smaller ones any real wall shows
     over thousands of beams."""
@@ -117,7 +115,7 @@ class Reliability:
         and 90 off, within the gate of a wall of vague direction.
         """
         rows, columns = self._records.rows(ids), self._records.columns
-        clear, few_rad = are_clear(segments, self._config), float(self._config.few_heading_rad)
+        clear, few_rad = are_clear(segments, self._config), float(self._config.shared.known_rad)
         told = segments.is_tentative, segments.cov, clear, rows
         return reliability_kernels.may_move(*told, columns["crooked"], columns["directions"], few_rad)
 
@@ -135,7 +133,8 @@ class Reliability:
         noise alone may show counts nothing: a straight wall lies on its line however often it was seen.
         """
         rows, columns = self._records.rows(ids), self._records.columns
-        return reliability_kernels.misfits(columns["residue"][rows], columns["directions"][rows], NOISE_SIGMAS)
+        sigmas = float(self._config.shared.outlier_sigmas)
+        return reliability_kernels.misfits(columns["residue"][rows], columns["directions"][rows], sigmas)
 
     @property
     def _level(self) -> float:

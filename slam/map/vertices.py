@@ -6,13 +6,13 @@ after scan. The map, which has seen each part alone, knows where to cut.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.gates import gate_level
+from ..estimation.shared import SharedConfig
 from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from .kernels import vertex_kernels
@@ -23,40 +23,17 @@ from .stochastic_map import StochasticMap
 LEAST_RAD = float(np.deg2rad(0.2))
 """Smaller turns are no bends: over thousands of beams every real wall shows one, and walls that overlap may be one that
 was entered twice."""
-
-
-@dataclass(frozen=True)
-class VerticesConfig:
-    """Where two walls make a bend, and which segments pass over it."""
-
-    reach_m: float = 0.1
-    """Largest gap between the end of one wall and the beginning of the next. They may overlap: a line over both was
-    given to one of them, which then reaches past the bend."""
-    largest_rad: float = float(np.deg2rad(10.0))
-    """A sharper bend is seen in every scan."""
-    slight_rad: float = float(np.deg2rad(2.0))
-    """Walls that overlap and turn more are not ended where their lines cross: which of them a beam met is plain, and
-    one of them may be a line laid across a step."""
-    beside_m: float = 0.08
-    """Distance across a segment within which a bend lies on it."""
-    cut_reach_m: float = 0.5
-    """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
-    met either of them near the bend."""
-    past_shown_m: float = 0.15
-    """A wall that reaches so far beyond a bend that a scan shows, on both sides, was laid across it: a beam of the
-    other side may have been taken in, at 4 m one in 0.13 m."""
-    sharpest_rad: float = float(np.deg2rad(30.0))
-    """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
-    past_m: float = 0.05
-    """Ends are known no better: a segment goes on at least so far on both sides of a bend, and walls that overlap by
-    less do not."""
+SLIGHT_RAD = float(np.deg2rad(2.0))
+"""Larger ones a scan may show."""
+LARGEST_RAD = float(np.deg2rad(10.0))
+"""A sharper bend is seen in every scan."""
 
 
 def vertices_within(
     segments: Segments,
     walls: StochasticMap,
     one_wall: float,
-    config: VerticesConfig = VerticesConfig(),
+    shared: SharedConfig = SharedConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> Float[np.ndarray, " b"]:
     """Return the bearings, rad, of the map's bends that lie on a segment, at the pose of the map's belief.
@@ -67,12 +44,12 @@ def vertices_within(
     """
     if not len(segments):
         return np.zeros(0)
-    bends = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), config, cut)
+    bends = _bends(walls, np.linalg.norm(segments.ends, axis=-1).max(), shared, cut)
     if not len(bends.rows):
         return np.zeros(0)
     alpha_world, pose = walls.belief.means[bends.rows[:, 0], 0], walls.belief.pose_world
     on, bearings = vertex_kernels.on_segments(
-        bends.points_world, alpha_world, pose, segments.lines, segments.ends, _bounds(config)
+        bends.points_world, alpha_world, pose, segments.lines, segments.ends, _bounds(shared)
     )
     return bearings[_are_known(bends, on, walls, one_wall)]
 
@@ -81,15 +58,16 @@ def meetings(
     walls: StochasticMap,
     range_m: float,
     one_wall: float,
-    config: VerticesConfig = VerticesConfig(),
+    shared: SharedConfig = SharedConfig(),
     cut: Collection[tuple[int, int]] = (),
 ) -> tuple[Int[np.ndarray, "k 2"], Float[np.ndarray, "k 2"]]:
     """Return ids of walls that overlap, before and after a bend, and how far along each from its anchor they meet, m.
 
-    Within `range_m` of the robot; `one_wall` and `cut` as above.
+    Within `range_m` of the robot; `one_wall` and `cut` as above. Walls that turn more than slightly are not ended where
+    their lines cross, unless they are cut: which of them a beam met is plain, and one may be laid across a step.
     """
-    bends = _bends(walls, range_m, config, cut)
-    slight = (bends.turn_rad > LEAST_RAD) & (bends.turn_rad < config.slight_rad)
+    bends = _bends(walls, range_m, shared, cut)
+    slight = (bends.turn_rad > LEAST_RAD) & (bends.turn_rad < SLIGHT_RAD)
     asked = bends.overlap & (bends.is_cut | (bends.cross & slight))
     if not asked.any():
         return np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2))
@@ -103,7 +81,7 @@ def meetings(
 
 
 def mistaken(
-    segments: Segments, walls: StochasticMap, gate: float, config: VerticesConfig = VerticesConfig()
+    segments: Segments, walls: StochasticMap, gate: float, shared: SharedConfig = SharedConfig()
 ) -> Int[np.ndarray, " n"]:
     """Return the ids of walls laid across a bend that this scan shows, and few scans before it.
 
@@ -114,13 +92,21 @@ def mistaken(
     """
     seen = segments.lines, segments.cov[:, 0, 0].copy(), segments.ends, segments.is_tentative
     walls_seen = walls.belief.pose_world, walls.belief.means[:, 0].copy(), walls.ends_world
-    laid = vertex_kernels.laid_across(*seen, *walls_seen, gate_level(gate, 1), _bounds(config))
+    laid = vertex_kernels.laid_across(*seen, *walls_seen, gate_level(gate, 1), _bounds(shared))
     return walls.ids[laid & ~walls.established]
 
 
 @lru_cache
-def _bounds(config: VerticesConfig) -> Bounds:
-    return Bounds(*(float(getattr(config, name)) for name in Bounds._fields))
+def _bounds(shared: SharedConfig) -> Bounds:
+    return Bounds(
+        float(shared.resolution_m),
+        float(shared.beside_m),
+        float(shared.thickness_m),
+        float(shared.beyond_m),
+        float(shared.far_m),
+        LARGEST_RAD,
+        float(shared.sharp_rad),
+    )
 
 
 def _are_known(
@@ -136,8 +122,8 @@ def _are_known(
     return known
 
 
-def _bends(walls: StochasticMap, range_m: float, config: VerticesConfig, cut: Collection[tuple[int, int]]) -> Bends:
+def _bends(walls: StochasticMap, range_m: float, shared: SharedConfig, cut: Collection[tuple[int, int]]) -> Bends:
     """Return where bends may lie; walls that begin beyond `range_m` have none that a scan of that range shows."""
     rows = np.flatnonzero((walls.distances_m < range_m) & ~walls.tentative)
     alpha, pairs = walls.belief.means[:, 0].copy(), np.array(sorted(cut), dtype=np.int64).reshape(-1, 2)
-    return vertex_kernels.bends(rows, walls.ids, alpha, walls.ends_world, pairs, _bounds(config))
+    return vertex_kernels.bends(rows, walls.ids, alpha, walls.ends_world, pairs, _bounds(shared))

@@ -104,21 +104,21 @@ def of_robot() -> Any:
     return field(default=RobotSpec(), repr=False, metadata={STATED: True})
 
 
-STATED = "stated by the robot"
-"""Marks such a field."""
+STATED = "stated once"
+"""Marks a field that holds what is stated elsewhere, by the robot (`of_robot`) or for all rules (`of_shared`)."""
 
 Settings = TypeVar("Settings")
 
 
-def fitted(settings: Settings, robot: RobotSpec) -> Settings:
-    """Return a group of settings, and all groups within, for a robot."""
+def fitted(settings: Settings, stated: object) -> Settings:
+    """Return a group of settings, and all groups within, with what is stated once: a robot, or what rules share."""
     assert is_dataclass(settings)
     assert not isinstance(settings, type)
     changes: dict[str, Any] = {}
     for each in fields(settings):
         value = getattr(settings, each.name)
         if each.metadata.get(STATED):
-            changes[each.name] = robot
+            changes |= {each.name: stated} if isinstance(value, type(stated)) else {}
         elif is_dataclass(value) and not isinstance(value, type):
-            changes[each.name] = fitted(value, robot)
+            changes[each.name] = fitted(value, stated)
     return replace(settings, **changes)

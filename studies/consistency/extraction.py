@@ -218,7 +218,7 @@ def groups(lines: Lines) -> dict[str, Bool[np.ndarray, " n"]]:
     rows["all of 5 beams or more"] = clean & long
     rows["lines of 4 beams"] = clean & (lines.beams == 4)
     rows["lines of 3 beams"] = clean & (lines.beams == 3)
-    is_known = np.sqrt(lines.cov[:, 0, 0]) < ReliabilityConfig().few_heading_rad
+    is_known = np.sqrt(lines.cov[:, 0, 0]) < ReliabilityConfig().shared.known_rad
     rows["lines of 3 or 4 beams that may move the estimate"] = clean & ~long & is_known
     return rows
 

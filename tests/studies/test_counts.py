@@ -2,7 +2,7 @@
 
 import pytest
 
-from studies.counts import arrows, entries, tunable
+from studies.counts import LAYOUT, arrows, entries, tunable
 
 CODE = '''
 """A file."""
@@ -11,6 +11,8 @@ import numpy as np
 
 SCANS = 4
 """So many scans."""
+POSE = 3
+"""Size of a pose."""
 NOTHING = np.zeros((0, 2))
 ANGLE_RAD = float(np.deg2rad(3.0))
 name = 5
@@ -39,7 +41,8 @@ def rule(x, y):
     """Decide."""
     if x > 0.25 * y and len(y) > 1 and y[7] == 0:
         return x < -9.0
-    return min(x, 8)
+    nearly = 0.5 * max(x, 1e-3)
+    return min(nearly, 8)
 '''
 
 
@@ -61,10 +64,17 @@ def test_numbers_that_one_may_tune_are_settings_constants_and_sides_of_compariso
         ("AConfig.reach_m", "0.3", "setting", "How far."),
         ("AConfig.pair", "(0.1, 0.2)", "setting", ""),
         ("SCANS", "4", "constant", "So many scans."),
+        ("POSE", "3", "layout", "Size of a pose."),
         ("ANGLE_RAD", "float(np.deg2rad(3.0))", "constant", ""),
         ("x > 0.25 * y", "0.25", "literal", ""),
         ("x < -9.0", "9.0", "literal", ""),
+        ("nearly = 0.5 * max(x, 0.001)", "0.001", "literal", ""),
     ]
+
+
+def test_what_is_no_choice_is_a_constant_of_the_product(request):
+    constants = {each.name for each in tunable(request.config.rootpath) if each.kind == "layout"}
+    assert constants == set(LAYOUT)
 
 
 def test_what_makes_a_folder_a_package_is_no_entry(root):

@@ -15,17 +15,22 @@ class Limits(NamedTuple):
     """The numbers of `MatchingConfig` that the loops read, probabilities as levels of chi-square."""
 
     level: float
+    """Of the gate."""
     doubt: float
+    """Of what is not ruled out."""
     one_wall: float
     angle_cosine: float
-    offset_m: float
     overlap_m: float
-    short_m: float
-    beside_m: float
     beside_rad: float
     density: float
-    clear: float
-    whole_m: float
+    beside_m: float
+    """A short segment so near a wall of which it covers half is not a new wall."""
+    face_m: float
+    """A short wall of which both ends were seen is none of which a segment shows more by this."""
+    short_m: float
+    """Shorter ones are too poor in direction for the gate alone."""
+    far_m: float
+    """Lines that are nearer at the seen piece are compared in any case."""
 
 
 class Seen(NamedTuple):
@@ -79,7 +84,7 @@ def candidates(seen: Seen, known: Known, limits: Limits) -> Candidates:
     for c in range(len(line)):
         low, high = along_line(seen.ends[segment[c]], known.anchors[line[c]], alpha[c], pose)
         gap[c] = gap_to(low, high, known.extents[line[c]])
-        near[c] = abs(e[c, 1]) < limits.offset_m or d2[c] <= limits.doubt
+        near[c] = abs(e[c, 1]) < limits.far_m or d2[c] <= limits.doubt
         near[c] = near[c] and not _shows_more(low, high, line[c], known, limits)
     return Candidates(segment[near], line[near], e[near], H_pose[near], H_line[near], R[near], d2[near], gap[near])
 
@@ -112,7 +117,7 @@ def _shows_more(low: float, high: float, line: int, known: Known, limits: Limits
     """Return whether a segment reaches past a short wall of which both ends were seen."""
     begin, end = known.extents[line]
     past = max(high - end, begin - low)
-    return known.whole[line] and end - begin < limits.short_m and past > limits.whole_m
+    return known.whole[line] and end - begin < limits.short_m and past > limits.face_m
 
 
 @compiled

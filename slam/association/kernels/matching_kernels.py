@@ -12,9 +12,6 @@ from .hypothesis_kernels import agree
 from .joint_kernels import taken_together
 from .rest_kernels import UNMATCHED, compatible, nearest_alone
 
-OVERLAP_SHARE = 0.5
-"""A short segment lies along a wall that covers at least this share of it."""
-
 
 @compiled
 def matched(
@@ -62,7 +59,7 @@ def _agreed(
     for k in range(len(rows)):
         sure[k] = not seen.is_tentative[segment[k]]
     pairs, margins = agree(segment, line, e, S, sure, limits.level, limits.doubt, limits.density)
-    clear = pairs[margins >= limits.clear]
+    clear = pairs[margins >= limits.level]
     return rows[compatible(clear, e, S, limits.level, together)]
 
 
@@ -97,19 +94,20 @@ def _nearest(found: Candidates, rows: Int[np.ndarray, " r"], known: Known, limit
     """Return for each segment its nearest candidate among `rows`, unless another is nearly as near."""
     segment, e, R = found.segment[rows], found.e[rows].ravel(), found.R[rows]
     _, S = taken_together(known.cov, found.line[rows], found.H_pose[rows], found.H_line[rows], R)
-    return rows[nearest_alone(segment, found.d2[rows], e, S, R, limits.one_wall, limits.clear)]
+    return rows[nearest_alone(segment, found.d2[rows], e, S, R, limits.one_wall, limits.level)]
 
 
 @compiled
 def _is_beside(c: int, found: Candidates, seen: Seen, limits: Limits) -> bool:
-    """Return whether a candidate is a short segment along a wall, however badly its direction is known."""
+    """Return whether a candidate is a short segment of which half lies along a wall, whatever its direction."""
     s, turn = found.segment[c], found.e[c, 0]
     length = math.hypot(seen.ends[s, 1, 0] - seen.ends[s, 0, 0], seen.ends[s, 1, 1] - seen.ends[s, 0, 1])
+    half = 0.5 * length * math.cos(turn)
     return (
         length < limits.short_m
-        and abs(turn) < limits.beside_rad + 3.0 * math.sqrt(seen.cov[s, 0, 0])
+        and abs(turn) < limits.beside_rad + math.sqrt(limits.level * seen.cov[s, 0, 0])
         and abs(found.e[c, 1]) < limits.beside_m
-        and found.gap[c] <= -OVERLAP_SHARE * length * math.cos(turn)
+        and found.gap[c] <= -half
     )
 
 

@@ -13,13 +13,14 @@ from jaxtyping import Float, Int
 
 from ...estimation.backend import POSE, Belief, Joint, Observations, StaleBeliefError
 from ...estimation.models import Initialisation, Innovations, Linear, Motion, initialise, innovations, move, stack
+from ...geometry.numerics import LEAST_SIGMA
 from ...robot import Odometry
 from ..frame import Frame
 from .config import EkfConfig
 from .linear import equality
 
 DEFAULTS = EkfConfig()
-ONE_WALL = 1e-12 * np.eye(2)
+ONE_WALL = LEAST_SIGMA**2 * np.eye(2)
 """Two lines known to be one leave S singular: a thousandth of a millimetre keeps it invertible."""
 
 

@@ -65,7 +65,7 @@ def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tup
     keep = 1.0 / sigma2
     for i in range(size):
         is_free = (i == 0 and not joints.is_corner[k, 0]) or (i == size - 1 and not joints.is_corner[k, 1])
-        gate = rules.open_gate_sigmas if is_free else rules.noise_sigmas
+        gate = rules.outlier_sigmas if is_free else rules.noise_sigmas
         off = met_at(line, cos[i], sin[i]) - ranges[i]
         # A residual varies by sigma^2 less what its own beam lent to the line; a beam that alone holds the line stays.
         spread = max(sigma2[i] - variance_met(line, cos[i], sin[i]), 1e-6 * sigma2[i])

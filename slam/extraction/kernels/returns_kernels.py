@@ -20,8 +20,7 @@ class Rules(NamedTuple):
     segment_cost: float
     least_beams: int
     sure_beams: int
-    settling_rounds: int
-    open_gate_sigmas: float
+    outlier_sigmas: float
     doubt_sigmas: float
 
 

@@ -75,7 +75,7 @@ def choose(
     The least cost up to a cut is that up to the one before, with loose beams between, or that up to an earlier one of
     the same unbroken run, with a piece from there.
     """
-    loose_cost = rules.open_gate_sigmas**2
+    loose_cost = rules.outlier_sigmas**2
     least, came_from = np.zeros(len(cuts)), np.full(len(cuts), -1)
     run, first = 0, 0
     for j in range(1, len(cuts)):
@@ -165,12 +165,13 @@ def settled(
 
     Where a wall bends by a degree or two the gain at any scale is flat, and its peak lies many beams off the bend: a
     line over the beams of two walls is wrong by the same amount in scan after scan. In a round a cut takes at most
-    half of the beams that its neighbours can spare; most stay where they are at once.
+    half of the beams that its neighbours can spare; most stay where they are at once, and none moves more often than
+    there are beams.
     """
     n = len(pieces)
     is_break = np.zeros(len(sums), np.bool_)
     is_break[breaks] = True
-    for _ in range(rules.settling_rounds):
+    for _ in range(len(sums)):
         moved, is_still = pieces.copy(), True
         for k in range(n - 1):
             cut = pieces[k, 1]

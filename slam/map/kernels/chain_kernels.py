@@ -16,16 +16,25 @@ BESIDE_SHARE = 0.5
 
 
 class Reach(NamedTuple):
-    """The numbers of `ChainConfig` that the loops read."""
+    """The numbers of `SharedConfig` that the loops read."""
 
     reach_m: float
+    """Largest distance between two ends that are joined while the robot still explores them."""
     set_aside_reach_m: float
+    """The same for two ends that exploration looked at closely and set aside."""
     straight_cosine: float
+    """Walls that turn less into each other make no corner ..."""
     straight_reach_m: float
+    """... and join only this near, or beside each other: two rooms' walls on one line face each other across the end of
+    the wall between, as far apart as that is thick."""
     overlap_m: float
+    """Largest overlap of the two sides of a bend, both established: within the noise each reaches past it, ..."""
     beside_m: float
+    """... where it lies no farther than this from the other."""
     least_bend_cosine: float
+    """What such a bend turns: less, and it may be one wall entered twice; ..."""
     most_bend_cosine: float
+    """... more, and beams tell where it is."""
 
 
 @compiled

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
+from ...geometry.numerics import TINY
 
 
 @compiled
@@ -136,7 +137,7 @@ def surest(
     """Return the place of the surest turn that the scan of now tells of, the turn, and its square in its variances."""
     best, best_turn, best_square = 0, 0.0, -1.0
     for p in range(len(sums)):
-        turn = -sums[p] / max(information[p], 1e-9)
+        turn = -sums[p] / max(information[p], TINY)
         is_bend = abs(turn) > least_rad
         square = turn * turn * information[p] if is_bend and now[p] > 0.0 else 0.0
         if square > best_square:

@@ -7,6 +7,8 @@ from jaxtyping import Bool, Float, Int
 
 from ...extraction.segments import EndKind
 from ...geometry.compiled import compiled
+from ...geometry.line_kernels import GRAZING
+from ...geometry.numerics import TINY
 from .ray_kernels import ray_evidence
 from .wall_kernels import distances, ends_world
 
@@ -15,8 +17,6 @@ CLAIMED_BEAMS = 4
 """Fewer beams on a wall say nothing about whose they are."""
 CLAIMED_SHARE = 0.8
 """A wall is claimed by others in a scan that gives them this share of its beams: a beam or two may lie near both."""
-TRIM_M = 0.5
-"""What is left of a wall that a beam passed through is cut back to its hits by less than this: beams stand apart."""
 
 
 @compiled
@@ -50,7 +50,7 @@ def seen_along(
         for side in range(2):
             along[k, side] = _along(ends[k, side], pose_world, anchors[row], means[row, 0])
             distance = math.hypot(ends[k, side, 0], ends[k, side, 1])
-            cosine = min(max(lines[k, 1] / max(distance, 1e-9), 0.05), 1.0)
+            cosine = min(max(lines[k, 1] / max(distance, TINY), GRAZING), 1.0)
             apart[k, side] = step_rad * distance / cosine
     return along, apart
 
@@ -169,7 +169,8 @@ def cut_back(
     spacing: Float[np.ndarray, "w 2"],
     against: Int[np.ndarray, " w"],
     margin_m: float,
-    contradictions: int,
+    trim_m: float,
+    twice: int,
 ) -> None:
     """Cut walls back where beams pass through them in scan after scan: a door, or a wall that never was."""
     for k in range(len(near)):
@@ -177,10 +178,10 @@ def cut_back(
         inside = np.zeros(along.shape[1], np.bool_)
         for beam in range(len(inside)):
             inside[beam] = extents[row, 0] + margin_m < along[k, beam] < extents[row, 1] - margin_m
-        passed = np.count_nonzero(passes[k] & inside) >= 2
+        passed = np.count_nonzero(passes[k] & inside) >= twice
         against[row] = against[row] + 1 if passed else 0
-        if against[row] >= contradictions:
-            kept = kept_piece(extents[row], along[k][passes[k] & inside], along[k][hits[k] & inside])
+        if against[row] >= twice:
+            kept = kept_piece(extents[row], along[k][passes[k] & inside], along[k][hits[k] & inside], trim_m)
             for side in range(2):
                 if kept[side] != extents[row, side]:
                     extents[row, side], spacing[row, side] = kept[side], margin_m
@@ -189,9 +190,12 @@ def cut_back(
 
 @compiled
 def kept_piece(
-    extent: Float[np.ndarray, "2"], through: Float[np.ndarray, " p"], on: Float[np.ndarray, " h"]
+    extent: Float[np.ndarray, "2"], through: Float[np.ndarray, " p"], on: Float[np.ndarray, " h"], trim_m: float
 ) -> Float[np.ndarray, "2"]:
-    """Return the piece between passing beams that most beams end on (else the longest), cut back to its hits."""
+    """Return the piece between passing beams that most beams end on (else the longest), cut back to its hits.
+
+    By less than `trim_m`: beams stand apart.
+    """
     pieces = len(through) + 1
     bounds = np.empty(pieces + 1)
     bounds[0], bounds[1:pieces], bounds[pieces] = extent[0], np.sort(through), extent[1]
@@ -207,9 +211,9 @@ def kept_piece(
     for h in range(len(on)):
         if kept[0] <= on[h] <= kept[1]:
             first, last = min(first, on[h]), max(last, on[h])
-    if best > 0 and first - kept[0] < TRIM_M:
+    if best > 0 and first - kept[0] < trim_m:
         kept[0] = first
-    if best < pieces - 1 and kept[1] - last < TRIM_M:
+    if best < pieces - 1 and kept[1] - last < trim_m:
         kept[1] = last
     return kept
 
@@ -259,7 +263,8 @@ def weigh(
     claimed: Int[np.ndarray, " w"],
     against: Int[np.ndarray, " w"],
     margin_m: float,
-    contradictions: int,
+    trim_m: float,
+    twice: int,
 ) -> None:
     """Hold the walls in range against the beams: those that pass through them, and those that other walls have."""
     near = np.flatnonzero(distances(pose_world[:2], ends_world(anchors, means, extents)) < range_m)
@@ -267,4 +272,4 @@ def weigh(
         bearings_rad, ranges_m, passed_m, pose_world, anchors[near], means[near], margin_m
     )
     note_claims(near, along, hits, owners_of_beams, ids, extents, seen, claimed)
-    cut_back(near, along, hits, passes, extents, spacing, against, margin_m, contradictions)
+    cut_back(near, along, hits, passes, extents, spacing, against, margin_m, trim_m, twice)

@@ -7,12 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ...geometry.compiled import compiled
+from ...geometry.line_kernels import GRAZING
+from ...geometry.numerics import TINY
 from .chain_kernels import HEAD, TAIL, near_ends, supposed_corners
-
-GRAZING_COSINE = 0.05
-"""Beams within three degrees of a line say nothing about it: its own uncertainty moves the crossing by metres."""
-NEAREST_M = 0.02
-"""Nor do those to a line through the robot itself."""
 
 
 @compiled
@@ -33,11 +30,11 @@ def ray_evidence(
         nx, ny = math.cos(means[line, 0]), math.sin(means[line, 0])
         x, y = anchors[line, 0] - pose_world[0], anchors[line, 1] - pose_world[1]
         r, foot = means[line, 1] + nx * x + ny * y, ny * x - nx * y
-        if r <= NEAREST_M:
+        if r <= 0.0:
             continue
         for beam in range(k):
             cosine = beams[beam, 0] * nx + beams[beam, 1] * ny
-            if cosine <= GRAZING_COSINE:
+            if cosine <= GRAZING:
                 continue
             distance = r / cosine
             along[line, beam] = foot + distance * (beams[beam, 1] * nx - beams[beam, 0] * ny)
@@ -92,22 +89,22 @@ def _cross(
     """Note which beams, by their directions, cross one way as `passing` says; those noted before stay noted."""
     gap_x, gap_y = to_world[0] - from_world[0], to_world[1] - from_world[1]
     x, y = from_world[0] - pose_world[0], from_world[1] - pose_world[1]
-    width = max(math.hypot(gap_x, gap_y), 1e-9)
+    width = max(math.hypot(gap_x, gap_y), TINY)
     for k in range(len(beams)):
         # p + s beam = from + u gap; with J the quarter turn, x·(J y) = 0 for x parallel to y.
         denominator = gap_y * beams[k, 0] - gap_x * beams[k, 1]
-        if abs(denominator) <= 1e-9:
+        if abs(denominator) <= TINY:
             continue
         u = -(y * beams[k, 0] - x * beams[k, 1]) / denominator
         s = -(y * gap_x - x * gap_y) / denominator
         if not (margin_m / width < u < 1.0 - margin_m / width and s > 0.0):
             continue
-        sine = max(abs(denominator) / width, 1e-9)
+        sine = max(abs(denominator) / width, TINY)
         through[k] |= passed_m[k] > s + beyond_m + across_m / sine
 
 
 class Watch(NamedTuple):
-    """The numbers of `OpeningsConfig` and `ChainConfig` that the loops read."""
+    """The numbers of `SharedConfig` that the loops read."""
 
     widest_m: float
     corner_reach_m: float

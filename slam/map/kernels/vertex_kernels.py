@@ -28,15 +28,25 @@ class Bends(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """The numbers of `VerticesConfig` that the loops read."""
+    """The numbers that the loops read."""
 
-    reach_m: float
-    cut_reach_m: float
-    largest_rad: float
+    resolution_m: float
+    """A segment goes on at least so far on both sides of a bend, and walls that overlap by less do not."""
     beside_m: float
-    past_m: float
-    past_shown_m: float
-    sharpest_rad: float
+    """Distance across a segment within which a bend lies on it."""
+    thickness_m: float
+    """Largest gap between the end of one wall and the beginning of the next. They may overlap: a line over both was
+    given to one of them, which then reaches past the bend."""
+    beyond_m: float
+    """A wall that reaches so far beyond a bend that a scan shows, on both sides, was laid across it: a beam of the
+    other side may have been taken in, at 4 m one in 0.13 m."""
+    far_m: float
+    """The same gap between two walls that are known to be pieces of one bent wall: far from the robot no beam may have
+    met either of them near the bend."""
+    largest_rad: float
+    """A sharper bend is seen in every scan."""
+    sharp_rad: float
+    """And the largest turn of such a bend: round an apse of eight sides two of them are one line to a few scans."""
 
 
 @compiled
@@ -65,17 +75,17 @@ def bends(
                 continue
             turn = wrapped(alpha[after] - alpha[before])
             is_cut = _are_pair(ids[before], ids[after], cut)
-            reach = bounds.cut_reach_m if is_cut else bounds.reach_m
+            reach = bounds.far_m if is_cut else bounds.thickness_m
             if gap >= reach or abs(turn) >= bounds.largest_rad:
                 continue
             slope = math.tan(turn)
             crossing = gap + across / slope if slope != 0.0 else math.inf
-            cross = min(gap, 0.0) - bounds.reach_m < crossing < max(gap, 0.0) + bounds.reach_m
+            cross = min(gap, 0.0) - bounds.thickness_m < crossing < max(gap, 0.0) + bounds.thickness_m
             at = crossing if cross else 0.5 * gap
             pairs[count, 0], pairs[count, 1] = before, after
             points[count, 0], points[count, 1] = x - ny * at, y + nx * at
             turns[count], crosses[count] = abs(turn), cross
-            overlaps[count], cuts[count] = gap < -bounds.past_m, is_cut
+            overlaps[count], cuts[count] = gap < -bounds.resolution_m, is_cut
             count += 1
     return Bends(
         pairs[:count].copy(),
@@ -117,7 +127,7 @@ def on_segments(
             length = math.hypot(ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1])
             along = nx * (y - ends[k, 0, 1]) - ny * (x - ends[k, 0, 0])
             across = nx * (x - ends[k, 0, 0]) + ny * (y - ends[k, 0, 1])
-            beside = bounds.past_m < along < length - bounds.past_m and abs(across) < bounds.beside_m
+            beside = bounds.resolution_m < along < length - bounds.resolution_m and abs(across) < bounds.beside_m
             turn = wrapped(alpha_world[b] - pose_world[2] - lines[k, 0])
             on[b] = on[b] or (beside and abs(turn) < bounds.largest_rad)
     return on, bearings
@@ -142,10 +152,10 @@ def laid_across(
         after = (k + 1) % len(lines)
         turn = wrapped(lines[after, 0] - lines[k, 0])
         x, y = seen_ends[after, 0, 0] - seen_ends[k, 1, 0], seen_ends[after, 0, 1] - seen_ends[k, 1, 1]
-        blunt = abs(turn) < bounds.sharpest_rad
+        blunt = abs(turn) < bounds.sharp_rad
         shown = turn * turn > level * (variances[k] + variances[after])
         shown = shown and not (is_tentative[k] or is_tentative[after])
-        if not (shown and blunt and math.hypot(x, y) < bounds.cut_reach_m):
+        if not (shown and blunt and math.hypot(x, y) < bounds.far_m):
             continue
         x, y = seen_ends[k, 1, 0] + 0.5 * x, seen_ends[k, 1, 1] + 0.5 * y
         east, north = c * x - s * y + pose_world[0], s * x + c * y + pose_world[1]
@@ -155,6 +165,6 @@ def laid_across(
             across = nx * (east - ends[wall, 0, 0]) + ny * (north - ends[wall, 0, 1])
             begins = nx * (north - ends[wall, 0, 1]) - ny * (east - ends[wall, 0, 0])
             goes_on = ny * (east - ends[wall, 1, 0]) - nx * (north - ends[wall, 1, 1])
-            if min(begins, goes_on) > bounds.past_shown_m and abs(across) < bounds.beside_m:
+            if min(begins, goes_on) > bounds.beyond_m and abs(across) < bounds.beside_m:
                 laid[wall] = laid[wall] or abs(wrapped(alpha[wall] - normal)) < bounds.largest_rad
     return laid

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...geometry.compiled import compiled
+from ...geometry.numerics import TINY
 
 
 @compiled
@@ -29,7 +30,7 @@ def distances(point_world: Float[np.ndarray, "2"], ends: Float[np.ndarray, "n 2 
     for k in range(len(ends)):
         along_x, along_y = ends[k, 1, 0] - ends[k, 0, 0], ends[k, 1, 1] - ends[k, 0, 1]
         x, y = point_world[0] - ends[k, 0, 0], point_world[1] - ends[k, 0, 1]
-        share = (x * along_x + y * along_y) / max(along_x**2 + along_y**2, 1e-18)
+        share = (x * along_x + y * along_y) / max(along_x**2 + along_y**2, TINY**2)
         share = min(max(share, 0.0), 1.0)
         found[k] = math.hypot(x - share * along_x, y - share * along_y)
     return found

@@ -57,7 +57,7 @@ def test_an_older_run_is_replayed_and_what_means_nothing_now_is_told(name, older
     assert said.endswith("left aside: mission.wings.span_m")
     written = json.loads((out / CONFIG).read_text())
     assert written["format"] == FORMATS[CONFIG]
-    assert written["trial"]["mission"]["mapper"]["extraction"]["sure_gap_m"] == 0.4
+    assert written["trial"]["mission"]["mapper"]["shared"]["door_m"] == 0.4
     assert json.loads((out / "summary.json").read_text())["steps"] == 3
 
 

@@ -176,14 +176,14 @@ def test_a_config_of_the_first_format_is_read_as_what_it_was(tmp_path):
         return key
 
     record = json.loads(json_bytes(config_record(TrialConfig("hall", seed=4)))) | {"format": 1}
-    said = [(key, 0.85 if key.endswith(".duplicates.across_m") else value)
+    said = [(key, 0.85 if key.endswith(".duplicates.hidden_m") else value)
             for key, value in ((old_name(key), value) for key, value in leaves(record["trial"]))]  # fmt: skip
     record["trial"] = nested(said)
     assert "duplicates" in record["trial"]["mission"]["mapper"]
     path = tmp_path / "config.json"
     path.write_text(json.dumps(record))
-    assert read_trial(path).mission.mapper.merging.across_m == 0.85
-    record["trial"] = over(record["trial"], nested([("mission.mapper.duplicates.across_m", 0.05)]))
+    assert read_trial(path).mission.mapper.merging.hidden_m == 0.85
+    record["trial"] = over(record["trial"], nested([("mission.mapper.duplicates.hidden_m", 0.01)]))
     del record["trial"]["mission"]["mapper"]["matching"]["gate"]
     path.write_text(json.dumps(record))
     assert read_trial(path) == TrialConfig("hall", seed=4)

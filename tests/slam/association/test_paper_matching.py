@@ -19,6 +19,7 @@ from slam.geometry.poses import wrap
 from slam.mapper import Mapper
 
 PAPER = MatchingConfig(method="paper")
+NEAR_M = PAPER.shared.short_m
 IDS = np.array([2, 3, 5, 8, 13, 21])
 
 
@@ -103,9 +104,9 @@ def test_each_segment_takes_the_nearest_wall_that_passes_both_gates(seed):
         level = chi2.ppf(PAPER.gate, 2)
         pairs = {}
         for s in range(len(segments)):
-            passing = [k for k in range(6) if d2[s, k] <= level and apart[s, k] <= 0.3]
+            passing = [k for k in range(6) if d2[s, k] <= level and apart[s, k] <= NEAR_M]
             met["far"] += any(d2[s] <= level) and not passing
-            met["gate"] += any(apart[s] <= 0.3) and not passing
+            met["gate"] += any(apart[s] <= NEAR_M) and not passing
             met["rivals"] += len(passing) > 1
             if passing:
                 pairs[s] = IDS[min(passing, key=lambda k: d2[s, k])]

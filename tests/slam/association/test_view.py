@@ -80,7 +80,7 @@ def test_the_more_the_robot_is_lost_the_farther_it_looks():
     turned = joint.mean[:3] + np.array([0.0, 0.0, 0.3])
     apart = rotation(0.3) @ segments.ends[0, 0] - segments.ends[0, 0]
     sure, unsure = (np.diag([1e-8, 1e-8, sigma**2]) for sigma in (1e-4, 0.1))
-    assert np.hypot(*apart) > CONFIG.offset_m
+    assert np.hypot(*apart) > CONFIG.shared.far_m
     lost, found = (near_segments(segments, ends_world, turned, cov, CONFIG) for cov in (sure, unsure))
     assert np.all(found[lost])
     assert np.count_nonzero(found) > np.count_nonzero(lost)

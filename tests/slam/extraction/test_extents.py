@@ -1,18 +1,17 @@
 """The ends that are believed: as far as beams stand close together, and hardly beyond the last of them."""
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slam.estimation.shared import SharedConfig
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind
 from slam.extraction.visible_extent import sure_pieces
 from tests.slam.extraction.test_extract import room_scan
 
-CONFIG = replace(ExtractionConfig(), sure_gap_m=0.12, corner_leap_m=0.02)
+CONFIG = ExtractionConfig(shared=SharedConfig(door_m=0.12, within_m=0.02))
 
 
 def met(line, bearing):
@@ -36,18 +35,18 @@ def test_an_end_is_the_last_point_where_beams_stand_close_and_no_leap_beyond_the
         ends = segments.ends[k].copy()
         for end in range(2):
             last = met(line, scan.bearings_rad[segments.beams[k, end]])
-            if np.hypot(*(ends[end] - last)) > CONFIG.corner_leap_m:
+            if np.hypot(*(ends[end] - last)) > CONFIG.shared.within_m:
                 ends[end] = last
         along = np.array([-np.sin(line[0]), np.cos(line[0])])
-        is_beyond = (ends @ along).prod() > 0 and min(apart(line, end) for end in ends) > CONFIG.sure_gap_m
+        is_beyond = (ends @ along).prod() > 0 and min(apart(line, end) for end in ends) > CONFIG.shared.door_m
         nearest = min(ends, key=lambda end: apart(line, end))
         for end in range(2):
             shown = believed.ends[k, end]
-            if apart(line, ends[end]) <= CONFIG.sure_gap_m:
+            if apart(line, ends[end]) <= CONFIG.shared.door_m:
                 np.testing.assert_allclose(shown, ends[end], atol=1e-9)
             elif is_beyond:
                 np.testing.assert_allclose(shown, nearest, atol=1e-9)
-            elif apart(line, np.array([np.cos(line[0]), np.sin(line[0])])) <= CONFIG.sure_gap_m:
-                assert abs(apart(line, shown) - CONFIG.sure_gap_m) < 1e-6
+            elif apart(line, np.array([np.cos(line[0]), np.sin(line[0])])) <= CONFIG.shared.door_m:
+                assert abs(apart(line, shown) - CONFIG.shared.door_m) < 1e-6
             same = np.allclose(shown, segments.ends[k, end], atol=1e-12)
             assert believed.end_kinds[k, end] == (segments.end_kinds[k, end] if same else EndKind.OPEN)

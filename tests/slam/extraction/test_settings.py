@@ -5,13 +5,14 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from slam.estimation.shared import SharedConfig
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import extract
 from slam.extraction.visible_extent import sure_pieces
 from tests.slam.extraction.test_extract import CLOSED, PLACES, loop, room_scan, scan_of
 
 FAR_OFF = {
-    "noise_sigmas": 1.5,
+    "shared": SharedConfig(noise_sigmas=1.5),
     "gap_beams": 1,
     "grazing_rad": 0.5,
     "scales": (3,),
@@ -20,11 +21,7 @@ FAR_OFF = {
     "segment_cost": 1e4,
     "least_beams": 9,
     "sure_beams": 20,
-    "settling_rounds": 0,
-    "open_gate_sigmas": 0.1,
     "doubt_sigmas": 0.0,
-    "sure_gap_m": 0.02,
-    "corner_leap_m": 0.0,
 }
 
 

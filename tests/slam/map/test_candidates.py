@@ -10,7 +10,7 @@ from slam.geometry.poses import to_robot
 from slam.map.candidates import CandidatesConfig, LandmarkCandidates
 
 SIGMA_M = 0.005
-GATE, ANGLE_RAD = 0.99, 1.05
+GATE, ANGLE_RAD, SURE_BEAMS = 0.99, 1.05, 5
 
 
 def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generator, beams: int = 3) -> Segments:
@@ -44,8 +44,8 @@ def test_a_face_is_believed_once_several_places_showed_three_spare_beams(
     free_side = -np.array([np.cos(turn), np.sin(turn)])
     poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(len(beams))]
     moving, standing = (
-        LandmarkCandidates(0.99999, ANGLE_RAD),
-        LandmarkCandidates(0.99999, ANGLE_RAD),
+        LandmarkCandidates(0.99999, ANGLE_RAD, SURE_BEAMS),
+        LandmarkCandidates(0.99999, ANGLE_RAD, SURE_BEAMS),
     )
     believed = [len(moving.see(pose, look(face, pose, rng, m))) for pose, m in zip(poses, beams, strict=True)]
     assert believed == [k == look_of_belief for k in range(len(beams))]
@@ -54,7 +54,7 @@ def test_a_face_is_believed_once_several_places_showed_three_spare_beams(
 
 def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
     rng = np.random.default_rng(3)
-    faint = LandmarkCandidates(GATE, ANGLE_RAD)
+    faint = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS)
     for k in range(15):
         face = np.array([[1.0 + 0.08 * k, 0.05], [1.0 + 0.08 * k, -0.05]])[::-1]
         pose = np.array([0.0, 0.06 * k, 0.0])
@@ -63,7 +63,7 @@ def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
 
 def test_a_line_unseen_for_long_is_forgotten() -> None:
     rng = np.random.default_rng(4)
-    faint = LandmarkCandidates(GATE, ANGLE_RAD, CandidatesConfig(patience_m=5 * 0.15))
+    faint = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS, CandidatesConfig(patience_m=5 * 0.15))
     face, nothing = (
         np.array([[1.0, 0.05], [1.0, -0.05]])[::-1],
         look(np.eye(2), np.zeros(3), rng).take(np.zeros(0, int)),
@@ -80,6 +80,6 @@ def test_a_line_longer_than_a_door_end_is_never_believed() -> None:
     """What shows three or four beams there is mostly a line from one wall's corner to the next wall."""
     rng = np.random.default_rng(5)
     for half_m, is_believed in ((0.08, True), (0.1, False)):
-        faint, face = LandmarkCandidates(GATE, ANGLE_RAD), np.array([[1.0, -half_m], [1.0, half_m]])
+        faint, face = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS), np.array([[1.0, -half_m], [1.0, half_m]])
         poses = [np.array([0.0, 0.1 * k, 0.0]) for k in range(4)]
         assert any(len(faint.see(pose, look(face, pose, rng, 4))) for pose in poses) == is_believed

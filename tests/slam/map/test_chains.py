@@ -6,14 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.estimation.backend import Belief, Joint
+from slam.estimation.shared import SharedConfig
 from slam.geometry.lines import normals, through
-from slam.map.chains import HEAD, TAIL, ChainConfig, connect
+from slam.map.chains import HEAD, TAIL, connect
 from slam.map.stochastic_map import StochasticMap
 
 few = settings(max_examples=40, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
-REACH = ChainConfig().reach_m
-ASIDE_REACH = ChainConfig().set_aside_reach_m
+REACH = SharedConfig().thickness_m
+ASIDE_REACH = SharedConfig().door_m
 
 
 def map_of(segments, ids=None, tentative=None, seen=20):

@@ -29,7 +29,7 @@ def test_what_is_left_of_a_wall_is_the_piece_that_most_beams_end_on(seed):
         expected[0] = inner.min()
     if len(inner) and high < 2.0 and high - inner.max() < 0.5:
         expected[1] = inner.max()
-    np.testing.assert_array_equal(kept_piece(extent, through, on), expected)
+    np.testing.assert_array_equal(kept_piece(extent, through, on, 0.5), expected)
 
 
 @few

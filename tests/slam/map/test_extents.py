@@ -8,15 +8,13 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind
 from slam.geometry.lines import normals, through
-from slam.map.chains import ChainConfig
 from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
-from slam.map.openings import OpeningsConfig
 from slam.map.stochastic_map import ESTABLISHED
 from slam.robot import Scan
 
-SETTINGS = (WallsConfig(), ChangePointsConfig(), OpeningsConfig(), ChainConfig())
+SETTINGS = (WallsConfig(), ChangePointsConfig())
 CONFIG = WallsConfig()
 
 
@@ -203,7 +201,7 @@ def looked(walls, times, shown=(CAP,), at=0, known=CAP):
 
 def test_a_wall_is_seen_whole_where_nothing_hides_its_ends():
     walls = Landmarks(*SETTINGS)
-    assert not looked(walls, CONFIG.trusted_observations - 1)
+    assert not looked(walls, CONFIG.shared.scans - 1)
     assert looked(walls, 1)
 
 

@@ -50,7 +50,7 @@ def beside(alpha, at, along=0.0, across=0.0):
 def test_a_wall_entered_twice_is_found_whatever_pieces_were_seen(alpha, x, y, one, two, share, seed):
     """The pieces overlap; their lines are drawn with the errors that the covariance states."""
     rng = np.random.default_rng(seed)
-    along = share * (0.5 * (one + two) - CONFIG.across_m)
+    along = share * (0.5 * (one + two) - CONFIG.shared.resolution_m)
     draw = rng.standard_normal((2, 2)) * [0.002, 0.003]
     draw = np.clip(draw, [-0.003, -0.005], [0.003, 0.005])
     lines = [(alpha + draw[0, 0], (x, y), one), (alpha + draw[1, 0], beside(alpha, (x, y), along, draw[1, 1]), two)]
@@ -145,9 +145,10 @@ def test_candidates_are_those_of_a_plain_loop():
             long, short = (i, j) if lines[i][2] > lines[j][2] else (j, i)
             n, t = normals(np.array(lines[long][0])), directions(np.array(lines[long][0]))
             off = known.ends_world[short] - known.ends_world[long, 0]
-            near = np.abs(off @ n).max() <= CONFIG.across_m
+            near = np.abs(off @ n).max() <= CONFIG.shared.resolution_m
             apart = max((off @ t)[0] - lines[long][2], -(off @ t)[1])
-            if near and apart <= -CONFIG.across_m and np.cos(lines[i][0] - lines[j][0]) > np.cos(CONFIG.turn_rad):
+            straight = np.cos(lines[i][0] - lines[j][0]) > np.cos(CONFIG.shared.straight_rad)
+            if near and apart <= -CONFIG.shared.resolution_m and straight:
                 plain.append((int(known.ids[i]), int(known.ids[j])))
     assert len(plain) > 5
     pairs, hidden = lying_along(known, touched, CONFIG)
@@ -158,6 +159,6 @@ def test_candidates_are_those_of_a_plain_loop():
         off = points - known.ends_world[long, 0]
         n, t = normals(np.array(lines[long][0])), directions(np.array(lines[long][0]))
         shared = np.mean((off @ t >= 0.0) & (off @ t <= lines[long][2]))
-        enough = shared * lines[short][2] >= CONFIG.hidden_overlap_m
+        enough = shared * lines[short][2] >= CONFIG.shared.long_m
         assert is_hidden == (enough and bool(np.all(np.abs(off @ n) <= CONFIG.hidden_m)))
     assert 3 < np.count_nonzero(hidden) < len(pairs) - 3

@@ -12,9 +12,9 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.estimation.backend import Belief
 from slam.geometry.lines import normals, through
-from slam.map.chains import HEAD, TAIL, ChainConfig, connect
+from slam.map.chains import HEAD, TAIL, connect
 from slam.map.kernels.ray_kernels import Watch, between
-from slam.map.openings import Openings, OpeningsConfig, passing
+from slam.map.openings import Openings, passing
 from slam.map.stochastic_map import StochasticMap
 from slam.mapper import Mapper
 from slam.robot import Scan
@@ -65,7 +65,7 @@ def test_a_gap_is_passed_by_two_beams_of_one_scan(through: int, is_passed: bool)
     ranges = scan.ranges_m.copy()
     ranges[beams[:through]] = 3.9
     ranges[beams[through:]] = np.hypot(*(ends[0, HEAD] - pose[:2]))
-    gaps = Openings(OpeningsConfig(), ChainConfig())
+    gaps = Openings()
     gaps.see(walls, replace(scan, ranges_m=ranges))
     assert bool(gaps.passed) == is_passed
 
@@ -109,14 +109,14 @@ def test_a_pillar_is_not_closed_in_a_corner_that_beams_have_cut_off(turn: float)
     (chain,) = connect(walls)
     assert chain.is_closed
     assert chain.corners_world[:, 1].max() > 0.3
-    gaps = Openings(OpeningsConfig(), ChainConfig())
+    gaps = Openings()
     gaps.see(walls, scan_past(faces, pose))
     (chain,) = connect(walls, cut_off=gaps.cut_off)
     assert len(chain.open_ends) == 2
     met = map_of(ring_of([(0.0, 0.0), (0.045, 0.32), (0.09, 0.0)])[[2, 0, 1]], pose)
     gaps.see(met, scan_past(faces, pose))
     assert not gaps.cut_off, "ends that meet by now in a corner suppose nothing there"
-    gaps = Openings(OpeningsConfig(), ChainConfig())
+    gaps = Openings()
     gaps.see(whole, scan_past(faces, pose))
     (chain,) = connect(whole, cut_off=gaps.cut_off)
     assert chain.is_closed
@@ -136,7 +136,7 @@ def test_no_beam_cuts_off_a_true_corner_whose_walls_were_seen_short_of_it(seed: 
     if np.all(np.abs(pose[:2] - 1.5) < 0.8):
         return
     scan = scan_past(faces, pose)
-    gaps = Openings(OpeningsConfig(), ChainConfig())
+    gaps = Openings()
     gaps.see(map_of(short, pose), replace(scan, ranges_m=scan.ranges_m + rng.normal(0.0, 0.01, 180)))
     assert not gaps.cut_off
 

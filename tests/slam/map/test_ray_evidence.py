@@ -98,7 +98,7 @@ def test_a_wall_seen_at_a_grazing_angle_is_sure_only_where_its_beams_stand_close
     step = scan.bearings_rad[1] - scan.bearings_rad[0]
     bearing = np.arctan2(end[1], end[0])
     beyond = 0.5 / np.tan(-(bearing + step))
-    assert beyond - end[0] == pytest.approx(config.sure_gap_m, rel=0.2)
+    assert beyond - end[0] == pytest.approx(config.shared.door_m, rel=0.2)
 
 
 @pytest.mark.parametrize(("leap_m", "is_believed"), [(0.05, True), (0.1, False)])

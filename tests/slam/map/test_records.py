@@ -7,15 +7,13 @@ from hypothesis import strategies as st
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import directions, normals
-from slam.map.chains import ChainConfig
 from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
-from slam.map.openings import OpeningsConfig
 from slam.map.records import Records
 from slam.map.reliability import Reliability
 
-SETTINGS = (WallsConfig(), ChangePointsConfig(), OpeningsConfig(), ChainConfig())
+SETTINGS = (WallsConfig(), ChangePointsConfig())
 SUMS = ("observations", "fits")
 """Columns that add up over mergers, whatever walls were merged."""
 

@@ -12,7 +12,7 @@ from slam.map.kernels.wall_kernels import distances, ends_world
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
-BOUNDS = Bounds(0.3, 0.8, 0.4, 0.2, 0.05, 0.15, 0.7)
+BOUNDS = Bounds(0.05, 0.2, 0.3, 0.15, 0.8, 0.4, 0.7)
 
 
 def scene(seed, most=9):
