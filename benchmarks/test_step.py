@@ -80,6 +80,8 @@ def test_a_step_takes_as_long_in_a_large_map_and_after_a_long_way(benchmark: Ben
     benchmark.pedantic(drive, rounds=1, iterations=1)
     step_s, work_s, lines, path_m = np.array(rows[WARM : WARM + (len(rows) - WARM) // BIN * BIN]).T.reshape(4, -1, BIN)
     ratio = np.median(step_s, axis=1) / np.median(work_s, axis=1)
+    benchmark.extra_info["longest_ms"] = round(1e3 * float(step_s.max()), 1)
+    print(f"longest step: {benchmark.extra_info['longest_ms']} ms")
     for name, size in (("lines", lines.mean(axis=1)), ("path", path_m.mean(axis=1))):
         fit, cov_fit = np.polyfit(np.log(size), np.log(ratio), 1, cov=True)
         benchmark.extra_info[name] = [round(float(b), 3) for b in (fit[0], np.sqrt(cov_fit[0, 0]))]
