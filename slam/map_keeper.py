@@ -9,7 +9,7 @@ from .association.matching import Matches
 from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
-from .extraction.straightness import cov_of_bows
+from .extraction.straightness import cov_of_bows, cov_of_misfits
 from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
@@ -78,7 +78,8 @@ class MapKeeper:
         if len(fresh):
             centres = seen_centres(segments, fresh)
             begun = segments.take(fresh)
-            cov = begun.cov + cov_of_bows(begun, self.config.walls.reliability.straightness)
+            straightness = self.config.walls.reliability.straightness
+            cov = begun.cov + cov_of_bows(begun, straightness) + cov_of_misfits(begun, straightness)
             owners[fresh] = self.backend.grow(begun.lines, cov, centres)
         known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:

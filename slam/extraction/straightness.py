@@ -14,7 +14,7 @@ from jaxtyping import Float
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
 from .segments import Segments
-from .straightness_kernels import faces_cov
+from .straightness_kernels import faces_cov, misfit_variances
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,15 @@ class StraightnessConfig:
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    edges = faces_cov(segments.lines, segments.ends, float(config.edge_m), float(config.shared.face_m))
+    edges = faces_cov(
+        segments.lines, segments.ends, _misfits_m2(segments, config), float(config.edge_m), float(config.shared.face_m)
+    )
     return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
+
+
+def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
+    """Return what they lack where the residuals of a segment show that it is of several faces."""
+    return faces_cov(segments.lines, segments.ends, _misfits_m2(segments, config), 0.0, 1.0)
 
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
@@ -44,6 +51,11 @@ def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessCon
     cov[:, 0, 0], cov[:, 1, 1] = config.bow_rad**2, config.bow_m**2 + (config.bow_rad * middles) ** 2
     cov[:, 0, 1] = cov[:, 1, 0] = config.bow_rad**2 * middles
     return cov
+
+
+def _misfits_m2(segments: Segments, config: StraightnessConfig) -> Float[np.ndarray, " s"]:
+    sigmas = float(config.shared.outlier_sigmas)
+    return misfit_variances(segments.cov, segments.chi2, segments.beam_counts, sigmas)
 
 
 def _middles_m(segments: Segments) -> Float[np.ndarray, " s"]:

@@ -138,7 +138,7 @@ REAL = (
            "return edges + cov_of_bows(segments, config) if «config.bow_rad or config.bow_m» else edges",
            "False", "no scan tells a real wall's line better than it bows"),
     Switch("mapper.new_bows", "slam.map_keeper",
-           "cov = begun.cov + «cov_of_bows(begun, self.config.walls.reliability.straightness)»",
+           "cov = begun.cov + «cov_of_bows(begun, straightness)» + cov_of_misfits(begun, straightness)",
            "0.0", "nor does the first one"),
     Switch("real_log.walls", "experiments.replays.real_log",
            "trial_of(record_of(plain), «REAL_WALLS», robot,", "{}", "in a recorded drive walls bow"),

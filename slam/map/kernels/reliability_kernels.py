@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...extraction.straightness_kernels import edge_cov, edge_variance
+from ...extraction.straightness_kernels import edge_cov, edge_variance, of_a_beam
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import wrapped
 
@@ -24,11 +24,9 @@ def add_fits(
         row, beams, dof = rows[k], beam_counts[k], beam_counts[k] - 2.0
         fits[row, 0] += chi2[k]
         fits[row, 1] += dof
-        # Across the line a beam has the variance of the whole fit, times as many beams.
-        across = cov[k, 1, 1] - cov[k, 0, 1] ** 2 / cov[k, 0, 0]
-        of_a_beam = across * beams
-        residue[row, 0] += (chi2[k] - dof) * of_a_beam
-        residue[row, 1] += 2.0 * dof * of_a_beam * of_a_beam
+        variance = of_a_beam(cov[k], beams)
+        residue[row, 0] += (chi2[k] - dof) * variance
+        residue[row, 1] += 2.0 * dof * variance * variance
         residue[row, 2] += beams
 
 
