@@ -135,7 +135,7 @@ def _array(stream: Any, name: str, header: _Header, layout: str | None) -> np.nd
     if kind == "text":
         try:
             return np.array(array.tolist())
-        except (ValueError, SystemError) as error:
+        except SystemError as error:
             raise ArchiveError(f"{name} of letters that do not exist") from error
     if kind == "int" and array.size and array.max() > np.iinfo(np.int64).max:
         raise ArchiveError(f"{name} with numbers beyond 64 bits")

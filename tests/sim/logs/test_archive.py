@@ -160,6 +160,12 @@ def test_what_is_no_archive_of_arrays_is_told(tmp_path):
             read_archive(place, LAYOUT)
 
 
+def test_letters_that_do_not_exist_are_told(tmp_path):
+    beyond = member((1,), (0x110000).to_bytes(4, "little"), "<U1")
+    with pytest.raises(ArchiveError, match="word of letters that do not exist"):
+        read_archive(zipped(tmp_path / "a.npz", [("word.npy", beyond)]), {"word": "text n"})
+
+
 def test_no_array_has_less_than_no_rows(tmp_path):
     """Its bytes, below zero, would let a larger array through."""
     text = repr({"descr": "<f8", "fortran_order": False, "shape": (-1,)}).ljust(200).encode()
