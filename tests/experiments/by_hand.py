@@ -1,9 +1,10 @@
 """A run of three steps made by hand, for scores to be worked out by plain arithmetic."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import networkx as nx
 import numpy as np
+from scipy.linalg import logm
 
 from experiments.scenario import Scenario, TrialConfig, build
 from experiments.scoring.association import Votes
@@ -90,3 +91,21 @@ def true_map(world, make_map, make_chains):
     votes = Votes(truth, {k: 10 * np.eye(len(truth.faces), dtype=np.int64)[k] for k in range(len(truth.faces))})
     chains = make_chains(to_world(truth.faces, back), truth.rings)
     return Run(scenario, log_of(), votes, step_of(walls, chains), walls.belief.joint(walls.ids), ENDING)
+
+
+def marked(run, **marks):
+    """The run with some walls marked as tentative or crooked."""
+    walls = run.step.map
+    rows = {name: np.isin(np.arange(len(walls)), which) for name, which in marks.items()}
+    return replace(run, step=replace(run.step, map=replace(walls, **rows)))
+
+
+def matrix(pose):
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+
+
+def xi_of(estimated, true):
+    """The error of a pose by the logarithm of matrices: X_est = Exp(xi) X_true."""
+    log = np.real(logm(matrix(estimated) @ np.linalg.inv(matrix(true))))
+    return np.array([log[0, 2], log[1, 2], log[1, 0]])

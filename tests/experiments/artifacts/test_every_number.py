@@ -14,7 +14,8 @@ from experiments.campaign.work import Job, perform, unpack
 
 HERE = Path(__file__).parents[1]
 BY_HAND = (
-    *("scoring/test_summary", "scoring/test_step_table", "scoring/test_innovations", "artifacts/test_products"),
+    *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations")),
+    "artifacts/test_products",
     "campaign/scores/test_score",
     *(f"campaign/comparison/test_{name}" for name in ("tables", "comparison", "findings", "hypothesis", "left_out")),
 )
