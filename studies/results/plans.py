@@ -50,7 +50,8 @@ def _anees(rows: Sequence[Row]) -> str:
     """Return the map's ANEES and what it says of the covariance, in words."""
     median = float(np.median(numbers(rows, "map_anees")))
     told = "as wide as they should be" if 0.9 <= median <= 1.15 else "too narrow" if median > 1.15 else "too wide"
-    return f"map ANEES {median:.3g} at the median: covariances are typically {told}"
+    anees = f"map ANEES {mean_of(rows, 'map_anees'):.3g} in the mean, {median:.3g} at the median"
+    return f"{anees}: covariances are typically {told}"
 
 
 def real_plans(rows: Sequence[Row]) -> Found:

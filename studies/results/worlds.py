@@ -99,5 +99,5 @@ def paper_method(rows: Sequence[Row]) -> Found:
     for name, mine in by.items():
         cells = [f"`{name}`", str(len(mine)), f"{twice[name]} of {len(mine)}", str(total(mine, "duplicate_lines"))]
         table.append([*cells, median_of(mine, "pose_anees"), median_of(mine, "map_anees")])
-    shares = ", ".join(f"`{name}` in {count} of {len(by[name])}" for name, count in twice.items())
+    shares = "; ".join(f"`{name}` in {count} of {len(by[name])}" for name, count in twice.items())
     return Found(table, f"The wall entered twice appears, by {shares} runs ([why](exploration.md#the-papers-method)).")

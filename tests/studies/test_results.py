@@ -63,7 +63,10 @@ def test_apartments_stand_by_back_end_and_the_verdict_says_which_way_the_covaria
     assert cells["map ANEES: mean, median"] == ["1.73, 0.7", "1.3, 1.3"]
     assert cells["maps with an ANEES above 3"] == ["1", "0"]
     assert cells["false matches, duplicate walls, a plan"] == ["2.00, 1.00", "2.00, 1.00"]
-    assert "`graph`: 3 of 3 complete, map ANEES 0.7 at the median: covariances are typically too wide." in found.verdict
+    assert (
+        "`graph`: 3 of 3 complete, map ANEES 1.73 in the mean, 0.7 at the median: covariances are typically too wide."
+        in found.verdict
+    )
     assert found.verdict.endswith("typically too narrow.")
 
 
