@@ -181,7 +181,10 @@ def _place(key: str, value: Any) -> None:
         if part not in hints or part not in kind.__dataclass_fields__ or _is_stated(kind, part):
             if now := told_of(key):
                 raise UnfitError(f"the key {key!r} of older versions (name {now})")
-            near = get_close_matches(key, [name for name, _ in leaves(defaults())], 3, 0.5)
+            beside = [
+                ".".join([*parts[:depth], name, *parts[depth + 1 :]]) for name in get_close_matches(part, hints, 1)
+            ]
+            near = beside or get_close_matches(key, [name for name, _ in leaves(defaults())], 3, 0.5)
             raise UnfitError(f"the unknown key {key[:80]!r}" + (f" (is it {' or '.join(near)}?)" if near else ""))
         kind = hints[part]
     if _inner(kind) is not None and value is not None:

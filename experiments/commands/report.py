@@ -12,6 +12,7 @@ from ..artifacts.files import write
 from ..campaign.contrast import CONTRAST
 from ..campaign.pages.contrast_page import contrast_page
 from ..campaign.pages.page import page_of
+from ..usage import UsageError
 from ..views.gif import gif_of
 from ..views.run_page import is_run, run_page
 
@@ -50,6 +51,8 @@ class Report:
 
 
 def _page(folder: Path) -> Page:
+    if not folder.is_dir():
+        raise UsageError(f"expected a folder of results, found no folder {folder}: name what a command left")
     if (folder / CONTRAST).is_file():
         return contrast_page(folder)
     # A campaign keeps no summary.json; its recordings lie two folders further down.

@@ -78,6 +78,8 @@ def recordings_at(path: Path) -> Callable[[], list[Path]]:
         return lambda: found
     if (path / TRIALS).is_file():
         return lambda: [_made(path, lambda target: record_campaign(path, read_campaigns(path)[0], target))]
+    if not path.exists():
+        raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found no {path}: name what a run left")
     log = path if path.name == LOG else path / LOG
     logs = [log] if log.is_file() else sorted(path.glob(f"*/{LOG}"))
     if not logs:

@@ -97,7 +97,7 @@ class RecordedRobot:
 
 def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
     """Return the arrays of a run's own log (`log.npz`), and the truth where it is there; raises RecordingError."""
-    name = source.name if isinstance(source, Path) else "log.npz"
+    name, where = (source.name, str(source)) if isinstance(source, Path) else ("log.npz", "log.npz")
     try:
         said = read_archive(source, {"format": "int"})["format"]
         if not 1 <= said <= FORMAT:
@@ -106,7 +106,7 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
             return _of_format_1(read_archive(source, NEEDED | {"sigma_m": "float"}, {**TRUTH, **LATER}))
         return read_archive(source, NEEDED, {**TRUTH, **LATER})
     except FileNotFoundError as error:
-        raise RecordingError(f"expected a run's log.npz, found no file {name} there: name a log that exists") from error
+        raise RecordingError(f"expected a run's log.npz, found no file {where}: name a log that exists") from error
     except ArchiveError as error:
         raise RecordingError(f"expected a run's log.npz, found {name} with {error}: record the run anew") from error
     except OSError as error:

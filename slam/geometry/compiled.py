@@ -108,7 +108,9 @@ def _fingerprint(function: Callable[..., object]) -> str:
     """Return one name for all that the kernels of the function's module are made of."""
     module = function.__module__
     if module not in _FINGERPRINTS:
-        told = blake2b(Path(inspect.getfile(function)).read_bytes(), digest_size=8)
+        path = inspect.getfile(function)
+        # numba keeps the machine code of each place by itself: another installation compiles anew, and says so.
+        told = blake2b(os.fsencode(path) + Path(path).read_bytes(), digest_size=8)
         for name, value in _globals(function):
             if isinstance(value, _FROZEN):
                 told.update(f"{name}={value!r};".encode())

@@ -134,6 +134,4 @@ def navigation(rows: Sequence[Row]) -> Found:
         table.append([*cells, str(total(pairs, "steps")), planning, str(total(pairs, "collisions"))])
     ratio = [by["visibility"][file]["path_length_m"] / by["floor"][file]["path_length_m"] for file in both]
     share = float(np.exp(np.mean(np.log(ratio))))
-    return Found(
-        table, f"Sequences of walls are {share:.2f} times as long as the way over the floor, and all complete."
-    )
+    return Found(table, f"In the geometric mean ways by walls are {share:.2f} times as long as over the floor.")
