@@ -23,10 +23,10 @@ from slam.backends import BACKENDS
 from viz.figures.anees_map import Field, anees_map
 from viz.figures.maps import saved
 
+from ..exploration.ring_worlds import LEAST_M, ring_world
 from ..runner.explored import explored
 from ..runner.rows import Key, Row, key_of, read, rows_of
 from ..runner.scores import bootstrap
-from .ring_worlds import LEAST_M, ring_world
 
 NAMES = ("length_m", "heading_deg", "p0", "strategy", "backend", "seed", "way")
 KINDS: dict[str, Literal["png", "svg", "pdf"]] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}

@@ -12,9 +12,9 @@ from explore.goal import Goal
 from slam.geometry.lines import distance_to_segments
 from studies.consistency import heading as heading_study
 from studies.consistency.heading import HeadingStudy, Ring
-from studies.consistency.ring_worlds import ring_world
 from studies.exploration import adaptive as adaptive_study
 from studies.exploration.adaptive import AdaptiveStudy, comparison_table, returns_table, values_of
+from studies.exploration.ring_worlds import ring_world
 from studies.runner.explored import Returns, explored
 
 SCORED = {

@@ -110,8 +110,8 @@ def test_the_way_goes_where_the_walls_go(driven):
     floor._follow(around.walls)
     before = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
     shift = np.array([0.0, -0.4])
-    around.walls.belief.anchors[:] += shift
-    floor._follow(around.walls)
+    belief = around.walls.belief
+    floor._follow(replace(around.walls, belief=replace(belief, anchors=belief.anchors + shift)))
     after = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
     assert len(after) >= 0.9 * len(before)
     np.testing.assert_allclose((after.mean(axis=0) - before.mean(axis=0))[::-1] * 0.05, shift, atol=0.06)
