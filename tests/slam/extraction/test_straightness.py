@@ -209,3 +209,17 @@ def test_a_segment_with_a_misfit_of_its_own_moves_no_estimate():
     assert not are_clear(bent).any()
     np.testing.assert_allclose(cov_of_misfits(straight), 0.0)
     np.testing.assert_allclose(cov_of_faces(bent), cov_of_faces(straight) + cov_of_misfits(bent), rtol=1e-9)
+
+
+def test_a_wall_that_begins_by_a_segment_with_a_misfit_is_as_uncertain_as_that():
+    """Sixty beams two sigmas before and behind a wall in turn: four times the chi-square of a straight one."""
+    bearings = np.linspace(-0.5, 0.5, 60)
+    ranges = (2.0 + 0.004 * np.tile([1.0, -1.0], 30)) / np.cos(bearings)
+    scan = Scan(bearings, ranges, 0.002, 6.0, 0.0)
+    segments = extract(scan)
+    assert len(segments) == 1
+    mapper = Mapper(BACKENDS["full-ekf"].make(np.zeros(3), 1e-12 * np.eye(3)), MapperConfig())
+    mapper.step(scan)
+    turn = mapper.belief.joint(mapper.belief.ids).cov[3, 3]
+    assert turn == pytest.approx(segments.cov[0, 0, 0] + cov_of_misfits(segments)[0, 0, 0], rel=1e-3)
+    assert turn > 10.0 * segments.cov[0, 0, 0]
