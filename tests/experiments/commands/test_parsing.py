@@ -106,3 +106,20 @@ def test_every_message_about_size_names_the_option(shape, scale, capsys, tmp_pat
     drawing.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" fill="none" stroke="black">{shape}</svg>')
     assert main(["explore", str(drawing), *(["--scale", scale] if scale else [])]) == 2
     assert "--scale" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["report", "PLACE"], "found no folder PLACE"),
+        (["view", "PLACE.rrd"], "found no PLACE.rrd"),
+        (["replay", "PLACE/log.npz"], "found no file PLACE/log.npz"),
+        (["explore", "rooms", "--set", "mission.maper.matching.gate=0.9"], "(is it mission.mapper.matching.gate?)"),
+        (["explore", "rooms", "--set", "mision.mapper.x=1"], "(is it mission.mapper.x?)"),
+    ],
+)
+def test_a_line_names_what_is_missing_or_meant(words, told, tmp_path, capsys):
+    place = str(tmp_path / "nothing")
+    assert main([word.replace("PLACE", place) for word in words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told.replace("PLACE", place) in line

@@ -1,8 +1,11 @@
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+
+import slam.geometry.compiled as compiled_module
 
 CALLED = """
 from slam.geometry.compiled import compiled
@@ -66,3 +69,18 @@ def test_dividing_by_zero_is_infinite_as_in_numpy() -> None:
         return 1.0 / x
 
     assert inverse(0.0) == np.inf
+
+
+def test_another_installation_of_the_same_source_has_machine_code_of_its_own(tmp_path, monkeypatch):
+    """numba keeps it by place: what one has compiled says nothing of the other."""
+    found = []
+    for place in ("one", "other", "one"):
+        path = tmp_path / place / "twin_kernels.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("from slam.geometry.compiled import compiled\n\n\n@compiled\ndef same(x):\n    return x\n")
+        spec = importlib.util.spec_from_file_location("twin_kernels", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        monkeypatch.setattr(compiled_module, "_FINGERPRINTS", {})
+        found.append(compiled_module._fingerprint(module.same.plain))
+    assert found[0] == found[2] != found[1]
