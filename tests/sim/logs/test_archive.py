@@ -218,7 +218,9 @@ BREAKS = {
 @pytest.mark.parametrize("kind", BREAKS, ids=lambda kind: kind.__name__)
 def test_whatever_zipfile_cannot_read_is_told_in_the_same_words(tmp_path, kind):
     content = BREAKS[kind](deflated(tmp_path))
-    with pytest.raises(kind), zipfile.ZipFile(io.BytesIO(content)) as file:
+    # Pythons that look for bombs refuse a member that reaches into the directory before they read it.
+    kinds = (kind, zipfile.BadZipFile) if kind is EOFError else kind
+    with pytest.raises(kinds), zipfile.ZipFile(io.BytesIO(content)) as file:
         file.read("time.npy")
     with pytest.raises(ArchiveError, match="no archive of arrays"):
         read_archive(content, {"time": "float s"})
