@@ -14,6 +14,8 @@ class Outcome(StrEnum):
     """Nothing was found that could be explored."""
     RECORDING_ENDED = "recording-ended"
     """A recorded robot was ridden to the end of its recording."""
+    RECORDING_CUT_SHORT = "recording-cut-short"
+    """The same, of a drive that had not come to its own end."""
     STEP_LIMIT = "step-limit"
     PATH_LIMIT = "path-limit"
     TIME_LIMIT = "time-limit"

@@ -36,6 +36,11 @@ def write(path: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def replacing(path: Path) -> str:
+    """Return words to tell, ahead of writing a file, that an earlier one gives way to it; none where there is none."""
+    return ", in place of an earlier one" if path.exists() else ""
+
+
 def probe(path: Path) -> None:
     """Raise OSError, leaving nothing behind, where `write_anywhere` could not write."""
     if path.is_dir():

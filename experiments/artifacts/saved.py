@@ -185,6 +185,17 @@ def read_trial(path: Path) -> TrialConfig:
     return config.trial
 
 
+def cut_short(folder: Path) -> str:
+    """Return in words what ended the run in a folder early; nothing where it came to its end, or no summary is there.
+
+    Raises UsageError for a summary that is none.
+    """
+    if not (folder / "summary.json").exists():
+        return ""
+    said = read_json(folder / "summary.json", {"status": str, "reason": str}, REMEDY)
+    return "" if said["status"] == "complete" else str(said["reason"])
+
+
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a run's `summary.json`; raises UsageError."""
     return read_json(folder / "summary.json", SUMMARY, REMEDY)

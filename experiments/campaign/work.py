@@ -137,7 +137,7 @@ def pack(record: TrialScores) -> bytes:
 def unpack(content: bytes, trial: Trial) -> TrialScores:
     """Return the record in the bytes of a trial's file; raises ArchiveError or UnfitError for anything else."""
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
-    summary = parse_json(str(arrays.pop(SUMMARY)).encode(errors="replace"), RECORD, SHAPE)
+    summary = parse_json(str(arrays.pop(SUMMARY)).encode(), RECORD, SHAPE)
     arrays.pop("format", None)
     for group in (HEARD, tuple(name for name in LAYOUTS if name not in HEARD)):
         missing = [name for name in group if name not in arrays]

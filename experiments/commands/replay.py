@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from explore.outcome import Outcome
 from explore.step import Step
 from sim.logs.recorded_log import is_own_log
 from sim.logs.recorded_robot import knows_truth
@@ -112,6 +113,9 @@ class Replay:
                     break
             problems += recording.close()
         self._print(source, summaries)
+        early = [summary["reason"] for summary in summaries if summary["outcome"] == Outcome.RECORDING_CUT_SHORT]
+        for words in dict.fromkeys(early):
+            print(words)
         print_references(summaries)
         print(f"results in {out}")
         for problem in problems:

@@ -8,7 +8,7 @@ import tyro
 
 from viz.reports.report import Page, html, latex
 
-from ..artifacts.files import write
+from ..artifacts.files import replacing, write
 from ..campaign.contrast import CONTRAST
 from ..campaign.pages.contrast_page import contrast_page
 from ..campaign.pages.page import page_of
@@ -32,15 +32,18 @@ class Report:
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
+        replaced = replacing(self.folder / REPORT)
         page = self.write()
-        print(f"report in {self.folder / REPORT}")
+        print(f"report in {self.folder / REPORT}{replaced}")
         if self.latex:
             tables = [table for section in page.sections for table in section.tables]
+            replaced = replacing(self.folder / TABLES)
             write(self.folder / TABLES, latex(tables))
-            print(f"tables in {self.folder / TABLES}")
+            print(f"tables in {self.folder / TABLES}{replaced}")
         if self.gif:
+            replaced = replacing(self.folder / GIF)
             write(self.folder / GIF, gif_of(self.folder))
-            print(f"animation in {self.folder / GIF}")
+            print(f"animation in {self.folder / GIF}{replaced}")
         return 0
 
     def write(self) -> Page:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from viz.figures.maps import saved
 
-from ..artifacts.files import json_bytes, write
+from ..artifacts.files import json_bytes, replacing, write
 from ..artifacts.run_folder import prepare
 from ..reproductions import REPRODUCTIONS, Reproduction
 from ..reproductions.reproduction import Value
@@ -43,6 +43,7 @@ class Reproduce:
         for done, name in enumerate(names):
             began = time.perf_counter()
             with bar_of(f"{_far(done, len(names), began - started)}{name}: {REPRODUCTIONS[name].about}", None):
+                replaced = replacing(self.out / f"{name}.json")
                 made = REPRODUCTIONS[name].make(self.seed)
                 for kind in ("png", "svg"):
                     write(self.out / f"{name}.{kind}", saved(made.figure, kind))
@@ -52,7 +53,8 @@ class Reproduce:
             for note in made.notes:
                 console.print(note, style="dim")
             console.print(
-                f"{self.out / name}.png, .svg, .json; computing time {duration(time.perf_counter() - began)}\n"
+                f"{self.out / name}.png, .svg, .json{replaced}; computing time"
+                f" {duration(time.perf_counter() - began)}\n"
             )
         return 0
 

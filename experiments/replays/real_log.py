@@ -17,7 +17,7 @@ from sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, rec
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.mapper import Mapper
 
-from ..artifacts.saved import read_trial
+from ..artifacts.saved import cut_short, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
 from ..scoring.summary import odometry_poses
@@ -58,6 +58,8 @@ class RealRun:
     log: RecordedLog
     trial: TrialConfig
     options: RealOptions
+    cut_short: str = ""
+    """What ended the drive or its log early, in words."""
 
     @cached_property
     def wheels_alone(self) -> Float[np.ndarray, "s 3"]:
@@ -82,7 +84,7 @@ def read_real_run(
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
     trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, sets, settled))
-    return RealRun(path.name, log, trial, options)
+    return RealRun(path.name, log, trial, options, log.trouble)
 
 
 def _keyframes(options: RealOptions) -> KeyframesConfig:
@@ -110,9 +112,8 @@ def read_own_run(
         raise UsageError(str(error)) from error
     trial = replace(read_trial(path.with_name("config.json")), strategy=STRATEGY_OF_REPLAYS)
     settled = record_of(trial).keys() - set(OPEN_TO_REPLAYS)
-    return RealRun(
-        trial.world, every_scan(recording), trial_of(record_of(trial), robot, asked(config, sets, settled)), options
-    )
+    trial = trial_of(record_of(trial), robot, asked(config, sets, settled))
+    return RealRun(trial.world, every_scan(recording), trial, options, cut_short(path.parent))
 
 
 def replayed_real(run: RealRun, backend: str) -> TrialConfig:
@@ -127,7 +128,7 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     def mission(scenario: Scenario) -> Iterator[Step]:
         heard = heard_by(run.options.odometry, scenario.robot, scenario.config)
         mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
-        return ride_mission(heard, mapper, len(run.log.recording))
+        return ride_mission(heard, mapper, len(run.log.recording), run.cut_short)
 
     result = run_unwitnessed(scenario, watch, mission, run.log)
     return looked_again(result) if run.options.second_looks or result.smoothed is not None else result

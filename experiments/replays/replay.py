@@ -33,7 +33,7 @@ from slam.odometry.scan_matching import ScanMatcher
 from slam.robot import MotionCommand, Odometry, Robot, Scan
 
 from ..artifacts.reading import fit, told
-from ..artifacts.saved import read_config, read_trial
+from ..artifacts.saved import cut_short, read_config, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world, make_backend
 from ..scoring.truth import truth_of
@@ -71,6 +71,8 @@ class RecordedRun:
     start_cov: Float[np.ndarray, "3 3"]
     true_poses_world: Float[np.ndarray, "s 3"]
     true_face_of_beam: Int[np.ndarray, "s k"]
+    cut_short: str = ""
+    """What ended the drive before its own end, in words."""
 
 
 def read_run(log: Path) -> RecordedRun:
@@ -79,7 +81,8 @@ def read_run(log: Path) -> RecordedRun:
         arrays = read_log(log)
     except RecordingError as error:
         raise UsageError(str(error)) from error
-    return run_of(arrays, lambda: read_trial(log.with_name("config.json")))
+    run = run_of(arrays, lambda: read_trial(log.with_name("config.json")))
+    return replace(run, cut_short=cut_short(log.parent))
 
 
 def read_options(config: Path) -> ReplayOptions:
@@ -202,7 +205,7 @@ def replay(
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(METHODS[rules.matching.method].matcher if oracle is None else oracle),
         )
-        return ride_mission(heard_by(options.odometry, robot, config), mapper, len(recording))
+        return ride_mission(heard_by(options.odometry, robot, config), mapper, len(recording), run.cut_short)
 
     return run_scenario(scenario, learn, mission)
 

@@ -169,6 +169,7 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
     """Print one column for each of several replays of one recording on standard output."""
     table = Table(title=title, title_justify="left")
     columns = {
+        "status": "status",
         "pose ANEES": "pose_anees",
         "NEES in 95 % band": "pose_nees_in_band",
         "map ANEES": "map_anees",

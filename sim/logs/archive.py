@@ -134,9 +134,11 @@ def _array(stream: Any, name: str, header: _Header, layout: str | None) -> np.nd
     kind = layout.split()[0] if layout else None
     if kind == "text":
         try:
-            return np.array(array.tolist())
-        except SystemError as error:
+            text = np.array(array.tolist())
+            "".join(text.ravel().tolist()).encode()
+        except (SystemError, UnicodeEncodeError) as error:
             raise ArchiveError(f"{name} of letters that do not exist") from error
+        return text
     if kind == "int" and array.size and array.max() > np.iinfo(np.int64).max:
         raise ArchiveError(f"{name} with numbers beyond 64 bits")
     return np.array(array, dtype=TYPES[kind] if kind else array.dtype.newbyteorder("="), order="C")

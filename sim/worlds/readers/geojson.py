@@ -45,6 +45,8 @@ class _About:
     name: str | None = None
     heading: float = 0.0
     kind: Kind | None = None
+    unknown: str = ""
+    """Its property `kind`, where that is no word for a room or something solid and no other property is one."""
     is_own: bool = False
     """Whether it is a part of a map that this program wrote."""
 
@@ -86,6 +88,10 @@ def _add(found: _Found, geometry: dict[str, Any], about: _About) -> None:
             if np.ptp(path, axis=0).any():
                 _add_line(found, shapely.LineString(path), about)
     elif kind in ("Polygon", "MultiPolygon"):
+        if about.unknown:
+            raise WorldError(
+                f"expected a polygon of kind room or solid, found {about.unknown}: use such a word, or leave kind out"
+            )
         for rings in [coordinates] if kind == "Polygon" else _list(coordinates, kind):
             paths = [_path(ring, 4) for ring in _list(rings, kind)]
             found.outlines += [Outline(shapely.Polygon(paths[0], paths[1:]), about.kind)] if paths else []
@@ -132,7 +138,8 @@ def _about(number: Any, properties: dict[str, Any], is_own: bool) -> _About:
     best = "start" if "start" in called else name_of(called[-1]) if called else None
     values = [properties.get(key) for key in KEYS]
     kinds = [WORDS[value.lower()] for value in values if isinstance(value, str) and value.lower() in WORDS]
-    return _About(best, float(turn[0]), kinds[0] if kinds else None, is_own)
+    unknown = shorten(said) if not kinds and not is_own and (said := properties.get("kind")) is not None else ""
+    return _About(best, float(turn[0]), kinds[0] if kinds else None, unknown, is_own)
 
 
 def _list(value: Any, what: str) -> list[Any]:

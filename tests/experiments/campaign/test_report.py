@@ -80,9 +80,10 @@ def test_a_campaign_of_one_strategy_that_only_replays_has_no_empty_tables(tmp_pa
     assert all(table.rows for section in page.sections for table in section.tables)
 
 
-def test_the_same_results_give_the_same_page(folder):
+def test_the_same_results_give_the_same_page_and_the_earlier_one_is_told_of(folder, capsys):
     before = (folder / "report.html").read_bytes()
     assert main(["report", str(folder)]) == 0
+    assert capsys.readouterr().out == f"report in {folder / 'report.html'}, in place of an earlier one\n"
     assert (folder / "report.html").read_bytes() == before
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.artifacts.reading import read_json
 from experiments.artifacts.results import write_results
 from experiments.commands.cli import main
 from experiments.replays.oracles import true_odometry
@@ -33,9 +34,23 @@ def made(tmp_path_factory):
 def test_the_same_back_end_gives_the_same_estimate_bit_for_bit(made):
     result, folder = made
     again = replay(read_run(folder / "log.npz"), "full-ekf")
-    assert again.ending.status == "complete"
     np.testing.assert_array_equal(again.log.estimated_world, result.log.estimated_world)
     np.testing.assert_array_equal(again.log.estimated_cov, result.log.estimated_cov)
+
+
+def test_a_replay_of_a_drive_that_was_cut_short_says_so_and_is_not_complete(made, tmp_path, capsys):
+    result, folder = made
+    reason = "the recording ends early (the limit of 60 steps)"
+    once, twice = tmp_path / "once", tmp_path / "twice"
+    for source, out in ((folder, once), (once, twice)):
+        assert main(["replay", str(source / "log.npz"), "--out", str(out)]) == 0
+        assert reason in capsys.readouterr().out.splitlines()
+        summary = read_json(out / "summary.json", {"status": str, "outcome": str, "reason": str}, "")
+        assert summary["status"] == "stopped"
+        assert summary["outcome"] == "recording-cut-short"
+        assert summary["reason"] == reason
+    whole = replay(recorded(result), "full-ekf").ending
+    assert (whole.status, whole.reason) == ("complete", "the recording has ended")
 
 
 def test_a_log_on_disk_replays_like_the_run_in_memory(made):

@@ -160,8 +160,9 @@ def test_what_is_no_archive_of_arrays_is_told(tmp_path):
             read_archive(place, LAYOUT)
 
 
-def test_letters_that_do_not_exist_are_told(tmp_path):
-    beyond = member((1,), (0x110000).to_bytes(4, "little"), "<U1")
+@pytest.mark.parametrize("letter", [0x110000, 0xD800, 0xDFFF], ids=hex)
+def test_letters_that_do_not_exist_are_told(tmp_path, letter):
+    beyond = member((1,), letter.to_bytes(4, "little"), "<U1")
     with pytest.raises(ArchiveError, match="word of letters that do not exist"):
         read_archive(zipped(tmp_path / "a.npz", [("word.npy", beyond)]), {"word": "text n"})
 

@@ -38,6 +38,11 @@ def _geo(kind: str, coordinates: object) -> str:
     return json.dumps({"type": kind, "coordinates": coordinates})
 
 
+def _feature(**properties: object) -> str:
+    square = {"type": "Polygon", "coordinates": [[[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]]}
+    return json.dumps({"type": "Feature", "properties": properties, "geometry": square})
+
+
 def _png(width: int, height: int) -> bytes:
     """Return a PNG that only claims its size."""
     head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
@@ -73,6 +78,8 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "geo null": ("a.geojson", '{"type": "Feature", "geometry": null}', "nothing drawn"),
     "geo shape": ("a.geojson", _geo("LineString", [[0, 0], 3]), "position"),
     "geo ring": ("a.geojson", _geo("Polygon", [[[0, 0], [1, 1]]]), "4 or more"),
+    "geo kind": ("a.geojson", _feature(kind="romo"), "of kind room or solid, found 'romo'"),
+    "geo kind number": ("a.geojson", _feature(kind=3), "of kind room or solid, found 3"),
     "geo nested": ("a.geojson", '{"type":"Feature","geometry":' * 60 + "null" + "}" * 60, "GeoJSON object"),
     "svg entities": ("a.svg", f"{LAUGHS}<svg {NS}><text>&b;</text>{ROOM}</svg>", "entity"),
     "svg external": ("a.svg", f'<!DOCTYPE s [<!ENTITY x SYSTEM "file:///etc/passwd">]><svg {NS}>&x;</svg>', "entity"),
