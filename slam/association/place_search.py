@@ -40,8 +40,8 @@ class PlaceSearchConfig:
     """... this, are others."""
 
 
-_AT_ONCE = 20_000
-"""Poses that are judged together; more would only take memory."""
+_AT_ONCE = 250_000
+"""Pairs of pose and wall that are compared together: more would only take memory."""
 
 
 def place_of(
@@ -78,12 +78,8 @@ def _scores(
     segments: Segments, walls: StochasticMap, poses: Float[np.ndarray, "h 3"], config: PlaceSearchConfig
 ) -> tuple[Float[np.ndarray, " h"], Int[np.ndarray, " h"]]:
     """Return how many metres of a scan lie along walls at each pose, and how many of its segments."""
-    lengths = segments.lengths_m
-    scores, counts = np.empty(len(poses)), np.empty(len(poses), dtype=np.int64)
-    for at in range(0, len(poses), _AT_ONCE):
-        lies = _lies_along(segments, walls, poses[at : at + _AT_ONCE], config)
-        scores[at : at + _AT_ONCE], counts[at : at + _AT_ONCE] = lies @ lengths, lies.sum(axis=1)
-    return scores, counts
+    lies = _lies_along(segments, walls, poses, config)
+    return lies @ segments.lengths_m, lies.sum(axis=1)
 
 
 def _poses(segments: Segments, walls: StochasticMap, config: PlaceSearchConfig) -> Float[np.ndarray, "h 3"]:
@@ -120,6 +116,15 @@ def _lies_along(
     segments: Segments, walls: StochasticMap, poses: Float[np.ndarray, "h 3"], config: PlaceSearchConfig
 ) -> Bool[np.ndarray, "h s"]:
     """Return which segments lie along some wall, seen from its free side, at each pose."""
+    step = max(_AT_ONCE // max(len(walls), 1), 1)
+    parts = [_lie_along(segments, walls, poses[at : at + step], config) for at in range(0, len(poses), step)]
+    return np.concatenate([np.zeros((0, len(segments)), dtype=bool), *parts])
+
+
+def _lie_along(
+    segments: Segments, walls: StochasticMap, poses: Float[np.ndarray, "h 3"], config: PlaceSearchConfig
+) -> Bool[np.ndarray, "h s"]:
+    """Return the same of few enough poses to judge together."""
     belief = walls.belief
     n, t = normals(belief.means[:, 0]), directions(belief.means[:, 0])
     offsets = belief.means[:, 1] + np.vecdot(n, belief.anchors)
