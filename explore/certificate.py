@@ -15,7 +15,7 @@ from .floor.free_space import FreeSpace
 from .goal import GivenUp
 from .outcome import Outcome
 from .planning.driving_field import DrivingField
-from .planning.paths import PathConfig
+from .planning.passable import PathConfig
 from .step import Step
 from .survey.frontiers import frontiers
 from .survey.unmapped_obstacles import unmapped_obstacles

@@ -20,9 +20,11 @@ from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
-from ..planning.paths import PathConfig, Planner
+from ..planning.passable import PathConfig
+from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ViewpointsConfig, ideal_places, lane, places_beyond, places_near, places_that_see
-from .driving import DrivingConfig, Pilot
+from .driving import Pilot
+from .driving_config import DrivingConfig
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory
 from ..floor.touches import Touches
-from ..following.driving import keeps_clear
+from ..following.safe_steps import keeps_clear
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..outcome import Outcome
 from ..planning.driving_field import DrivingField

@@ -12,7 +12,7 @@ from slam.robot import RobotSpec
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any
-from .paths import PathConfig, passable, roomy
+from .passable import PathConfig, passable, roomy
 
 DIRECTIONS = 16
 """Places on a ring."""

@@ -6,72 +6,17 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import label
 from skimage.graph import MCP_Geometric
-
-from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any, cells_of
+from .passable import PathConfig, blind_blocks, metre_costs, passable
 
 BESIDE_M = 1.0
 """Paths are sought so far to each side of the shortest way by blocks."""
-COAST_SHARE = 0.75
-"""Of the scanner's range: farther from walls than this it sees too few beams of them."""
 ESCAPE_COST = 30.0
 """What a metre costs where the robot gets away from a wall that it is too near to."""
-
-
-@dataclass(frozen=True)
-class PathConfig:
-    """How near to walls a path may lead, and what it pays for it."""
-
-    robot: RobotSpec = of_robot()
-    margin_m: float = 0.025
-    """Least distance m kept beyond the radius, between cell centres."""
-    squeeze_beyond_m: float = 0.0
-    """Through gaps narrower than that, down to this clearance beyond the radius, between cell centres, the robot
-    squeezes where no other way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells
-    whether it fits."""
-    squeeze_cost: float = 20.0
-    """What a metre of squeezing costs on top."""
-    tight_beyond_m: float = 0.1
-    """Within the radius and this of a place where the body did not fit it is not tried again."""
-    standoff_beyond_m: float = 0.15
-    """A body this far from walls pays nothing; it yields in narrow passages, the margin does not."""
-    narrow_cost: float = 4.0
-    """A metre at the least clearance costs this much more than one at the stand-off."""
-    coast_m: float = 3.0
-    """Farther than this from any wall, or than three quarters of its range, the scanner shows too little to tell where
-    the robot is, ..."""
-    blind_cost: float = 4.0
-    """... and a metre costs so much more: a way along the walls is worth a detour."""
-    escape_beyond_m: float = 0.1
-    """So far around the body free cells count as passable however near a wall is: it may have to get away."""
-
-    def coast_of(self, range_m: float) -> float:
-        """Return how far from walls a scanner of this range shows enough of them."""
-        return min(self.coast_m, COAST_SHARE * range_m)
-
-    @property
-    def squeeze_m(self) -> float:
-        """Least clearance between cell centres."""
-        return self.robot.beyond(self.squeeze_beyond_m)
-
-    @property
-    def tight_m(self) -> float:
-        """Where the body did not fit, so far around it is not tried again."""
-        return self.robot.beyond(self.tight_beyond_m)
-
-    @property
-    def standoff_m(self) -> float:
-        """Distance of the middle of the body from walls that costs nothing."""
-        return self.robot.beyond(self.standoff_beyond_m)
-
-    @property
-    def escape_m(self) -> float:
-        """So far around the middle of the body it may get away."""
-        return self.robot.beyond(self.escape_beyond_m)
 
 
 @dataclass(frozen=True)
@@ -285,50 +230,3 @@ class Planner:
         for cells in (self._passable, self._roomy):
             cells[box] |= self._escape[box]
             cells[r, c] = True
-
-
-def passable(
-    free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig
-) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Return in which cells of a part of the grid the body fits, and in which it has room enough.
-
-    It fits wherever it drove, whatever beams say that were drawn at other poses.
-    """
-    is_free, clearance = free_space.is_free(box), free_space.clearance()[box]
-    roomy_cells = roomy(is_free, clearance, config)
-    fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
-    return fits | roomy_cells | free_space.driven(box), roomy_cells
-
-
-def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig) -> Bool[np.ndarray, "p q"]:
-    """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
-    block = block_cells(config.robot.radius_m, free_space.config.cell_m)
-    side_m = block * free_space.config.cell_m
-    coast_m = config.coast_of(free_space.range_m)
-    beside = int(np.ceil(coast_m / side_m))
-    (r0, r1, _), (c0, c1, _) = (part.indices(size) for part, size in zip(box, free_space.shape, strict=True))
-    above, left = min(beside, r0 // block), min(beside, c0 // block)
-    rows = slice(r0 - block * above, r1 + block * beside)
-    columns = slice(c0 - block * left, c1 + block * beside)
-    hit = blocks_with_any(free_space.evidence[rows, columns] > 0, block)
-    shape = -(-(r1 - r0) // block), -(-(c1 - c0) // block)
-    if not hit.any():
-        return np.ones(shape, dtype=bool)
-    distance = distance_transform_edt(~hit, sampling=side_m)
-    return np.asarray(distance[above : above + shape[0], left : left + shape[1]] > coast_m)
-
-
-def roomy(
-    is_free: Bool[np.ndarray, "*n"], clearance: Float[np.ndarray, "*n"], config: PathConfig
-) -> Bool[np.ndarray, "*n"]:
-    """Return in which cells the body has room enough, by whether they were seen free and their clearance, m."""
-    return is_free & (clearance >= config.robot.radius_m + config.margin_m)
-
-
-def metre_costs(
-    clearance: Float[np.ndarray, "h w"], is_roomy: Bool[np.ndarray, "h w"], config: PathConfig
-) -> Float[np.ndarray, "h w"]:
-    """Return what a metre costs in each cell, if the body fits there."""
-    least = config.robot.radius_m + config.margin_m
-    tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
-    return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)

@@ -15,7 +15,7 @@ from rich.table import Table
 from experiments.scenario import TrialConfig, check, load_world
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
-from explore.following.driving import DrivingConfig
+from explore.following.driving_config import DrivingConfig
 from sim.robot import RobotConfig
 from sim.worlds import World
 from slam.robot import ScannerSpec

@@ -6,7 +6,8 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 
 from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from sim.lidar import LidarConfig, RangeFinder
 from slam.robot import Scan
 

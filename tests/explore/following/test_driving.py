@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from explore.floor.accumulated_returns import NEAR_BEYOND_M, SCANS, AccumulatedReturns, returns, steadied
 from explore.floor.free_space import FreeSpace
-from explore.following.driving import DrivingConfig, Pilot
-from explore.planning.paths import Path, PathConfig, Planner
+from explore.following.driving import Pilot
+from explore.following.driving_config import DrivingConfig
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Path, Planner
 from sim.lidar import LidarConfig, RangeFinder
 from slam.geometry.poses import arc, compose, to_world
 from slam.robot import MotionCommand, Odometry, Scan

@@ -16,7 +16,8 @@ from explore.goals.retreat import Retreat, RetreatConfig
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
 from explore.outcome import Outcome
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from explore.strategies import STRATEGIES
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import SimulatedRobot

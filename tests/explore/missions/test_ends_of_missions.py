@@ -18,7 +18,7 @@ from explore.goals.homing import Homing, HomingConfig
 from explore.limits import Limits, limited
 from explore.mission import MissionConfig, explore_mission
 from explore.outcome import Outcome
-from explore.planning.paths import PathConfig
+from explore.planning.passable import PathConfig
 from explore.strategies import STRATEGIES
 from sim.robot import SimulatedRobot
 from sim.worlds import World

@@ -8,7 +8,8 @@ from skimage.graph import MCP_Geometric
 from explore.floor.free_space import FreeSpace
 from explore.planning import driving_field
 from explore.planning.driving_field import DrivingField
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from sim.lidar import LidarConfig, RangeFinder
 from slam.robot import Scan
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.ndimage import label
 
 from explore.planning.lanes import lanes_of
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from slam.geometry.lines import normals
 
 pytestmark = pytest.mark.usefixtures("_unchecked")

@@ -10,7 +10,8 @@ from skimage.graph import MCP_Geometric
 
 from explore.floor.free_space import FreeSpace
 from explore.planning import paths
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from explore.planning.sight import cells_within, sees
 from sim.lidar import LidarConfig, RangeFinder
 from slam.robot import Scan

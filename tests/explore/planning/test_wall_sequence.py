@@ -9,7 +9,8 @@ import pytest
 
 from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
-from explore.planning.paths import PathConfig, Planner
+from explore.planning.passable import PathConfig
+from explore.planning.paths import Planner
 from explore.planning.wall_sequence import WallSearch
 from slam.robot import Scan
 
