@@ -65,12 +65,14 @@ NEAR = {
     "real_log": "real_log",
     "replay_driver": "lost",
     "driving": "driving narrow_doors",
+    "safe_steps": "driving narrow_doors",
     "wall_following": "wall_sequence navigation clearance_while_growing ping_pong endings",
     "explorer": "round_things patience ends_of_missions endings mission",
     "sweep": "sweep coastal_viewpoints unmapped_obstacles ends_of_missions",
     "floor_memory": "floor_memory",
     "free_space": "free_space kernels paths",
     "paths": "paths driving_field free_space",
+    "passable": "paths driving_field free_space",
 }
 """By the module of a rule: the test files that are about it."""
 PYTEST = ("-q", "-m", "not long", *(f"--override-ini={option}" for option in OPTIONS))
