@@ -16,7 +16,7 @@ HERE = Path(__file__).parents[1]
 BY_HAND = (
     *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations")),
     "artifacts/test_products",
-    "campaign/scores/test_score",
+    *(f"campaign/scores/test_{name}" for name in ("score", "path_scores")),
     *(f"campaign/comparison/test_{name}" for name in ("tables", "comparison", "findings", "hypothesis", "left_out")),
 )
 """The tests that hold each number against another way to work it out."""

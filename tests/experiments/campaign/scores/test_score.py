@@ -7,55 +7,25 @@ import pytest
 from scipy.optimize import minimize
 
 from experiments.campaign.scores.innovation import InnovationEar
-from experiments.campaign.scores.observer import Fate, Moment, Observer
+from experiments.campaign.scores.observer import Fate, Moment
 from experiments.campaign.scores.score import offsets, record_of, wall_errors
 from experiments.scoring.association import Votes
 from experiments.scoring.coverage import alignment
 from experiments.scoring.summary import nees_of_poses
-from experiments.trial import TrialResult
 from slam.estimation.backend import Joint
-from slam.geometry.poses import compose, inverse, to_world
+from slam.geometry.poses import inverse, to_world
 from slam.map.chains import OpenEnd
 from slam.map.reliability import ReliabilityConfig
-from tests.experiments.by_hand import true_map
-
-N = 13
-RNG = np.random.default_rng(12)
-TRUE = np.column_stack([1.0 + 0.1 * np.arange(N), 1.0 + 0.02 * np.arange(N) ** 1.5, 0.3 * np.arange(N)])
-OFF = np.column_stack([0.1 + 0.05 * RNG.normal(size=(N, 2)), 0.03 * RNG.normal(size=N)])
-COVS = np.array([np.diag([0.01, 0.02, 0.003]) * (1.0 + 0.1 * k) for k in range(N)])
-PATH = np.linspace(0.0, 12.0, N)
-START_COV = np.diag([0.01, 0.01, np.deg2rad(2.0) ** 2])
-
-
-@pytest.fixture
-def made(world, make_map, make_chains):
-    """A run of so many steps, with the true map off by the start's error."""
-    run = true_map(world, make_map, make_chains)
-    columns = {
-        name: np.repeat(getattr(run.log, name)[:1], N, axis=0)
-        for name in ("ranges_m", "odometry", "odometry_cov", "face_of_beam", "open_ends", "tentative", "closed_chains",
-                     "set_aside", "seconds", "planning_seconds", "touched", "nis", "nis_dof",
-                     "unstated_motion", "is_lost", "wheel_noise_factor")
-    }  # fmt: skip
-    log = replace(
-        run.log, **columns, time_s=np.arange(float(N)), scan_start_s=np.arange(float(N)) - 0.1,
-        estimated_world=TRUE + OFF, estimated_cov=COVS, true_world=TRUE,
-        path_length_m=PATH, lines=np.arange(N), reasons=("",) * N,
-    )  # fmt: skip
-    return replace(run, log=log, step=replace(run.step, index=N - 1, path_length_m=12.0))
-
-
-def result_of(run):
-    return TrialResult(run.scenario, run.ending, run.log, run.votes, run.step, run.joint, None, {"world": "square"})
-
-
-def observer_of(run, **more):
-    return Observer(run.votes.truth.walls, lambda index: run.log.face_of_beam[index], **more)
-
-
-def kept(run, ear=None, **more):
-    return record_of(result_of(run), observer_of(run, **more), ear)
+from tests.experiments.campaign.scores.thirteen_steps import (
+    COVS,
+    OFF,
+    PATH,
+    TRUE,
+    N,
+    kept,
+    observer_of,
+    result_of,
+)
 
 
 def test_a_trial_that_ended_before_its_first_step_keeps_its_summary_alone(made):
@@ -63,75 +33,6 @@ def test_a_trial_that_ended_before_its_first_step_keeps_its_summary_alone(made):
     record = record_of(result, observer_of(made), None)
     assert (record.summary, record.arrays) == ({"world": "square"}, {})
     assert record.summary is not result.summary
-
-
-def motion(before, after):
-    return compose(inverse(before), after)
-
-
-def test_errors_of_the_path_are_those_of_plain_loops(made):
-    found = kept(made).summary
-    estimated = TRUE + OFF
-    assert found["ate_m"] == pytest.approx(np.sqrt(np.mean(np.sum(OFF[:, :2] ** 2, axis=1))))
-
-    def off(moved):
-        return np.mean(np.sum((to_world(estimated[:, :2], moved) - TRUE[:, :2]) ** 2, axis=1))
-
-    best = minimize(off, np.zeros(3), tol=1e-14)
-    assert found["ate_aligned_m"] == pytest.approx(np.sqrt(best.fun), rel=1e-6)
-    parts = [motion(estimated[k], estimated[k + 10]) - motion(TRUE[k], TRUE[k + 10]) for k in range(N - 10)]
-    shifts = [np.hypot(*part[:2]) for part in parts]
-    turns = [np.angle(np.exp(1j * part[2])) for part in parts]
-    assert found["rpe_m"] == pytest.approx(np.sqrt(np.mean(np.square(shifts))))
-    assert found["rpe_rad"] == pytest.approx(np.sqrt(np.mean(np.square(turns))))
-    assert found["world"] == "square"
-
-
-def test_the_relative_error_takes_more_than_ten_steps(made):
-    def shortened(n):
-        names = [name for name, value in vars(made.log).items() if isinstance(value, np.ndarray) and len(value) == N]
-        log = replace(made.log, **{name: getattr(made.log, name)[:n] for name in names}, reasons=("",) * n)
-        return kept(replace(made, log=log)).summary
-
-    assert (shortened(10)["rpe_m"], shortened(10)["rpe_rad"]) == (None, None)
-    assert shortened(11)["rpe_m"] > 0.0
-
-
-def test_the_trace_is_held_against_that_of_the_start(made):
-    start = np.trace(START_COV)
-    factors = np.array([1.0, 1.0 - 1e-7, 0.9, 0.5, 2.0] + 8 * [1.5])
-    log = replace(made.log, estimated_cov=factors[:, None, None] * START_COV)
-    assert np.trace(made.scenario.start_cov) == pytest.approx(start)
-    found = kept(replace(made, log=log)).summary
-    assert found["trace_least"] == pytest.approx(0.5)
-    assert found["trace_below"] == pytest.approx(2 / N), "less than a millionth below is rounding"
-
-
-def test_the_bound_is_missed_first_and_worst_somewhere(made):
-    """The robot stands, so that the bound is the start's own covariance."""
-    estimated = np.repeat(TRUE[:1], N, axis=0)
-    factors = np.array([1.0, 1.0 - 1e-9, 0.9, 0.4, 0.8, 2.0] + 7 * [1.5])
-    log = replace(made.log, estimated_world=estimated, estimated_cov=factors[:, None, None] * START_COV)
-    found = kept(replace(made, log=log)).summary
-    assert found["bound_margin"] == pytest.approx(-0.6 * START_COV.max() / np.trace(START_COV))
-    assert (found["bound_first_m"], found["bound_worst_m"]) == (PATH[2], PATH[3])
-    log = replace(log, estimated_cov=np.maximum(factors, 1.0)[:, None, None] * START_COV)
-    found = kept(replace(made, log=log)).summary
-    assert found["bound_margin"] == pytest.approx(0.0, abs=1e-15)
-    assert found["bound_first_m"] is found["bound_worst_m"] is None
-
-
-def test_the_arrays_of_the_steps_are_what_each_step_knew(made):
-    arrays = kept(made).arrays
-    np.testing.assert_array_equal(arrays["path_length_m"], PATH)
-    np.testing.assert_array_equal(arrays["lines"], np.arange(N))
-    np.testing.assert_allclose(arrays["pose_trace"], [cov[0, 0] + cov[1, 1] + cov[2, 2] for cov in COVS])
-    np.testing.assert_allclose(arrays["pose_error_m"], np.hypot(*OFF[:, :2].T))
-    np.testing.assert_allclose(arrays["heading_error_rad"], np.abs(OFF[:, 2]))
-    np.testing.assert_allclose(arrays["heading_sigma_rad"], np.sqrt(0.003 * (1.0 + 0.1 * np.arange(N))))
-    np.testing.assert_allclose(arrays["pose_nees"], nees_of_poses(TRUE + OFF, COVS, TRUE))
-    turned = replace(made.log, estimated_world=TRUE + OFF + [0.0, 0.0, 2.0 * np.pi])
-    np.testing.assert_allclose(kept(replace(made, log=turned)).arrays["heading_error_rad"], np.abs(OFF[:, 2]))
 
 
 def test_the_last_map_and_the_path_are_moved_by_the_start_s_error(made, truth_faces):
@@ -145,14 +46,6 @@ def test_the_last_map_and_the_path_are_moved_by_the_start_s_error(made, truth_fa
     assert arrays["map_tentative"].tolist() == [False] * 5 + [True] + 2 * [False]
     np.testing.assert_allclose(arrays["path_estimated"], to_world((TRUE + OFF)[:, :2], to_true))
     np.testing.assert_array_equal(arrays["path_true"], TRUE[:, :2])
-
-
-@pytest.fixture
-def truth_faces(made):
-    return made.votes.truth.faces
-
-
-# Distances between corners of which the true ones are known.
 
 
 def test_all_pairs_of_true_corners_are_measured_once(made, truth_faces):
@@ -195,9 +88,6 @@ def test_only_corners_of_which_beams_tell_the_walls_are_measured(made):
         assert [len(arrays[f"distance_{name}"]) for name in ("m", "sigma_m", "true_m")] == [0, 0, 0]
 
 
-# Walls.
-
-
 def test_wall_errors_are_those_of_the_ends_and_of_the_best_small_motion(made, make_map):
     off = np.array([0.02, -0.01, 0.004])
     faces = made.votes.truth.faces
@@ -229,9 +119,6 @@ def test_offsets_of_points_on_their_lines_are_nothing():
     points = np.array([[[1.0, 0.0], [1.0, 5.0]], [[0.0, 2.0], [3.0, 2.0]]])
     assert offsets(points, lines) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert offsets(points + np.array([0.3, 0.0]), lines) == pytest.approx((0.3 / np.sqrt(2.0), 0.0), abs=1e-9)
-
-
-# Marks.
 
 
 def moment(run, index, **changes):
@@ -297,9 +184,6 @@ def test_the_curve_of_coverage_ends_where_the_run_does(made):
     arrays = kept(made, moments=marks).arrays
     np.testing.assert_allclose(arrays["coverage_path_m"], [0.0, 4.0, 12.0])
     np.testing.assert_allclose(arrays["coverage"], [0.0, 20.0 / 22.4, 1.0], atol=1e-3)
-
-
-# Matches and innovations.
 
 
 def test_segments_are_counted_by_what_became_of_them(made):
