@@ -32,11 +32,6 @@ class Expectation:
     map_gain_nats: float
     """What that look tells about those walls: the fall of their joint entropy."""
 
-    @property
-    def position_sigma_m(self) -> float:
-        """Standard deviation of the position along its worst direction."""
-        return position_sigma(self.pose_cov)
-
 
 def position_sigma(pose_cov: Float[np.ndarray, "3 3"]) -> float:
     """Return the standard deviation of the position along its worst direction, m."""

@@ -16,6 +16,8 @@ from ..planning.sight import cells_within, sees
 
 FAR_SHARE = 0.875
 """Nothing is looked at from beyond this share of the scanner's range: 3.5 m of 4 m."""
+LANE_EVERY_M = 0.25
+"""Places along a wall at which it is followed lie this far apart."""
 
 
 @dataclass(frozen=True)
@@ -101,9 +103,9 @@ def places_that_see(
     return points[sees(free_space, points, end.position_world, config.short_m)]
 
 
-def lane(wall: int, walls: StochasticMap, standoff_m: float, every_m: float = 0.25) -> Float[np.ndarray, "n 2"]:
+def lane(wall: int, walls: StochasticMap, standoff_m: float) -> Float[np.ndarray, "n 2"]:
     """Return places along a wall at the distance at which it is followed, world frame, m."""
     row = walls.belief.rows([wall])[0]
     tail, head = walls.ends_world[row]
-    share = np.linspace(0.0, 1.0, max(int(np.hypot(*(head - tail)) / every_m), 1) + 1)
+    share = np.linspace(0.0, 1.0, max(int(np.hypot(*(head - tail)) / LANE_EVERY_M), 1) + 1)
     return tail + share[:, None] * (head - tail) - standoff_m * normals(walls.belief.means[row, 0])

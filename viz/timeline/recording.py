@@ -74,15 +74,12 @@ class RerunRecording:
         counts: Int[np.ndarray, " n"],
         points: Float[np.ndarray, "k v 2"],
         colors: UInt32[np.ndarray, " k"] | None = None,
-        radii: Float[np.ndarray, " k"] | None = None,
         labels: Sequence[str] | None = None,
     ) -> None:
         """Send strips of v points each, `counts` of them at each moment."""
         offsets = np.arange(len(points) + 1, dtype=np.int32) * points.shape[1]
         strips = pa.ListArray.from_arrays(_plain(offsets, pa.int32()), _vectors(points), type=_STRIP)
-        columns = rr.LineStrips2D.columns(
-            strips=strips, colors=_colors(colors), radii=_floats(radii), labels=_words(labels)
-        )
+        columns = rr.LineStrips2D.columns(strips=strips, colors=_colors(colors), labels=_words(labels))
         self._send(entity, moments, columns.partition(counts))
 
     def points(
@@ -91,11 +88,10 @@ class RerunRecording:
         moments: Timestamps,
         counts: Int[np.ndarray, " n"],
         positions: Float[np.ndarray, "k 2"],
-        colors: UInt32[np.ndarray, " k"] | None = None,
         labels: Sequence[str] | None = None,
     ) -> None:
         """Send points, `counts` of them at each moment."""
-        columns = rr.Points2D.columns(positions=_vectors(positions), colors=_colors(colors), labels=_words(labels))
+        columns = rr.Points2D.columns(positions=_vectors(positions), labels=_words(labels))
         self._send(entity, moments, columns.partition(counts))
 
     def circles(
@@ -226,7 +222,3 @@ def _pairs(pairs: Sequence[tuple[str, str]]) -> pa.Array:
     return pa.StructArray.from_arrays(
         halves, fields=[pa.field(name, pa.utf8(), nullable=False) for name in ("first", "second")]
     )
-
-
-def _floats(values: Float[np.ndarray, " k"] | None) -> pa.Array | None:
-    return None if values is None else _plain(values.astype(np.float32), pa.float32())

@@ -23,9 +23,3 @@ def record_campaign(folder: Path, campaign: Campaign, rrd: Path) -> list[str]:
     trials, steps = (read_rows(folder / f"{name}.parquet") for name in ("trials", "steps"))
     estimators = [name for name in campaign.backends if name in BACKENDS]
     return record_comparison(rrd, title, trials, steps, run, estimators, ReplayOptions())
-
-
-def record_summary(folder: Path, title: str, rrd: Path) -> list[str]:
-    """Record only the tables in a campaign's folder; raises UsageError where it has none."""
-    trials, steps = (read_rows(folder / f"{name}.parquet") for name in ("trials", "steps"))
-    return record_comparison(rrd, title, trials, steps, None, (), ReplayOptions())

@@ -123,7 +123,7 @@ class Graph:
         """Forget lines; raises KeyError where an id is not in the map.
 
         What their observations said of the rest stays, as when a filter forgets a line: lines seen more than once are
-        no longer shown, but remain in the graph. To undo what a wrong line did, `retract` it.
+        no longer shown, but remain in the graph.
         """
         rows = self._rows(ids)
         solver = self._settled()
@@ -137,34 +137,6 @@ class Graph:
         self._hide(rows)
 
     # -- what only a graph can do -----------------------------------------------------------------------------------
-
-    def retract(self, ids: Sequence[int]) -> None:
-        """Take lines out with all that was ever seen of them, as if those observations had not been used at all."""
-        rows = self._rows(ids)
-        solver = self._settled()
-        for line in self._solver.ids[rows].tolist():
-            solver.leave_observations(line, self._record.lines[line].observations)
-            self._drop(line)
-        self._hide(rows)
-
-    def retract_observations(self, line: int, numbers: Sequence[int]) -> None:
-        """Undo wrong matches with a line, by the numbers of `observations_of`; without any left it is removed."""
-        (row,) = self._rows([line])
-        observations = self._record.lines[line].observations
-        if unknown := set(numbers).difference(observations):
-            raise KeyError(f"expected numbers of observations of line {line}, found {sorted(unknown)}")
-        solver = self._settled()
-        solver.leave_observations(line, sorted(set(numbers)))
-        observations[:] = [number for number in observations if number not in set(numbers)]
-        if not observations:
-            self._drop(line)
-            self._hide(np.array([row]))
-
-    def observations_of(self, line: int) -> Int[np.ndarray, "m 2"]:
-        """Return rows (number of the observation, predictions made before it) of a line, oldest first."""
-        self._rows([line])
-        numbers = np.array(sorted(self._record.lines[line].observations), dtype=np.int64)
-        return np.stack([numbers, self._record.steps_of(numbers)], axis=-1)
 
     def trajectory(self) -> Float[np.ndarray, "n 3"]:
         """Return the present estimates of the pose at the start and after every prediction, world frame (smoothed).

@@ -97,10 +97,9 @@ class Isam:
         """Return the present estimate of one pose."""
         return pose_of(self._isam.calculateEstimatePose3(pose_key(index)))
 
-    def all(self, linearisation: bool = False) -> "Estimates":
-        """Return the present estimates of everything, or the points of linearisation."""
-        isam = self._isam
-        return Estimates(isam.getLinearizationPoint() if linearisation else isam.calculateBestEstimate())
+    def all(self) -> "Estimates":
+        """Return the present estimates of everything."""
+        return Estimates(self._isam.calculateBestEstimate())
 
     def moved(self, keys: Sequence[int]) -> Float[np.ndarray, " s"]:
         """Return by how much lines (by their keys) have moved from where they are linearised, in their charts."""

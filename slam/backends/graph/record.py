@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from ...geometry.poses import compose
 from ...robot import Odometry
@@ -84,11 +84,6 @@ class Record:
             path.append(compose(path[-1], odometry.motion))
         path[-1:] = [compose(self.frame.pose_world, pose) for pose in poses]
         return np.array([path[k] for k in self.steps])
-
-    def steps_of(self, numbers: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return how many predictions were made before observations."""
-        motions = len(self.lead) + np.array(self.seen_from, dtype=np.int64)[numbers]
-        return np.searchsorted(self.steps, motions)
 
     def see(self, pose: int, line: int, seen: Seen) -> int:
         """Note an observation and return its number."""

@@ -231,13 +231,13 @@ class Solver:
 
     # -- asking -----------------------------------------------------------------------------------------------------
 
-    def poses(self, linearisation: bool = False) -> Float[np.ndarray, "p 3"]:
-        """Return the estimates of all poses when it was settled, or the points at which they are linearised."""
-        return self.isam.all(linearisation).poses(self.last + 1)
+    def poses(self) -> Float[np.ndarray, "p 3"]:
+        """Return the estimates of all poses when it was settled."""
+        return self.isam.all().poses(self.last + 1)
 
-    def all_lines(self, linearisation: bool = False) -> Float[np.ndarray, "n 2"]:
-        """Return the estimates of all lines of the record, shown or not, or where they are linearised."""
-        return self.isam.all(linearisation).lines(list(self._record.lines))
+    def all_lines(self) -> Float[np.ndarray, "n 2"]:
+        """Return the estimates of all lines of the record, shown or not."""
+        return self.isam.all().lines(list(self._record.lines))
 
     def start(self) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "n 2"]]:
         """Return where to begin anew: the points of linearisation of all that was entered, settled or not."""
