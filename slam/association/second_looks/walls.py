@@ -15,6 +15,9 @@ from .config import SecondLooksConfig
 from .landmarks import Sightings
 from .solve import Unknowns
 
+AT_ONCE = 64
+"""So many columns of a covariance are solved for together: each is as long as all poses and walls."""
+
 
 def spans(at: Unknowns, sightings: Sightings, owner: Int[np.ndarray, " n"]) -> Float[np.ndarray, "l 2"]:
     """Return how far each line was seen along itself, from its anchor, m; the farthest end on either side is left out.
@@ -79,9 +82,7 @@ def surveyed(
     """
     reach, count = spans(at, sightings, owner), len(at.lines)
     rows = np.concatenate([at.poses.size - POSE + np.arange(POSE), at.poses.size + np.arange(2 * count)])
-    wanted = np.zeros((information.shape[0], len(rows)))
-    wanted[rows, np.arange(len(rows))] = 1.0
-    cov = splu(information, permc_spec="MMD_AT_PLUS_A").solve(wanted)[rows]
+    cov = _inverse_at(information, rows)
     cov = 0.5 * (cov + cov.T)
     half = 0.5 * np.maximum(reach[:, 1] - reach[:, 0], config.least_m)
     lines = POSE + 2 * np.arange(count)
@@ -91,3 +92,15 @@ def surveyed(
     belief = Belief(at.poses[-1], cov[:POSE, :POSE], np.arange(count), at.anchors, at.lines, joint.take)
     none = np.zeros(count, dtype=bool)
     return StochasticMap(belief, reach, np.bincount(owner, minlength=count), none, none.copy()), joint
+
+
+def _inverse_at(information: csc_array, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, "r r"]:
+    """Return the inverse at some rows and columns, `AT_ONCE` columns at a time."""
+    solver = splu(information, permc_spec="MMD_AT_PLUS_A")
+    found = np.empty((len(rows), len(rows)))
+    for at in range(0, len(rows), AT_ONCE):
+        part = rows[at : at + AT_ONCE]
+        wanted = np.zeros((information.shape[0], len(part)))
+        wanted[part, np.arange(len(part))] = 1.0
+        found[:, at : at + len(part)] = solver.solve(wanted)[rows]
+    return found

@@ -200,7 +200,9 @@ def test_walls_stand_where_the_room_has_them_and_reach_as_far():
     assert np.all(np.diag(cov)[4::2] >= CONFIG.floor_m**2)
 
 
-def test_the_covariance_is_that_of_the_whole_information_and_the_floor():
+@pytest.mark.parametrize("at_once", [2, 64])
+def test_the_covariance_is_that_of_the_whole_information_and_the_floor(at_once, monkeypatch):
+    monkeypatch.setattr("slam.association.second_looks.walls.AT_ONCE", at_once)
     true, _, motions, sightings, owner = problem()
     links = [driven(motions).links(CONFIG.doubt, CONFIG)]
     found = solved(begun(true, sightings, owner), links, sightings, owner, CONFIG)
