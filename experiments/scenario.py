@@ -20,11 +20,14 @@ from slam.config import MapperConfig
 from slam.estimation.backend import Backend
 from slam.estimation.mounting import start_of_scanner
 from slam.odometry.config import ScanMatchingConfig
+from slam.odometry.matched_robot import MatchedRobot
+from slam.odometry.scan_matching import ScanMatcher
 from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
 
 P0 = Literal["zero", "small", "large"]
+OdometrySource = Literal["wheels", "scans"]
 P0_SIGMAS: dict[str, tuple[float, float]] = {
     "zero": (1e-4, 1e-5),
     "small": (0.01, float(np.deg2rad(0.1))),
@@ -44,7 +47,7 @@ class MappingMissionConfig(MissionConfig):
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
-    """Of replays whose odometry is told by the scans."""
+    """Of drives and replays whose odometry is told by the scans."""
     second_looks: SecondLooksConfig = field(default_factory=SecondLooksConfig)
     """Of real robots' logs, once the drive has ended."""
 
@@ -67,6 +70,8 @@ class TrialConfig:
     max_path_m: float | None = None
     time_limit_s: float | None = None
     """On the robot's own clock."""
+    odometry: OdometrySource = "wheels"
+    """Who tells the motion between two scans."""
     robot: RobotConfig = field(default_factory=RobotConfig)
     mission: MappingMissionConfig = field(default_factory=MappingMissionConfig)
     backend_options: BackendOptions = field(default_factory=BackendOptions)
@@ -188,3 +193,10 @@ def make_backend(config: TrialConfig, start_world: Float[np.ndarray, "3"], cov: 
     """Return the back end of a trial for a body that is believed to start at a pose: it follows the scanner."""
     start, start_cov = start_of_scanner(start_world, cov, config.robot.scanner)
     return BACKENDS[config.backend].make(start.copy(), start_cov.copy(), config.backend_options)
+
+
+def heard_by(odometry: OdometrySource, robot: Robot, config: TrialConfig) -> Robot:
+    """Return a robot whose motions are told by its wheels, or by its scans."""
+    if odometry == "wheels":
+        return robot
+    return MatchedRobot(robot, ScanMatcher(config.mission.scan_matching), config.robot.scanner)

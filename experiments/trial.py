@@ -17,7 +17,7 @@ from sim.worlds import World
 from slam.estimation.backend import Joint
 from slam.mapper import Mapper
 
-from .scenario import Scenario, TrialConfig, build
+from .scenario import Scenario, TrialConfig, build, heard_by
 from .scoring.association import Votes
 from .scoring.records import Log, Recorder
 from .scoring.summary import Ending, run_keys, summarise
@@ -53,7 +53,8 @@ def default_mission(scenario: Scenario) -> Iterator[Step]:
     """Return the closed loop over the simulated robot."""
     assert scenario.strategy is not None, "expected a strategy to explore by"
     rules = scenario.config.mission
-    return explore_mission(scenario.robot, Mapper(scenario.backend, rules.mapper), scenario.strategy, rules)
+    robot = heard_by(scenario.config.odometry, scenario.robot, scenario.config)
+    return explore_mission(robot, Mapper(scenario.backend, rules.mapper), scenario.strategy, rules)
 
 
 def run_trial(

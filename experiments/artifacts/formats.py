@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 11,
+    CONFIG: 12,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -32,6 +32,7 @@ format 5 the body and the step stood at several places (`MOVED`), until format 6
 (`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
 (`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
 Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
+Until format 11 no scan told a drive's motion (`odometry`).
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 

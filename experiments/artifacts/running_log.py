@@ -63,7 +63,8 @@ class RunningLog:
         self.check()
         if step.index < self._steps:
             return
-        rows = ([step.time_s], step.scan.ranges_m, step.odometry.motion, step.odometry.cov)
+        wheels = step.odometry.reported
+        rows = ([step.time_s], step.scan.ranges_m, wheels.motion, wheels.cov)
         message = _batch(self._schema, rows)
         before = os.fstat(self._file).st_size
         try:

@@ -69,7 +69,7 @@ class SavedRun:
         if step.index >= len(self):
             return
         same = np.array_equal(step.scan.ranges_m, self.ranges_m[step.index], equal_nan=True)
-        if not same or not np.array_equal(step.odometry.motion, self.odometry[step.index]):
+        if not same or not np.array_equal(step.odometry.reported.motion, self.odometry[step.index]):
             raise UsageError(
                 f"expected the saved run again, found another from step {step.index} on (the world, the software or"
                 " the machine has changed): explore anew"

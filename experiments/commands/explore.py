@@ -17,7 +17,7 @@ from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
 from ..artifacts.settings import NAVIGATION, nested, parse_setting, read_settings, trial_of
-from ..scenario import DRIVER, P0, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import print_summary, progress
@@ -29,7 +29,7 @@ from .echo import echo_world, expected_steps, run_line
 MAX_STEPS = TrialConfig.max_steps
 KEYS = {
     **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
-    "scale": "scale",
+    **{name: name for name in ("scale", "odometry")},
     "max_path": "max_path_m",
     "time_limit": "time_limit_s",
     "sweep": "mission.explorer.sweep",
@@ -46,6 +46,7 @@ SETTLED = (
     "errorless",
     "sweep",
     "navigation",
+    "odometry",
     "start",
     "scale",
     "fence",
@@ -77,6 +78,9 @@ class Explore:
     """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
     navigation: Navigation = "floor"
     """How the robot finds its way: over the floor seen free, or by sequences of walls, as the paper's did."""
+    odometry: OdometrySource = "wheels"
+    """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
+    matching*), with the wheels for a first guess."""
     max_steps: int | None = None
     """The run is stopped after this many scans; 100,000 where no number is named."""
     max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
@@ -272,6 +276,7 @@ def default_folder(world: str, trial: TrialConfig, preset: str | None = None) ->
     parts += [preset] if preset else []
     parts += [trial.p0] if trial.p0 != "small" else []
     parts += ["errorless"] if trial.errorless else []
+    parts += ["scans"] if trial.odometry == "scans" else []
     return Path("results") / "-".join(parts)
 
 

@@ -19,9 +19,9 @@ from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..replays.measured import held_against
 from ..replays.real_log import RealOptions, read_own_run, read_real_run
-from ..replays.replay import Association, OdometrySource, ReplayOptions, read_run, retuned
+from ..replays.replay import Association, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
-from ..scenario import load_world
+from ..scenario import OdometrySource, load_world
 from ..scoring.without_truth.references import read_references
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
@@ -52,7 +52,7 @@ class Replay:
     """The true motions in place of what the wheels reported; the stated covariance stays."""
     odometry: OdometrySource | None = None
     """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
-    matching*). By default the wheels of a simulated run and the scans of a real robot's log."""
+    matching*). By default whoever told it when the run was driven, and the scans of a real robot's log."""
     second_looks: bool = False
     """Once the drive of a real robot's log has ended, associate all segments anew and smooth the path by all of them
     (trajectory_smoothed.tum). Back ends that smooth do so anyway."""
@@ -134,9 +134,7 @@ class Replay:
                     f"expected --range-noise with a log that states none, found {self.log.name}: leave it out"
                 )
             run = retuned(read_run(self.log), self.config, self.set, robot)
-            options = ReplayOptions(
-                self.association, self.perfect_extraction, self.perfect_odometry, self.odometry or "wheels"
-            )
+            options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry, self.odometry)
             return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.scale))
         if self.association != "own" or self.perfect_extraction or self.perfect_odometry:
             raise UsageError(
@@ -144,8 +142,7 @@ class Replay:
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
         read = read_own_run if is_own else read_real_run
-        odometry: OdometrySource = self.odometry or ("wheels" if is_own else "scans")
-        told = RealOptions(self.every, odometry, self.second_looks, self.range_noise)
+        told = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise)
         real = RealLog(read(self.log, told, self.config, self.set, robot))
         if real.run.log.trouble:
             say(

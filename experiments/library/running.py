@@ -22,7 +22,7 @@ from ..replays.real_log import RealOptions
 from ..replays.replay import Association
 from ..replays.sources import RECORDED
 from ..replays.unwitnessed import run_unwitnessed, unwitnessed
-from ..scenario import DRIVER, P0, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError, choose
 from .runs import Home, Run
@@ -40,6 +40,7 @@ def explore(
     errorless: bool = False,
     navigation: Navigation = "floor",
     sweep: bool = True,
+    odometry: OdometrySource = "wheels",
     max_steps: int | None = None,
     max_path: float | None = None,
     time_limit: float | None = None,
@@ -65,8 +66,9 @@ def explore(
     spec = robot if isinstance(robot, RobotSpec) else None
     options = Explore(
         world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
-        sweep=sweep, max_steps=max_steps, max_path=max_path, time_limit=time_limit, return_to_start=return_to_start,
-        start=start, scale=scale, fence=fence, robot=None if robot is None or spec is not None else str(robot),
+        sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path, time_limit=time_limit,
+        return_to_start=return_to_start, start=start, scale=scale, fence=fence,
+        robot=None if robot is None or spec is not None else str(robot),
         set=tuple(_words(settings or {})),
     )  # fmt: skip
     trial = options.trial

@@ -34,7 +34,7 @@ def looked_again(result: TrialResult) -> TrialResult:
     on_body = result.scenario.config.robot.scanner
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
-    drive = Drive(log.odometry[1:], log.odometry_cov[1:])
+    drive = Drive(log.heard[1:], log.heard_cov[1:])
     survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, Rays(scans, on_body))
     return _mapped(result, last, survey)
 

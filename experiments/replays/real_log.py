@@ -19,12 +19,12 @@ from slam.mapper import Mapper
 
 from ..artifacts.saved import cut_short, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
-from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig
+from ..scenario import STRATEGY_OF_REPLAYS, OdometrySource, Scenario, TrialConfig, heard_by
 from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
 from .looked_again import looked_again
-from .replay import OPEN_TO_REPLAYS, OdometrySource, heard_by
+from .replay import OPEN_TO_REPLAYS
 from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
 _BOW = {"bow_rad": SecondLooksConfig.floor_rad, "bow_m": SecondLooksConfig.floor_m}
@@ -42,8 +42,9 @@ class RealOptions:
 
     every: int = 1
     """One of so many keyframes is mapped."""
-    odometry: OdometrySource = "scans"
-    """Who tells the motion between two keyframes."""
+    odometry: OdometrySource | None = None
+    """Who tells the motion between two keyframes; None for who told it when a robot of one's own drove, and for the
+    scans of other logs."""
     second_looks: bool = False
     """Whether all segments are associated anew once the drive has ended; a back end that smooths has it anyway."""
     range_noise: float | None = None
@@ -80,6 +81,7 @@ def read_real_run(
         log = read_recorded_log(path, _keyframes(options))
     except RecordingError as error:
         raise UsageError(str(error)) from error
+    options = replace(options, odometry=options.odometry or "scans")
     plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
@@ -111,6 +113,7 @@ def read_own_run(
     except RecordingError as error:
         raise UsageError(str(error)) from error
     trial = replace(read_trial(path.with_name("config.json")), strategy=STRATEGY_OF_REPLAYS)
+    options = replace(options, odometry=options.odometry or trial.odometry)
     settled = record_of(trial).keys() - set(OPEN_TO_REPLAYS)
     trial = trial_of(record_of(trial), robot, asked(config, sets, settled))
     return RealRun(trial.world, every_scan(recording), trial, options, cut_short(path.parent))
@@ -126,7 +129,7 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
-        heard = heard_by(run.options.odometry, scenario.robot, scenario.config)
+        heard = heard_by(run.options.odometry or run.trial.odometry, scenario.robot, scenario.config)
         mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
         return ride_mission(heard, mapper, len(run.log.recording), run.cut_short)
 

@@ -28,21 +28,27 @@ from slam.config import MapperConfig
 from slam.estimation.mounting import scanner_poses
 from slam.extraction.extract import extract
 from slam.mapper import Extractor, Mapper
-from slam.odometry.matched_robot import MatchedRobot
-from slam.odometry.scan_matching import ScanMatcher
-from slam.robot import MotionCommand, Odometry, Robot, Scan
+from slam.robot import MotionCommand, Odometry, Scan
 
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import cut_short, read_config, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
-from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, load_world, make_backend
+from ..scenario import (
+    STRATEGY_OF_REPLAYS,
+    OdometrySource,
+    Scenario,
+    TrialConfig,
+    check,
+    heard_by,
+    load_world,
+    make_backend,
+)
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
 from ..usage import UsageError
 from .oracles import PerfectExtraction, TrueAssociation, Witness, of_true_lines, true_odometry
 
 Association = Literal["own", "true"]
-OdometrySource = Literal["wheels", "scans"]
 OPEN_TO_REPLAYS = ("mission", "backend_options")
 """The settings that a replay may have of its own; the log has settled all others."""
 
@@ -57,8 +63,8 @@ class ReplayOptions:
     """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
     perfect_odometry: bool = False
     """The true motions in place of what the wheels reported; the stated covariance stays."""
-    odometry: OdometrySource = "wheels"
-    """Who tells the motion between two scans."""
+    odometry: OdometrySource | None = None
+    """Who tells the motion between two scans; None for the same as when the run was driven."""
 
 
 @dataclass(frozen=True)
@@ -205,14 +211,10 @@ def replay(
             PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
             around(METHODS[rules.matching.method].matcher if oracle is None else oracle),
         )
-        return ride_mission(heard_by(options.odometry, robot, config), mapper, len(recording), run.cut_short)
+        heard = heard_by(options.odometry or config.odometry, robot, config)
+        return ride_mission(heard, mapper, len(recording), run.cut_short)
 
     return run_scenario(scenario, learn, mission)
-
-
-def heard_by(odometry: OdometrySource, robot: Robot, config: TrialConfig) -> Robot:
-    """Return a robot whose motions are told by its wheels, or by its scans."""
-    return robot if odometry == "wheels" else MatchedRobot(robot, ScanMatcher(config.mission.scan_matching))
 
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:

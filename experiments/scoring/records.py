@@ -33,8 +33,11 @@ class Log:
     sigma_share: float
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
-    """Motion that led to each step, robot frame before the motion, m m rad."""
+    """Motion that led to each step as the wheels reported it, robot frame before the motion, m m rad."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
+    heard: Float[np.ndarray, "s 3"]
+    """The same motions as the mapper heard of them: from the wheels, or from the scans."""
+    heard_cov: Float[np.ndarray, "s 3 3"]
     touched: Bool[np.ndarray, " s"]
     """Whether the body met something on the way to each step."""
     estimated_world: Float[np.ndarray, "s 3"]
@@ -161,8 +164,10 @@ class Recorder:
                 "time_s": step.time_s,
                 "scan_start_s": step.scan.start_s,
                 "ranges_m": step.scan.ranges_m,
-                "odometry": step.odometry.motion,
-                "odometry_cov": step.odometry.cov,
+                "odometry": step.odometry.reported.motion,
+                "odometry_cov": step.odometry.reported.cov,
+                "heard": step.odometry.motion,
+                "heard_cov": step.odometry.cov,
                 "touched": step.odometry.touched,
                 "estimated_world": belief.pose_world,
                 "estimated_cov": belief.pose_cov,

@@ -1,14 +1,20 @@
 """A robot whose odometry is told by its scans, with its wheels for a first guess."""
 
-from ..robot import MotionCommand, Odometry, Robot, Scan
+from dataclasses import replace
+
+from ..estimation.mounting import odometry_of_body, odometry_of_scanner
+from ..robot import MotionCommand, Odometry, Robot, Scan, ScannerSpec
 from .scan_matching import ScanMatcher
+
+AT_AXLE = ScannerSpec()
+"""Where most scanners sit."""
 
 
 class MatchedRobot:
     """Stands before any robot: it senses once more in time to say how far the last command went."""
 
-    def __init__(self, robot: Robot, matcher: ScanMatcher) -> None:
-        self._robot, self._matcher = robot, matcher
+    def __init__(self, robot: Robot, matcher: ScanMatcher, scanner: ScannerSpec = AT_AXLE) -> None:
+        self._robot, self._matcher, self._scanner = robot, matcher, scanner
         self._scan: Scan | None = None
 
     def sense(self) -> Scan:
@@ -19,7 +25,8 @@ class MatchedRobot:
         return self._scan
 
     def drive(self, command: MotionCommand) -> Odometry:
-        """Carry out one command and return the motion as the scans tell it."""
+        """Carry out one command and return the motion of the body as the scans tell it."""
         wheels = self._robot.drive(command)
         self._scan = self._robot.sense()
-        return self._matcher.match(self._scan, wheels)
+        matched = self._matcher.match(self._scan, odometry_of_scanner(wheels, self._scanner))
+        return replace(odometry_of_body(matched, self._scanner), wheels=wheels)

@@ -178,11 +178,18 @@ class Odometry:
     """A bumper says that the body met something on the way; a robot without one never says so."""
     by_scans: bool = False
     """The scan after the motion fits those before it where this puts it: nobody has moved the robot on the way."""
+    wheels: "Odometry | None" = None
+    """What the wheels reported, where scans have told the motion instead."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for numbers that are none."""
         if not (np.all(np.isfinite(self.motion)) and np.all(np.isfinite(self.cov))):
             raise RobotError("expected odometry of finite numbers, found others: correct what the wheels report")
+
+    @property
+    def reported(self) -> "Odometry":
+        """What the wheels reported, whoever told the motion."""
+        return self if self.wheels is None else self.wheels
 
     @property
     def states_its_error(self) -> bool:

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from experiments.replays.measured import held_against
 from experiments.replays.real_log import RealOptions, read_real_run, replay_real
-from experiments.replays.replay import OdometrySource
+from experiments.scenario import OdometrySource
 from experiments.scoring.without_truth.references import read_references
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError

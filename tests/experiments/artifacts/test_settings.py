@@ -35,7 +35,7 @@ def another(value):
     if isinstance(value, list):
         return [another(each) for each in value]
     if isinstance(value, str):
-        return {"small": "large", "floor": "visibility", "joint": "paper"}.get(value, value + "x")
+        return {"small": "large", "floor": "visibility", "joint": "paper", "wheels": "scans"}.get(value, value + "x")
     return 1.5 if value is None else value + 1
 
 

@@ -17,7 +17,7 @@ from sim.logs.recorded_robot import RecordedRobot
 from slam.backends import BackendOptions
 from slam.backends.kalman.config import EkfConfig
 from slam.extraction.config import ExtractionConfig
-from slam.geometry.poses import compose
+from slam.geometry.poses import compose, wrap
 from slam.robot import MotionCommand
 from studies.runner.scores import bootstrap
 
@@ -135,3 +135,21 @@ def test_a_replay_goes_by_its_runs_options_of_the_back_end_and_settings_of_the_e
     again = replay(replace(run, trial=trial), "full-ekf", ReplayOptions("own", perfect_extraction))
     assert again.scenario.backend._config is options.ekf
     assert len(again.last.map) == 0
+
+
+@pytest.mark.parametrize("robot", ["paper", "front-scanner"])
+def test_a_drive_by_its_scans_keeps_what_the_wheels_reported_and_replays_bit_for_bit(tmp_path, robot):
+    folder = tmp_path / "run"
+    words = ["explore", "paper-fig4", "--backend", "full-ekf", "--odometry", "scans", "--robot", robot]
+    assert main([*words, "--seed", "3", "--max-steps", "30", "--out", str(folder)]) == 0
+    assert main(["explore", "--resume", str(folder), "--max-steps", "60"]) == 0
+    run = read_run(folder / "log.npz")
+    again = replay(run, "full-ekf").log
+    np.testing.assert_array_equal(again.odometry[1:], run.recording.odometry[1:])
+    estimated = np.loadtxt(folder / "trajectory_estimated.tum")[:, 1:3]
+    np.testing.assert_allclose(again.estimated_world[:, :2], estimated, atol=1e-8)
+    true = true_odometry(run.true_poses_world)
+    scans, wheels = (np.abs(wrap((each - true)[1:, 2])).mean() for each in (again.heard, again.odometry))
+    assert scans < 0.5 * wheels
+    by_wheels = replay(run, "full-ekf", ReplayOptions(odometry="wheels")).log
+    np.testing.assert_array_equal(by_wheels.heard, by_wheels.odometry)

@@ -1,5 +1,7 @@
 """Scan matching tells the motion between scans, how sure it is, and finds the robot again where wheels have slipped."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
@@ -12,10 +14,11 @@ from slam.odometry.config import ScanMatchingConfig
 from slam.odometry.matched_robot import MatchedRobot
 from slam.odometry.scan_matching import ScanMatcher
 from slam.odometry.search_kernels import Window
-from slam.robot import MotionCommand, Odometry, Robot, Scan
+from slam.robot import MotionCommand, Odometry, Robot, Scan, ScannerSpec
 
 ROOM = shapely.box(0, 0, 5, 3.5).difference(shapely.box(2, 2, 2.8, 3.5)).difference(shapely.box(4, 0, 5, 0.6))
 CORRIDOR = shapely.box(-50, 0, 50, 2)
+AHEAD = ScannerSpec(0.3, -0.1, 0.4)
 WHEELS_COV = np.diag([0.05, 0.05, np.deg2rad(3.0)]) ** 2
 
 
@@ -156,3 +159,24 @@ def test_a_matched_robot_senses_once_at_each_place_and_hands_that_scan_on():
         if k < 3:
             odometry = robot.drive(MotionCommand(0.1, 0.0))
             np.testing.assert_allclose(odometry.motion, compose(inverse(poses[k]), poses[k + 1]), atol=0.012)
+            assert odometry.reported is odometry.wheels
+            np.testing.assert_allclose(odometry.reported.motion - odometry.motion, [0.03, 0.0, 0.04], atol=0.012)
+
+
+class Mounted(Scripted):
+    """The same robot with its scanner ahead of the axle, turned."""
+
+    def sense(self):
+        return scan_at(ROOM, compose(self.poses[self.at], AHEAD.pose_robot))
+
+
+def test_of_a_scanner_off_the_axle_the_motion_is_that_of_the_body():
+    poses = walk()[:12]
+    told = []
+    for scanner in (AHEAD, ScannerSpec()):
+        robot = MatchedRobot(Mounted(poses), ScanMatcher(), scanner)
+        robot.sense()
+        told.append([robot.drive(MotionCommand(0.1, 0.0)) for _ in poses[1:]])
+    true = np.array([compose(inverse(before), after) for before, after in pairwise(poses)])
+    assert np.abs(errors_of(told[0], true)[:, :2]).max() < 0.012
+    assert np.abs(errors_of(told[1], true)[:, :2]).max() > 0.03, "without its place the scanner's own motion is told"
