@@ -2,8 +2,8 @@
 
 A kernel is a plain function of arrays and numbers, with `@compiled` above it: it can be read, and stepped through, as
 the loop that it is. What was compiled is kept under the fingerprint of its source, of the kernels that it calls and of
-the numbers that it reads, so that a changed kernel is never run as it was before. numba is imported at the first call:
-a command that runs no kernel does without it.
+the numbers that it reads, so that a changed kernel is never run as it was before. numba is imported only to compile:
+what an earlier process kept runs without it (`machine_code.py`).
 """
 
 import inspect
@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
+
+from .machine_code import IS_KNOWN, decide, file_of, keep, kinds, linked, read, remembering
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -41,11 +43,38 @@ class Kernel(Generic[_P, _R]):
     def __init__(self, plain: Callable[_P, _R]) -> None:
         self.plain = plain
         self._machine: Callable[_P, _R] | None = None
+        self._made: dict[tuple[Any, ...], Callable[..., _R]] | None = None
         update_wrapper(self, plain)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Run the machine code."""
-        return (self._machine or self.machine())(*args, **kwargs)
+        if self._made is None:
+            self._made = self._kept()
+        code = self._made.get(kinds(args))
+        return self._by_numba(*args, **kwargs) if code is None or kwargs else code(*args)
+
+    def _kept(self) -> dict[tuple[Any, ...], Callable[..., _R]]:
+        """Return by kinds of arguments what an earlier process kept."""
+        file = self._file()
+        return {} if file is None else {kind: linked(code, self.plain) for kind, code in read(file).items()}
+
+    def _by_numba(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """Run what numba compiles or loads, and keep it so that the next process does without numba."""
+        machine: Any = self.machine()
+        result: _R = machine(*args, **kwargs)
+        if (file := self._file()) is not None and not kwargs and decide(args):
+            types = tuple(map(machine.typeof_pyval, args))
+            if types in machine.overloads and types in machine._cache.made:
+                assert self._made is not None
+                self._made[kinds(args)] = machine.overloads[types].entry_point
+                keep(file, kinds(args), machine._cache.made[types])
+        return result
+
+    def _file(self) -> Path | None:
+        """Return where the machine code is kept, or None where numba has to load it."""
+        if not IS_KNOWN or self.plain.__closure__ or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+            return None
+        return file_of(cache() / _fingerprint(self.plain), self.plain)
 
     def machine(self) -> Callable[_P, _R]:
         """Return the function as numba compiles it at a call; what it calls in its module is the same from then on."""
@@ -57,6 +86,8 @@ class Kernel(Generic[_P, _R]):
                 _tell_once()
             config.CACHE_DIR = str(cache() / fingerprint)  # type: ignore[attr-defined]
             self._machine = njit(cache=True, error_model="numpy")(self.plain)
+            if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+                self._machine._cache = remembering(self.plain)  # type: ignore[attr-defined]
             for name, value in _globals(self.plain):
                 if isinstance(value, Kernel):
                     self.plain.__globals__[name] = value.machine()

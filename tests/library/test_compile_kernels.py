@@ -14,10 +14,9 @@ ROOT = Path(__file__).parents[2]
 def test_once_compiled_no_run_compiles_again_and_every_file_of_kernels_was_called(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
-    def run(*words):
-        done = subprocess.run(
-            [sys.executable, "-m", *words], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
-        )
+    def run(*words, options=()):
+        command = [sys.executable, *options, "-m", *words]
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
         return done.stderr
 
     assert run("experiments.library.compile_kernels").count("compiling loops") == 1
@@ -27,5 +26,8 @@ def test_once_compiled_no_run_compiles_again_and_every_file_of_kernels_was_calle
     # Only logs of real robots are looked at again.
     assert {name for name in every if "second_looks" not in name} == kept
     out = tmp_path / "run"
-    told = run("experiments.commands.cli", "explore", "rooms", "--seed", "2", "--max-steps", "60", "--out", str(out))
+    words = f"explore rooms --seed 2 --max-steps 60 --out {out}".split()
+    told = run("experiments.commands.cli", *words, options=("-X", "importtime"))
     assert "compiling" not in told
+    assert "llvmlite" in told
+    assert "numba" not in told
