@@ -17,8 +17,9 @@ from jaxtyping import Bool, Float, Int
 from sim.logs.archive import regular
 from slam.geometry.lines import directions, normals
 
-from ..artifacts.reading import UnfitError, read_arrays, read_json, told
-from ..artifacts.results import MAP, SUMMARY
+from ..artifacts.maps.map_files import read_map
+from ..artifacts.reading import UnfitError, read_json, told
+from ..artifacts.results import SUMMARY
 from ..usage import UsageError
 
 if TYPE_CHECKING:
@@ -26,16 +27,6 @@ if TYPE_CHECKING:
 
 REMEDY = "name a folder that explore or replay left"
 STEPS = "steps.csv"
-MAP_ARRAYS = {
-    "pose": "float 3",
-    "ids": "int n",
-    "lines": "float n 2",
-    "lines_world": "float n 2",
-    "anchors": "float n 2",
-    "extents": "float n 2",
-    "tentative": "bool n",
-    "cov": "float c c",
-}
 Picture = Literal["map", "paths", "nees", "model", "traversals"]
 
 
@@ -88,7 +79,7 @@ class Run:
     @cached_property
     def map(self) -> Map:
         """Return the walls at the end."""
-        arrays = read_arrays(self.folder / MAP, MAP_ARRAYS, REMEDY)
+        arrays = read_map(self.folder)
         alpha = arrays["lines"][:, 0]
         feet = arrays["anchors"] + arrays["lines"][:, 1:] * normals(alpha)
         ends = feet[:, None] + arrays["extents"][..., None] * directions(alpha)[:, None]

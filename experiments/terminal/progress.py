@@ -167,43 +167,48 @@ def number(value: float | None) -> str:
 
 def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
     """Print one column for each of several replays of one recording on standard output."""
-    table = Table(title=title, title_justify="left")
-    columns = {
-        "status": "status",
-        "pose ANEES": "pose_anees",
-        "NEES in 95 % band": "pose_nees_in_band",
-        "map ANEES": "map_anees",
-        "pose error m": "pose_rmse_m",
-        "heading error rad": "heading_rmse_rad",
-        "lines": "lines",
-        "duplicate walls": "duplicate_lines",
-        "false matches": "false_matches",
-        "computing ms a step": "step_ms",
-    }
-    table.add_column("", no_wrap=True)
-    for summary in summaries:
-        table.add_column(summary["backend"], justify="right", overflow="fold")
-    for name, key in columns.items():
-        table.add_row(name, *(_short(summary[key]) for summary in summaries))
-    plain_console().print(table)
+    _print_columns(
+        summaries,
+        title,
+        {
+            "status": "status",
+            "pose ANEES": "pose_anees",
+            "NEES in 95 % band": "pose_nees_in_band",
+            "map ANEES": "map_anees",
+            "pose error m": "pose_rmse_m",
+            "heading error rad": "heading_rmse_rad",
+            "lines": "lines",
+            "duplicate walls": "duplicate_lines",
+            "false matches": "false_matches",
+            "computing ms a step": "step_ms",
+        },
+    )
 
 
 def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
     """Print one column for each back end that mapped a real robot's log on standard output."""
+    _print_columns(
+        summaries,
+        title,
+        {
+            "status": "status",
+            "scans mapped": "steps",
+            "path by the wheels, m": "path_length_m",
+            "walls": "lines",
+            "duplicate walls": "duplicate_lines",
+            "closed chains": "chains_closed",
+            "computing ms a step": "step_ms",
+        },
+    )
+
+
+def _print_columns(summaries: Sequence[dict[str, Any]], title: str, keys: dict[str, str]) -> None:
+    """Print a column for each summary, of the values under these keys, each under its name."""
     table = Table(title=title, title_justify="left")
-    columns = {
-        "status": "status",
-        "scans mapped": "steps",
-        "path by the wheels, m": "path_length_m",
-        "walls": "lines",
-        "duplicate walls": "duplicate_lines",
-        "closed chains": "chains_closed",
-        "computing ms a step": "step_ms",
-    }
     table.add_column("", no_wrap=True)
     for summary in summaries:
         table.add_column(summary["backend"], justify="right", overflow="fold")
-    for name, key in columns.items():
+    for name, key in keys.items():
         table.add_row(name, *(_short(summary.get(key)) for summary in summaries))
     plain_console().print(table)
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import tyro
 from jaxtyping import Float
 from rich.table import Table
 
@@ -23,13 +22,14 @@ from experiments.replays.replay import Association, RecordedRun, ReplayOptions, 
 from experiments.scenario import TrialConfig, strategy_of
 from experiments.scoring.coverage import alignment
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError, choose
+from experiments.usage import choose
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees
 from slam.evaluation.trajectories import ate
 from slam.geometry.lines import normals
 from slam.geometry.poses import to_world
 
+from ..runner.command import run_study
 from ..runner.scores import Key, Scores, bootstrap, fill
 from .faults import Fault, faulty
 
@@ -174,7 +174,4 @@ def _replayed(run: RecordedRun, name: str) -> Scores:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(BiasStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"bias_study: {error}") from error
+    run_study(BiasStudy)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import tyro
 
 from experiments.replays.observations import DriveObservations, observations_of, ride, start
 from experiments.replays.recordings import record
@@ -20,6 +19,7 @@ from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees, share_in_band
 
+from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill, show
 
 KEY = ("world", "p0", "association", "perfect_extraction", "told_noise", "backend", "seed")
@@ -113,7 +113,4 @@ def _ridden(run: RecordedRun, name: str, drive: DriveObservations) -> Scores:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(EstimatorStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"consistency_study: {error}") from error
+    run_study(EstimatorStudy)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import tyro
 from jaxtyping import Float, Int
 from rich.table import Table
 from scipy.linalg import cho_factor, cho_solve
@@ -21,6 +20,8 @@ from experiments.terminal.console import plain_console
 from slam.backends.graph.graph import Graph
 from slam.geometry.lines import lines_to_world, normals
 from slam.geometry.poses import wrap
+
+from ..runner.command import run_study
 
 STEP = 1e-6
 """Of the central differences, m and rad."""
@@ -186,4 +187,4 @@ class GraphStudy:
 
 
 if __name__ == "__main__":
-    tyro.cli(GraphStudy).run()
+    run_study(GraphStudy)

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.replays.recordings import record
@@ -22,6 +21,7 @@ from slam.estimation.backend import Observations
 from slam.geometry.lines import directions, normals
 from slam.robot import Odometry
 
+from ..runner.command import run_study
 from .graph import differences
 
 SETTINGS: dict[str, GraphConfig] = {
@@ -96,4 +96,4 @@ class SettingsStudy:
 
 
 if __name__ == "__main__":
-    tyro.cli(SettingsStudy).run()
+    run_study(SettingsStudy)

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import tyro
 from jaxtyping import Float
 
 from experiments.artifacts.files import write
@@ -24,6 +23,7 @@ from viz.figures.anees_map import Field, anees_map
 from viz.figures.maps import saved
 
 from ..exploration.ring_worlds import LEAST_M, ring_world
+from ..runner.command import run_study
 from ..runner.explored import explored
 from ..runner.rows import Key, Row, key_of, read, rows_of
 from ..runner.scores import bootstrap
@@ -167,7 +167,4 @@ def _one_of(study: HeadingStudy, ring: Ring) -> list[Row]:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(HeadingStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"heading_study: {error}") from error
+    run_study(HeadingStudy)

@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.artifacts.results import log_arrays
@@ -20,8 +19,8 @@ from experiments.replays.replay import ReplayOptions, replay, run_of
 from experiments.scenario import TrialConfig, check
 from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
-from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from .intervals import LOW, scores
 
@@ -86,7 +85,4 @@ def table(rows: Sequence[Row]) -> Table:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(CauseStudy, prog="studies.consistency.interval_causes").run()
-    except UsageError as error:
-        raise SystemExit(f"cause_study: {error}") from error
+    run_study(CauseStudy)

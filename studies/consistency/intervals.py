@@ -8,25 +8,24 @@ all intervals hold and in another fewer. What a right filter would show is drawn
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from jaxtyping import Float, Int
 from rich.table import Table
 
-from experiments.scenario import TrialConfig, check
+from experiments.scenario import TrialConfig
 from experiments.scoring.corners import Corner, corners
 from experiments.scoring.measurements import Z_95, corner_points, distances
 from experiments.scoring.truth import Truth
 from experiments.terminal.console import plain_console
 from experiments.trial import TrialResult, run_trial
-from experiments.usage import UsageError
 from slam.geometry.lines import normals
 
-from ..runner.rows import Row, rows_of
+from ..runner.command import run_study
+from ..runner.rows import Row
 from ..runner.scores import bootstrap
+from ..runner.trials import scored
 
 NAMES = ("world", "backend", "seed")
 DRAWS = 400
@@ -55,16 +54,15 @@ class IntervalStudy:
         trials = [
             TrialConfig(self.world, name, seed=seed) for seed in range(1, self.seeds + 1) for name in self.backends
         ]
-        for trial in trials:
-            check(trial)
-        tasks = [(k, [(trial.world, trial.backend, trial.seed)]) for k, trial in enumerate(trials)]
-        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
-        plain_console(width=150).print(table(rows))
+        plain_console(width=150).print(table(scored(trials, self.out, _known_by, _scores_of, self.jobs)))
 
 
-def _one_of(trials: Sequence[TrialConfig], number: int) -> list[Row]:
-    trial = trials[number]
-    return [{"world": trial.world, "backend": trial.backend, "seed": trial.seed} | scores(run_trial(trial))]
+def _known_by(trial: TrialConfig) -> Row:
+    return {name: getattr(trial, name) for name in NAMES}
+
+
+def _scores_of(trial: TrialConfig) -> Row:
+    return scores(run_trial(trial))
 
 
 def scores(result: TrialResult) -> Row:
@@ -162,7 +160,4 @@ def table(rows: Sequence[Row]) -> Table:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(IntervalStudy, prog="studies.consistency.intervals").run()
-    except UsageError as error:
-        raise SystemExit(f"interval_study: {error}") from error
+    run_study(IntervalStudy)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import tyro
 
 from experiments.replays.corridor import Loop, drive
 from experiments.replays.observations import DriveObservations, ride, start
@@ -19,6 +18,7 @@ from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.geometry.poses import wrap
 
+from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill, show
 
 KEY = ("length_m", "heading_deg", "gap_m", "p0", "backend", "seed")
@@ -88,7 +88,4 @@ def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservat
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(LoopStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"loop_study: {error}") from error
+    run_study(LoopStudy)

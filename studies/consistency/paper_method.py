@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.artifacts.presets import METHODS as PRESETS
@@ -18,6 +17,7 @@ from experiments.artifacts.settings import nested, trial_of
 from experiments.scenario import TrialConfig, check
 from experiments.terminal.console import plain_console
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 
@@ -113,4 +113,4 @@ def _numbers(rows: Sequence[Row], key: str) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    tyro.cli(PaperMethodStudy).run()
+    run_study(PaperMethodStudy)

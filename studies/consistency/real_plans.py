@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.artifacts.results import log_arrays
@@ -22,6 +21,7 @@ from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
 from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from .intervals import scores
 
@@ -145,7 +145,4 @@ def _figures(rows: Sequence[Row]) -> list[str]:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(RealPlans, prog="studies.consistency.real_plans").run()
-    except UsageError as error:
-        raise SystemExit(f"real_plans: {error}") from error
+    run_study(RealPlans)

@@ -5,21 +5,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.scenario import P0, TrialConfig, check
+from experiments.scenario import P0, TrialConfig
 from experiments.scoring.statistics import Clustered, estimate, paired
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.explored import explored
-from ..runner.rows import Row, key_of, read, rows_of
+from ..runner.rows import Row, key_of, read
+from ..runner.trials import scored
 
 NAMES = ("world", "p0", "backend", "strategy", "seed", "max_path_m")
 MEASURES = {
@@ -73,14 +72,10 @@ class AdaptiveStudy:
 
     def run(self) -> None:
         """Run what is to be run and print both tables; raises UsageError for bad names and another file."""
-        trials = self.trials()
-        for trial in trials:
-            check(trial)
         if self.only_report:
             rows = [row for row in read(self.out, NAMES) if row["max_path_m"] == self.metres]
         else:
-            tasks = [(k, [tuple(getattr(trial, name) for name in NAMES)]) for k, trial in enumerate(trials)]
-            rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
+            rows = scored(self.trials(), self.out, _known_by, explored, self.jobs)
         console = plain_console(width=160)
         console.print(returns_table(rows, self.strategies[0]))
         for p0 in self.p0:
@@ -92,9 +87,8 @@ class AdaptiveStudy:
                 console.print(comparison_table(own, first, others, f"p0 {p0}"))
 
 
-def _one_of(trials: Sequence[TrialConfig], number: int) -> list[Row]:
-    trial = trials[number]
-    return [{name: getattr(trial, name) for name in NAMES} | explored(trial)]
+def _known_by(trial: TrialConfig) -> Row:
+    return {name: getattr(trial, name) for name in NAMES}
 
 
 def returns_table(rows: Sequence[Row], strategy: str) -> Table:
@@ -157,7 +151,4 @@ def _values(rows: Sequence[Row], key: str) -> Float[np.ndarray, " n"]:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(AdaptiveStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"adaptive_study: {error}") from error
+    run_study(AdaptiveStudy)

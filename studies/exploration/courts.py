@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.trials import rows_of
 from .court_worlds import court
 from .suite import table
@@ -54,34 +52,24 @@ class CourtsStudy:
             for backend in self.backends
         ]
 
+    def run(self) -> int:
+        """Run the study and return the exit status: 1 where a run ended too soon."""
+        rows = list(rows_of(self.trials(), self.out, self.jobs))
+        rows.sort(key=lambda row: (row["file"], row["backend"], row["seed"]))
+        plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=True))
+        for row in rows:
+            if row["status"] == "failed" or is_premature(row):
+                print(f"{row['world']} {row['backend']} seed {row['seed']}: {row['status']}, {row['reason']}")
+        seen = sorted(row["swept"] for row in rows if row.get("swept") is not None)
+        early = sum(map(is_premature, rows))
+        print(f"{early} of {len(rows)} ended too soon; floor seen {seen[0]:.3f} to {seen[-1]:.3f}; rows in {self.out}")
+        return 1 if early else 0
+
 
 def is_premature(row: dict[str, Any]) -> bool:
     """Return whether a run said that it was complete and had not seen the floor."""
     return bool(row["status"] == "complete" and (row.get("swept") or 0.0) < LEAST_SWEPT)
 
 
-def main() -> int:
-    """Run the study that the command line names and return the exit status: 1 where a run ended too soon."""
-    study = tyro.cli(CourtsStudy, prog="studies.exploration.courts")
-    rows = []
-    try:
-        for row in rows_of(study.trials(), study.out, study.jobs):
-            rows.append(row)
-            if sys.stderr.isatty():
-                print(f"\r{len(rows)}", end="", file=sys.stderr, flush=True)
-    except UsageError as error:
-        print(f"courts_study: {error}", file=sys.stderr)
-        return 2
-    rows.sort(key=lambda row: (row["file"], row["backend"], row["seed"]))
-    plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=True))
-    for row in rows:
-        if row["status"] == "failed" or is_premature(row):
-            print(f"{row['world']} {row['backend']} seed {row['seed']}: {row['status']}, {row['reason']}")
-    seen = sorted(row["swept"] for row in rows if row.get("swept") is not None)
-    early = sum(map(is_premature, rows))
-    print(f"{early} of {len(rows)} ended too soon; floor seen {seen[0]:.3f} to {seen[-1]:.3f}; rows in {study.out}")
-    return 1 if early else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(CourtsStudy)

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from jaxtyping import Bool, Float, Int
 from rich.table import Table
 
@@ -22,6 +21,7 @@ from experiments.terminal.console import plain_console
 from experiments.trial import TrialResult, run_trial
 from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
 NAMES = ("world", "seed", "backend", "max_steps")
@@ -117,7 +117,4 @@ def table(rows: Sequence[Row]) -> Table:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(MapCauses, prog="studies.exploration.map_causes").run()
-    except UsageError as error:
-        raise SystemExit(f"map_causes: {error}") from error
+    run_study(MapCauses)

@@ -5,25 +5,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.artifacts.settings import NAVIGATION, nested, record_of, trial_of
-from experiments.scenario import TrialConfig, check
+from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 from explore.planning.navigators import NAVIGATORS
 from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 
-from ..runner.rows import Row, key_of, rows_of
-from ..runner.trials import KEYS, one
-
-NAMES = (*KEYS, "navigation")
+from ..runner.command import run_study
+from ..runner.rows import Row, key_of
+from ..runner.trials import KEYS, one, scored
 
 
 @dataclass(frozen=True)
@@ -69,21 +66,12 @@ class NavigationStudy:
 
     def run(self) -> None:
         """Run what is to be run and print the comparison; raises UsageError for bad names and another file."""
-        trials = self.trials()
-        for trial in trials:
-            check(trial)
-        tasks = [(k, [key_of(_known_by(trial), NAMES)]) for k, trial in enumerate(trials)]
-        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, tuple(trials)), self.jobs))
-        plain_console(width=140).print(table(rows))
+        plain_console(width=140).print(table(scored(self.trials(), self.out, _known_by, one, self.jobs)))
 
 
 def _known_by(trial: TrialConfig) -> Row:
     named = {name: getattr(trial, name) for name in KEYS if name != "file"}
     return named | {"file": Path(trial.world).name, "navigation": trial.mission.explorer.following.navigation}
-
-
-def _one_of(trials: Sequence[TrialConfig], number: int) -> list[Row]:
-    return [one(trials[number]) | {"navigation": trials[number].mission.explorer.following.navigation}]
 
 
 def table(rows: Sequence[Row]) -> Table:
@@ -126,4 +114,4 @@ def _mean(rows: Sequence[Row], key: str, digits: int) -> str:
 
 
 if __name__ == "__main__":
-    tyro.cli(NavigationStudy).run()
+    run_study(NavigationStudy)

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-import tyro
 from jaxtyping import Float
 from shapely.geometry.polygon import orient
 
 from experiments.scenario import TrialConfig, check
 from experiments.trial import run_trial
-from experiments.usage import UsageError
 from sim.worlds import World
+
+from ..runner.command import run_study
 
 ROOM_M = (3.5, 3.0)
 START = (0.6, 0.6, 0.3)
@@ -70,7 +70,4 @@ def pillar(seed: int) -> Float[np.ndarray, "n 2"]:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(PillarsStudy).run()
-    except UsageError as error:
-        raise SystemExit(f"pillars_study: {error}") from error
+    run_study(PillarsStudy)

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.trials import rows_of
 from .suite import table
 
@@ -52,6 +51,19 @@ class RandomStudy:
             for world in worlds
         ]
 
+    def run(self) -> int:
+        """Run the study and return the exit status: 1 where it was not clean."""
+        rows = list(rows_of(self.trials(), self.out, self.jobs))
+        for row in sorted(rows, key=lambda row: int(row["file"].partition(":")[2])):
+            if faults(row):
+                print(f"{row['file']}: {'; '.join(faults(row))}")
+        plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=False))
+        paths = np.array([row["path_length_m"] for row in rows if row.get("path_length_m") is not None])
+        clean = sum(not faults(row) for row in rows)
+        print(f"{clean} of {len(rows)} clean, median path {np.median(paths):.0f} m; rows in {self.out}")
+        complete = sum(row["status"] == "complete" for row in rows)
+        return 0 if complete >= 0.99 * len(rows) and not any(row.get("collisions") for row in rows) else 1
+
 
 def faults(row: dict[str, Any]) -> list[str]:
     """Return what was not clean about a run, in words; nothing for a clean one."""
@@ -65,28 +77,5 @@ def faults(row: dict[str, Any]) -> list[str]:
     return found
 
 
-def main() -> int:
-    """Run the study that the command line names and return the exit status: 1 where it was not clean."""
-    study = tyro.cli(RandomStudy, prog="studies.exploration.random_buildings")
-    rows = []
-    try:
-        for row in rows_of(study.trials(), study.out, study.jobs):
-            rows.append(row)
-            if sys.stderr.isatty():
-                print(f"\r{len(rows)} of {study.buildings}", end="", file=sys.stderr, flush=True)
-    except UsageError as error:
-        print(f"random_study: {error}", file=sys.stderr)
-        return 2
-    for row in sorted(rows, key=lambda row: int(row["file"].partition(":")[2])):
-        if faults(row):
-            print(f"{row['file']}: {'; '.join(faults(row))}")
-    plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, by_world=False))
-    paths = np.array([row["path_length_m"] for row in rows if row.get("path_length_m") is not None])
-    clean = sum(not faults(row) for row in rows)
-    print(f"{clean} of {len(rows)} clean, median path {np.median(paths):.0f} m; rows in {study.out}")
-    complete = sum(row["status"] == "complete" for row in rows)
-    return 0 if complete >= 0.99 * len(rows) and not any(row.get("collisions") for row in rows) else 1
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(RandomStudy)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 from rich.table import Table
 from scipy.stats import binomtest
 
@@ -21,6 +20,7 @@ from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
 from ..results.plans import LOST
+from ..runner.command import run_study
 from ..runner.trials import rows_of
 
 
@@ -56,6 +56,18 @@ class SchoolsStudy:
             for name in names
             for backend in self.backends
         ]
+
+    def run(self) -> int:
+        """Run the study and return the exit status: 1 where an exception ended a run."""
+        rows = list(rows_of(self.trials(), self.out, self.jobs, self.any_code))
+        plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, self.backends))
+        for one, other in combinations(self.backends, 2):
+            pairs, only_one, only_other, p = lost_in_pairs(rows, one, other)
+            print(f"{pairs} pairs: only {one} lost its map in {only_one}, only {other} in {only_other}; p = {p:.3g}")
+        for row in rows:
+            if row["status"] not in ("complete", "stopped"):
+                print(f"{row['file']} {row['backend']}: {row['status']} at step {row.get('steps')}: {row['reason']}")
+        return 1 if any(row.get("raised") for row in rows) else 0
 
 
 def table(rows: Sequence[dict[str, Any]], backends: Sequence[str]) -> Table:
@@ -96,28 +108,5 @@ def lost_in_pairs(rows: Sequence[dict[str, Any]], one: str, other: str) -> tuple
     return len(both), only_one, only_other, p
 
 
-def main() -> int:
-    """Run the study that the command line names and return the exit status: 1 where an exception ended a run."""
-    study = tyro.cli(SchoolsStudy, prog="studies.exploration.schools")
-    rows: list[dict[str, Any]] = []
-    try:
-        trials = study.trials()
-        for row in rows_of(trials, study.out, study.jobs, study.any_code):
-            rows.append(row)
-            if sys.stderr.isatty():
-                print(f"\r{len(rows)} of {len(trials)}", end="", file=sys.stderr, flush=True)
-    except UsageError as error:
-        print(f"schools_study: {error}", file=sys.stderr)
-        return 2
-    plain_console(width=200 if not sys.stdout.isatty() else None).print(table(rows, study.backends))
-    for one, other in combinations(study.backends, 2):
-        pairs, only_one, only_other, p = lost_in_pairs(rows, one, other)
-        print(f"{pairs} pairs: only {one} lost its map in {only_one}, only {other} in {only_other}; p = {p:.3g}")
-    for row in rows:
-        if row["status"] not in ("complete", "stopped"):
-            print(f"{row['file']} {row['backend']}: {row['status']} at step {row.get('steps')}: {row['reason']}")
-    return 1 if any(row.get("raised") for row in rows) else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(SchoolsStudy)

@@ -6,16 +6,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from jaxtyping import Float
 from rich.console import Console
 from rich.table import Table
 
-from experiments.scenario import Scenario, TrialConfig, build, check
+from experiments.scenario import Scenario, TrialConfig, build
 from experiments.scoring.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
 from experiments.scoring.records import Log
 from experiments.scoring.swept import Floor, visible_floor
@@ -27,7 +25,9 @@ from explore.strategies import STRATEGIES
 from sim.worlds import WORLDS
 from slam.geometry.poses import to_world
 
-from ..runner.rows import Row, read, rows_of
+from ..runner.command import run_study
+from ..runner.rows import Row, read
+from ..runner.trials import scored
 
 SHARES = (0.9, 0.99)
 EVERY_STEPS = 10
@@ -77,14 +77,18 @@ def floor_shares(scenario: Scenario, log: Log) -> Float[np.ndarray, " s"]:
     return np.array(shares) / max(int(np.count_nonzero(target)), 1)
 
 
+def known_by(trial: TrialConfig) -> Row:
+    """Return what makes a trial this one and no other."""
+    return {key: getattr(trial, key) for key in KEYS}
+
+
 def one(config: TrialConfig) -> Row:
-    """Run one trial and return its row."""
+    """Run one trial and return its scores."""
     scenario = build(config)
     gauge = Gauge(scenario, sample(truth_of(scenario.world, config.robot)))
     result = run_scenario(scenario, gauge.watch, default_mission)
     summary = result.summary
-    row = {"world": config.world, "strategy": config.strategy, "seed": config.seed, "errorless": config.errorless}
-    row |= {key: summary.get(key) for key in SCORES} | {"set_aside": len(summary.get("set_aside", []))}
+    row = {key: summary.get(key) for key in SCORES} | {"set_aside": len(summary.get("set_aside", []))}
     if result.log is not None:
         lengths, shares = np.array(gauge.rows).T
         swept = floor_shares(scenario, result.log)
@@ -124,19 +128,8 @@ class StrategyStudy:
 
     def run(self) -> None:
         """Run what is to be run and print the comparison; raises UsageError for bad names and another file."""
-        trials = self.trials()
-        for trial in trials:
-            check(trial)
-        if self.only_report:
-            rows = read(self.out, KEYS)
-        else:
-            tasks = [(k, [tuple(getattr(trial, key) for key in KEYS)]) for k, trial in enumerate(trials)]
-            rows = list(rows_of(self.out, KEYS, tasks, partial(_one_of, tuple(trials)), self.jobs))
+        rows = read(self.out, KEYS) if self.only_report else scored(self.trials(), self.out, known_by, one, self.jobs)
         print_report(rows, plain_console(width=160))
-
-
-def _one_of(trials: tuple[TrialConfig, ...], number: int) -> list[Row]:
-    return [one(trials[number])]
 
 
 def ratio(
@@ -201,4 +194,4 @@ def values(rows: Sequence[Row], key: str) -> Float[np.ndarray, " n"]:
 
 
 if __name__ == "__main__":
-    tyro.cli(StrategyStudy).run()
+    run_study(StrategyStudy)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.scenario import P0, TrialConfig
@@ -20,6 +19,7 @@ from experiments.usage import UsageError
 from sim.robot import RobotConfig
 from sim.worlds import WORLDS
 
+from ..runner.command import run_study
 from ..runner.trials import rows_of
 
 
@@ -72,6 +72,26 @@ class Suite:
             max_steps=self.max_steps, max_path_m=self.max_path_m, robot=replace(robot, wheels=wheels),
         )  # fmt: skip
         return [one(name, seed=seed) for name in names for seed in range(1, self.seeds + 1)]
+
+    def run(self) -> None:
+        """Run the suite and print its table."""
+        console = plain_console(width=200 if not sys.stdout.isatty() else None)
+        rows = list(rows_of(self.trials(), self.out, self.jobs))
+        rows.sort(key=lambda row: (row["file"], row["seed"]))
+        console.print(table(rows, by_world=self.plans is None))
+        for row in rows:
+            if row["status"] != "complete" or (self.each and row["coverage"] < 0.99):
+                found = "" if row.get("coverage") is None else f", coverage {row['coverage']:.4f}"
+                if row.get("map_began_step"):
+                    found += f" ({row['coverage_own_frame']:.4f} laid over the truth by its path)"
+                if (way := row.get("reachable_way")) is not None and way < 0.9:
+                    found += f", {100 * way:.0f} % of its way open to it at the end"
+                print(f"{row['file']} seed {row['seed']}: {row['status']}{found}: {row['reason']}")
+        for key in sorted({key for row in rows for key in row if key.startswith("distance_error")}):
+            worst = _values(rows, key)
+            if len(worst) and self.plans is None:
+                print(f"{key}: worst {100 * np.abs(worst).max():.1f} cm over {len(worst)} trials")
+        print(f"rows in {self.out}")
 
 
 def table(rows: list[dict[str, Any]], by_world: bool) -> Table:
@@ -133,37 +153,5 @@ def _mean(rows: list[dict[str, Any]], key: str, digits: int) -> str:
     return f"{values.mean():.{digits}f}" if len(values) else "-"
 
 
-def main() -> int:
-    """Run the suite that the command line names and return the exit status."""
-    suite = tyro.cli(Suite, prog="studies.exploration.suite")
-    console = plain_console(width=200 if not sys.stdout.isatty() else None)
-    try:
-        trials = suite.trials()
-        rows = []
-        for row in rows_of(trials, suite.out, suite.jobs):
-            rows.append(row)
-            if sys.stderr.isatty():
-                print(f"\r{len(rows)} of {len(trials)}", end="", file=sys.stderr, flush=True)
-    except UsageError as error:
-        print(f"suite: {error}", file=sys.stderr)
-        return 2
-    rows.sort(key=lambda row: (row["file"], row["seed"]))
-    console.print(table(rows, by_world=suite.plans is None))
-    for row in rows:
-        if row["status"] != "complete" or (suite.each and row["coverage"] < 0.99):
-            found = "" if row.get("coverage") is None else f", coverage {row['coverage']:.4f}"
-            if row.get("map_began_step"):
-                found += f" ({row['coverage_own_frame']:.4f} laid over the truth by its path)"
-            if (way := row.get("reachable_way")) is not None and way < 0.9:
-                found += f", {100 * way:.0f} % of its way open to it at the end"
-            print(f"{row['file']} seed {row['seed']}: {row['status']}{found}: {row['reason']}")
-    for key in sorted({key for row in rows for key in row if key.startswith("distance_error")}):
-        worst = _values(rows, key)
-        if len(worst) and suite.plans is None:
-            print(f"{key}: worst {100 * np.abs(worst).max():.1f} cm over {len(worst)} trials")
-    print(f"rows in {suite.out}")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(Suite)

@@ -6,12 +6,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
 from sim.logs.recorded_log import read_recorded_log
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import extract
 from slam.extraction.range_noise import range_noise
+
+from ..runner.command import run_study
 
 
 @dataclass(frozen=True)
@@ -40,4 +40,4 @@ class NoiseStudy:
 
 
 if __name__ == "__main__":
-    tyro.cli(NoiseStudy).run()
+    run_study(NoiseStudy)

@@ -5,7 +5,6 @@
 DIR holds `NAME.log.gz`, and where others measured something `NAME.relations` and `NAME.ref_gmapping.txt`.
 """
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.replays.measured import held_against
@@ -25,6 +23,7 @@ from experiments.terminal.console import plain_console
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
 NAMES = ("log", "backend", "odometry", "every")
@@ -113,15 +112,5 @@ def _cells(row: Row, tail: str) -> list[str]:
     ]  # fmt: skip
 
 
-def main() -> int:
-    """Run the command and return its exit status."""
-    try:
-        tyro.cli(LogsStudy).run()
-    except UsageError as error:
-        print(f"logs: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(LogsStudy)

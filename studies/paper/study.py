@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
 from experiments.reproductions import REPRODUCTIONS
-from experiments.usage import UsageError, choose
+from experiments.usage import choose
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from .page import PAGE, ROWS, write_page
 
@@ -67,7 +66,4 @@ def _commit() -> str:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(PaperStudy, prog="studies.paper.study").run()
-    except UsageError as error:
-        raise SystemExit(f"paper_study: {error}") from error
+    run_study(PaperStudy)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.scenario import TrialConfig
@@ -18,6 +17,7 @@ from sim.faults import FaultsConfig
 from sim.lidar import LidarConfig
 from sim.robot import RobotConfig
 
+from ..runner.command import run_study
 from ..runner.rows import Row
 from ..runner.trials import rows_of
 
@@ -61,6 +61,19 @@ class ApartmentsStudy:
             for plan in plans
         ]
 
+    def run(self) -> None:
+        """Run the study and print its table, with what did not end as complete."""
+        rows = list(rows_of(self.trials(), self.out, self.jobs, any_code=self.any_code))
+        console = plain_console(width=150)
+        console.print(table(rows))
+        found = [row["coverage"] for row in rows if row.get("coverage") is not None]
+        console.print(
+            f"mean coverage {np.mean(found):.4f}, {sum(row['status'] == 'complete' for row in rows)} complete"
+        )
+        for row in rows:
+            if row["status"] != "complete":
+                console.print(f"{row['world']}: {row['status']}, {row['reason']}")
+
 
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each plan."""
@@ -77,21 +90,5 @@ def table(rows: Sequence[Row]) -> Table:
     return shown
 
 
-def main() -> None:
-    """Run the study that the command line names and print its table, with what did not end as complete."""
-    study = tyro.cli(ApartmentsStudy, prog="studies.robots.apartments")
-    try:
-        rows = list(rows_of(study.trials(), study.out, study.jobs, any_code=study.any_code))
-    except UsageError as error:
-        raise SystemExit(f"apartments: {error}") from error
-    console = plain_console(width=150)
-    console.print(table(rows))
-    found = [row["coverage"] for row in rows if row.get("coverage") is not None]
-    console.print(f"mean coverage {np.mean(found):.4f}, {sum(row['status'] == 'complete' for row in rows)} complete")
-    for row in rows:
-        if row["status"] != "complete":
-            console.print(f"{row['world']}: {row['status']}, {row['reason']}")
-
-
 if __name__ == "__main__":
-    main()
+    run_study(ApartmentsStudy)

@@ -9,17 +9,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.scenario import TrialConfig, check, load_world
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
 from explore.following.driving_config import DrivingConfig
 from sim.robot import RobotConfig
 from sim.worlds import World
 from slam.robot import ScannerSpec
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 
@@ -119,7 +118,4 @@ def _median(rows: Sequence[Row], name: str) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(BodiesStudy, prog="studies.robots.bodies").run()
-    except UsageError as error:
-        raise SystemExit(f"bodies_study: {error}") from error
+    run_study(BodiesStudy)

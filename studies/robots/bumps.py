@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from jaxtyping import Bool, Float, Int
 from rich.table import Table
 
@@ -17,13 +16,13 @@ from experiments.scenario import TrialConfig, check
 from experiments.scoring.summary import pose_nees
 from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
-from experiments.usage import UsageError
 from sim.faults import FaultsConfig, bump_rad
 from sim.lidar import LidarConfig
 from sim.robot import RobotConfig
 from slam.estimation.gates import gate_level
 from slam.geometry.poses import wrap
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
 NAMES = ("beams", "world", "backend", "seed", "max_steps", "share", "bump_deg")
@@ -144,7 +143,4 @@ def table(rows: Sequence[Row]) -> Table:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(BumpsStudy, prog="studies.robots.bumps").run()
-    except UsageError as error:
-        raise SystemExit(f"bumps: {error}") from error
+    run_study(BumpsStudy)

@@ -9,16 +9,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.scenario import TrialConfig, check
 from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
 from sim.faults import FaultsConfig
 from sim.lidar import LidarConfig
 from sim.robot import RobotConfig
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 
@@ -140,7 +139,4 @@ def _median(rows: Sequence[Row], name: str) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        tyro.cli(ScannersStudy, prog="studies.robots.scanners").run()
-    except UsageError as error:
-        raise SystemExit(f"scanners_study: {error}") from error
+    run_study(ScannersStudy)

@@ -1,7 +1,7 @@
 """Many trials, a row for each with all that was scored of it."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -22,6 +22,33 @@ PARTS = 10
 SETTINGS = ("seed", "backend", "strategy", "errorless", "p0", "max_steps")
 KEYS = ("file", *SETTINGS)
 """What makes a trial this one and no other."""
+
+
+def scored(
+    trials: Sequence[TrialConfig],
+    path: Path,
+    known_by: Callable[[TrialConfig], Row],
+    score: Callable[[TrialConfig], Row],
+    jobs: int,
+) -> list[Row]:
+    """Return a row for each trial, what it is known by and its scores; those that the file lacks are run first.
+
+    Raises UsageError for bad names and for a file that holds something else.
+    """
+    for trial in trials:
+        check(trial)
+    names = tuple(known_by(trials[0]))
+    numbered = [(number, [rows.key_of(known_by(trial), names)]) for number, trial in enumerate(trials)]
+    return list(rows.rows_of(path, names, numbered, partial(_scored, tuple(trials), known_by, score), jobs))
+
+
+def _scored(
+    trials: Sequence[TrialConfig],
+    known_by: Callable[[TrialConfig], Row],
+    score: Callable[[TrialConfig], Row],
+    number: int,
+) -> list[Row]:
+    return [known_by(trials[number]) | score(trials[number])]
 
 
 def rows_of(trials: Sequence[TrialConfig], path: Path, jobs: int, any_code: bool = False) -> Iterator[Row]:

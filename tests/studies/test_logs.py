@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from studies.logs.study import LogsStudy, main, table
+from studies.logs.study import LogsStudy, table
+from studies.runner.command import run_study
 
 
 def cells(rows):
@@ -41,5 +42,6 @@ def test_each_log_has_a_row_for_each_path_and_is_not_run_twice(tmp_path, monkeyp
 
 def test_an_unknown_back_end_is_told_in_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["study", "--logs", str(tmp_path), "--backends", "none"])
-    assert main() == 2
+    with pytest.raises(SystemExit, match="2"):
+        run_study(LogsStudy)
     assert "found none" in capsys.readouterr().err

@@ -2,18 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import distance_transform_edt
 
 from explore.floor.free_space import FreeSpace
 from slam.robot import Scan
-
-
-def full_clearance(grid):
-    limit = grid.config.clearance_limit_m
-    occupied = grid.evidence > 0
-    if not occupied.any():
-        return np.full(grid.shape, limit)
-    return np.minimum(distance_transform_edt(~occupied, sampling=grid.config.cell_m), limit)
+from tests.explore.floor.plain_clearance import full_clearance
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import shapely
-from scipy.ndimage import distance_transform_edt
 
 from explore.floor.free_space import FreeSpace, FreeSpaceConfig
 from explore.planning.passable import PathConfig
 from explore.planning.paths import Planner
 from sim.lidar import LidarConfig, RangeFinder
 from slam.robot import Scan
+from tests.explore.floor.plain_clearance import full_clearance
 
 CELL = FreeSpaceConfig().cell_m
 
@@ -133,14 +133,6 @@ def test_beams_without_return_show_free_floor_up_to_the_range_and_nothing_occupi
     distance = np.hypot(centres[..., 0], centres[..., 1])
     assert np.all(grid.evidence[distance < 1.5 - CELL] < 0)
     assert np.all(grid.evidence[distance > 1.5] == 0)
-
-
-def full_clearance(grid):
-    limit = grid.config.clearance_limit_m
-    occupied = grid.evidence > 0
-    if not occupied.any():
-        return np.full(grid.shape, limit)
-    return np.minimum(distance_transform_edt(~occupied, sampling=grid.config.cell_m), limit)
 
 
 @pytest.mark.parametrize("seed", range(4))
