@@ -1,5 +1,6 @@
 """A real robot's log looked at again once its drive has ended: path and map are what all scans say together."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,10 @@ from slam.extraction.visible_extent import sure_pieces
 from slam.geometry.poses import to_world
 from slam.map.chains import connect
 from slam.odometry.scan_matching import returns_within
+from slam.robot import Scan
 
+from ..scenario import TrialConfig
+from ..scoring.records import Log
 from ..scoring.without_truth.certificate import certificate_record
 from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
@@ -28,15 +32,18 @@ def looked_again(result: TrialResult) -> TrialResult:
     log, last, recorded = result.log, result.last, result.recorded
     if log is None or last is None or recorded is None:
         return result
-    mission = result.scenario.config.mission
     scans = [recorded.recording.scan(k) for k in range(len(log))]
+    return _mapped(result, last, surveyed(scans, log, result.scenario.config))
+
+
+def surveyed(scans: Sequence[Scan], log: Log, config: TrialConfig) -> Survey:
+    """Return what the scans of a drive say together, in the frame of its first pose as it was estimated."""
+    mission, on_body = config.mission, config.robot.scanner
     rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
-    on_body = result.scenario.config.robot.scanner
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
     drive = Drive(log.heard[1:], log.heard_cov[1:])
-    survey = second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, Rays(scans, on_body))
-    return _mapped(result, last, survey)
+    return second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, Rays(scans, on_body))
 
 
 def _mapped(result: TrialResult, last: Step, survey: Survey) -> TrialResult:

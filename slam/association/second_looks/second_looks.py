@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse import csc_array
 
 from ...estimation.backend import Joint
 from ...extraction.segments import Segments
@@ -35,6 +36,8 @@ class Survey:
     """The last pose and all walls."""
     closures: int
     """So many places that the robot came back to hold the path together."""
+    information: csc_array
+    """About all poses, of which the first is fixed, and then all walls; the floors of walls are not in it."""
 
 
 def second_looks(
@@ -75,4 +78,4 @@ def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksCon
         unknowns = solved(begun(unknowns.poses, seen, of), links, seen, of, config)
     information, _ = normal_equations(unknowns, links, seen, of, config)
     walls, joint = surveyed(unknowns, information, seen, of, config)
-    return Survey(unknowns.poses, walls, joint, len(kept))
+    return Survey(unknowns.poses, walls, joint, len(kept), information)
