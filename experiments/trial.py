@@ -15,6 +15,7 @@ from explore.step import Step
 from sim.logs.keyframes import RecordedLog
 from sim.worlds import World
 from slam.estimation.backend import Joint
+from slam.geometry.compiled import link_kernels
 from slam.mapper import Mapper
 
 from .scenario import Scenario, TrialConfig, build, heard_by
@@ -91,7 +92,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
 
 def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
     """Go through a mission to its end, whatever that is, and return it; the recorder keeps every step."""
-    _leave_out_what_is_loaded()
+    _prepare_process()
     try:
         for step in limited(mission(scenario), scenario.config.limits):
             recorder.add(step)
@@ -109,8 +110,12 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
 
 
 @cache
-def _leave_out_what_is_loaded() -> None:
-    """Let the collector of garbage pass over all modules, once a process: that took a tenth of a second of one step."""
+def _prepare_process() -> None:
+    """Do once a process what would count as a step's time.
+
+    Link the kernels, and let the collector of garbage pass over all modules: that took a tenth of a second.
+    """
+    link_kernels()
     gc.freeze()
 
 

@@ -25,6 +25,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _FINGERPRINTS: dict[str, str] = {}
 """By module, of all that its kernels are made of."""
+_KERNELS: list["Kernel[..., Any]"] = []
 _FROZEN = (int, float, bool, str, tuple)
 """What a kernel reads of its module is compiled into it."""
 
@@ -45,18 +46,21 @@ class Kernel(Generic[_P, _R]):
         self._machine: Callable[_P, _R] | None = None
         self._made: dict[tuple[Any, ...], Callable[..., _R]] | None = None
         update_wrapper(self, plain)
+        _KERNELS.append(self)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Run the machine code."""
         if self._made is None:
-            self._made = self._kept()
+            self.link()
+            assert self._made is not None
         code = self._made.get(kinds(args))
         return self._by_numba(*args, **kwargs) if code is None or kwargs else code(*args)
 
-    def _kept(self) -> dict[tuple[Any, ...], Callable[..., _R]]:
-        """Return by kinds of arguments what an earlier process kept."""
-        file = self._file()
-        return {} if file is None else {kind: linked(code, self.plain) for kind, code in read(file).items()}
+    def link(self) -> None:
+        """Link what an earlier process kept, before the first call."""
+        if self._made is None:
+            file = self._file()
+            self._made = {} if file is None else {kind: linked(code, self.plain) for kind, code in read(file).items()}
 
     def _by_numba(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Run what numba compiles or loads, and keep it so that the next process does without numba."""
@@ -93,6 +97,12 @@ class Kernel(Generic[_P, _R]):
                     self.plain.__globals__[name] = value.machine()
         assert self._machine is not None
         return self._machine
+
+
+def link_kernels() -> None:
+    """Link what earlier processes kept of all kernels imported so far, so that the time of no step counts it."""
+    for kernel in _KERNELS:
+        kernel.link()
 
 
 @lru_cache

@@ -215,7 +215,7 @@ def _paths(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     handles.append(Line2D([], [], color=palette.PATH_ESTIMATED, linewidth=0.9, label="estimated path"))
     axes.plot(*path[0, :2], "o", markersize=9, color=palette.PAGE, markeredgecolor=palette.INK, mew=1.2, zorder=6)
     axes.plot(*path[0, :2], "+", markersize=8, color=palette.INK, mew=1.2, zorder=6)
-    handles.append(_marker(r"$\oplus$", palette.INK, palette.INK, 9, "start"))
+    handles.append(_marker(_start_sign(), "none", palette.INK, 9, "start"))
     return handles
 
 
@@ -279,7 +279,13 @@ def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     return [_marker("o", "#D55E0033", palette.ALARM, 7, label)]
 
 
-def _marker(shape: str, face: str, edge: str, size: int, label: str) -> Line2D:
+def _start_sign() -> Path:
+    """Return a cross in a circle: the letter for it would load the setting of formulas, a tenth of a second."""
+    cross = Path([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], [Path.MOVETO, Path.LINETO] * 2)
+    return Path.make_compound_path(Path.unit_circle(), cross)
+
+
+def _marker(shape: str | Path, face: str, edge: str, size: int, label: str) -> Line2D:
     return Line2D(
         [], [], linestyle="none", marker=shape, color=face, markeredgecolor=edge, markersize=size, label=label
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import experiments.trial as trial_module
 from experiments.artifacts.results import write_results
 from experiments.scenario import TrialConfig, build
 from experiments.scoring.summary import TIMED, odometry_path, pose_nees
@@ -31,6 +32,15 @@ def test_a_run_is_scored(world, scripted_mission):
     assert 0.5 < summary["swept"] < 1.0
     assert set(summary["step_ms"]) == set(summary["planning_ms"]) == {"mean", "p50", "p95", "max"}
     assert 0.0 < summary["planning_ms"]["mean"] < summary["step_ms"]["mean"]
+
+
+def test_what_was_compiled_is_linked_before_the_first_step(world, scripted_mission, monkeypatch):
+    order: list[str] = []
+    monkeypatch.setattr(trial_module, "link_kernels", lambda: order.append("linked"))
+    trial_module._prepare_process.cache_clear()
+    run_trial(TrialConfig("square"), lambda step: order.append("step"), world, scripted_mission)
+    assert order[:2] == ["linked", "step"]
+    assert order.count("linked") == 1
 
 
 def test_without_noise_there_is_no_nees_and_no_odometry_error(world, scripted_mission):

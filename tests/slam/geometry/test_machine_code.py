@@ -63,7 +63,7 @@ def run(folder: Path, *words: str, **environment: str) -> list[str]:
     (folder / "calls.py").write_text(CALLS)
     around = {"PYTHONPATH": f"{Path(__file__).parents[3]}:{folder}", "NUMBA_CACHE_DIR": str(folder / "cache")}
     return subprocess.run(
-        [sys.executable, "calls.py", *words],
+        [sys.executable, *(words if words[0] == "-c" else ("calls.py", *words))],
         cwd=folder, env=os.environ | around | environment, capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
 
@@ -75,6 +75,12 @@ def test_what_was_compiled_runs_without_numba_and_other_arguments_get_code_of_th
     # bytes.
     assert run(tmp_path, "9") == ["TypingError"] * 4 + ["True"]
     assert run(tmp_path, "5") == ["False"]
+
+
+def test_all_that_was_kept_is_linked_at_once_where_that_is_asked_for(tmp_path: Path) -> None:
+    run(tmp_path, "1")
+    asks = "from slam.geometry.compiled import link_kernels; from its_kernels import *; link_kernels(); "
+    assert run(tmp_path, "-c", asks + "print(len(described._made), len(depth._made))") == ["4", "0"]
 
 
 def test_a_damaged_file_or_one_of_another_version_is_made_anew(tmp_path: Path) -> None:
