@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from experiments.artifacts.settings import record_of
+from experiments.scenario import TrialConfig
+
 ROOT = Path(__file__).parents[2]
 DOCS = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *DOCS]
@@ -55,6 +58,22 @@ def test_sentences_of_every_page_are_short(page):
     sentences = re.split(r"[.;:!?](?:\s|$)|\n\s*\n|\n\s*[-*\d]+\.? ", text)
     words = {len(re.findall(r"[\w'-]+", sentence)): sentence for sentence in sentences}
     assert max(words) <= LONGEST, words[max(words)]
+
+
+def test_every_setting_that_a_text_names_is_one():
+    def keys(settings, before=""):
+        for key, value in settings.items():
+            yield before + key
+            yield from keys(value, f"{before}{key}.") if isinstance(value, dict) else ()
+
+    known = set(keys(record_of(TrialConfig("paper-fig4"))))
+    settings = (ROOT / "docs" / "settings.md").read_text()
+    for page in PAGES:
+        text = page.read_text()
+        named = re.findall(r"`(?:--set )?((?:mission|robot|backend_options)\.[a-z_.0-9]+)(?:=[^`]*)?`", text)
+        assert [name for name in named if name not in known and not (ROOT / name).exists()] == [], page
+        of_classes = re.findall(r"`([A-Z]\w+Config\.\w+)`", text)
+        assert [name for name in of_classes if f"`{name}`" not in settings] == [], page
 
 
 @pytest.mark.long
