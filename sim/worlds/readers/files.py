@@ -21,9 +21,7 @@ def read_bytes(path: Path) -> bytes:
         if not 0 < size <= FILE_MAX:
             raise WorldError(f"expected a map file of 1 byte to 64 MB, found {size} bytes: choose another file")
         return path.read_bytes()
-    except (OSError, ValueError) as error:
-        if isinstance(error, WorldError):
-            raise
+    except OSError as error:
         raise WorldError(f"expected a readable file, found {shorten(str(error))}: check the path") from None
 
 

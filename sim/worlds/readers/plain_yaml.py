@@ -32,9 +32,9 @@ def plain_mapping(
     try:
         events = yaml.parse(data, Loader=yaml.SafeLoader)
         documents = [_value(events, next(events), 0) for event in events if isinstance(event, yaml.DocumentStartEvent)]
+    except WorldError:
+        raise
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        if isinstance(error, WorldError):
-            raise
         raise WorldError(f"expected {what}, found {shorten(str(error))}: correct the file") from None
     if len(documents) != 1 or not isinstance(documents[0], dict):
         found = shorten(documents[0]) if len(documents) == 1 else f"{len(documents)} documents"

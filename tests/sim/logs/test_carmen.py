@@ -18,10 +18,10 @@ def flaser(x, y=0.0, theta=0.0, time_s=None, ranges=(), beams=180, laser=None):
     return " ".join(map(str, ["FLASER", beams, *values, *laser, x, y, theta, time_s, "robot", time_s]))
 
 
-def robotlaser(x, beams=4, offset=(0.0, 0.0, 0.0), most=8.0, ranges=None):
+def robotlaser(x, beams=4, offset=(0.0, 0.0, 0.0), most=8.0, ranges=None, step=0.2):
     robot = np.array([x, 0.0, 0.0])
     laser = compose(robot, np.array(offset))
-    head = ["ROBOTLASER1", 0, -0.3, 0.6, 0.2, most, 0.01, 0, beams, *(ranges or [1.0] * beams), 2, 7, 7]
+    head = ["ROBOTLASER1", 0, -0.3, 0.6, step, most, 0.01, 0, beams, *(ranges or [1.0] * beams), 2, 7, 7]
     return " ".join(map(str, [*head, *laser, *robot, 0, 0, 0, 0, 0, 100.0 + x, "robot", 0.0]))
 
 
@@ -187,6 +187,10 @@ WRONG = [
     ("ROBOTLASER1 0 0 1 1 8 0 0", "expected a number of beams, found nothing"),
     (robotlaser(9.0).rsplit(" ", 3)[0], "expected 12 numbers in ROBOTLASER1, found 11"),
     (robotlaser(9.0, most=0.0), "expected beams over one turn"),
+    (robotlaser(9.0, step=0.0), "expected beams over one turn"),
+    (robotlaser(9.0, beams=8, step=1.0), "expected beams over one turn"),
+    ("ROBOTLASER1 0 0 1 1 8 0 0 1", "expected a number of beams, found 1"),
+    (f"ROBOTLASER1 0 0 1 1 8 0 0 {10**8}", "expected a number of beams, found 100000000"),
 ]
 
 

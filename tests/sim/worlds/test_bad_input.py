@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import struct
 import zlib
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from sim.worlds import World, WorldError, load
+from sim.worlds.readers import geojson
 
 QUICK = settings(
     max_examples=60, deadline=None, database=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -41,6 +43,21 @@ def _geo(kind: str, coordinates: object) -> str:
 def _feature(**properties: object) -> str:
     square = {"type": "Polygon", "coordinates": [[[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]]}
     return json.dumps({"type": "Feature", "properties": properties, "geometry": square})
+
+
+def _points() -> str:
+    one = {"type": "Point", "coordinates": [1, 1]}
+    points = [{"type": "Feature", "id": f"p{i}", "geometry": one} for i in range(201)]
+    room = {"type": "LineString", "coordinates": [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}
+    return json.dumps({"type": "FeatureCollection", "features": [*points, {"type": "Feature", "geometry": room}]})
+
+
+def _svg(more: str) -> str:
+    return f"<svg {NS}>{ROOM}{more}</svg>"
+
+
+def _map(more: str) -> str:
+    return f"image: b.pgm\nresolution: 0.05\n{more}"
 
 
 def _png(width: int, height: int) -> bytes:
@@ -80,6 +97,13 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "geo ring": ("a.geojson", _geo("Polygon", [[[0, 0], [1, 1]]]), "4 or more"),
     "geo kind": ("a.geojson", _feature(kind="romo"), "of kind room or solid, found 'romo'"),
     "geo kind number": ("a.geojson", _feature(kind=3), "of kind room or solid, found 3"),
+    "geo list": ("a.geojson", '{"type": "FeatureCollection", "features": {}}', "features to hold a list"),
+    "geo no feature": ("a.geojson", '{"type": "FeatureCollection", "features": [3]}', "a GeoJSON object, found 3"),
+    "geo properties": ("a.geojson", '{"type": "Feature", "properties": [1]}', "properties to be an object"),
+    "geo collection": ("a.geojson", '{"type": "GeometryCollection", "geometries": 1}', "geometries to hold a list"),
+    "geo points": ("a.geojson", _points(), "at most 200 named points, found 201"),
+    "plan labels": ("a.json", _plan(labels={str(i): [1, 1] for i in range(201)}), "at most 200 named points"),
+    "svg labels": ("a.svg", _svg("".join(f'<path id="label-{i}" d="M1 1h1"/>' for i in range(201))), "named points"),
     "geo nested": ("a.geojson", '{"type":"Feature","geometry":' * 60 + "null" + "}" * 60, "GeoJSON object"),
     "svg entities": ("a.svg", f"{LAUGHS}<svg {NS}><text>&b;</text>{ROOM}</svg>", "entity"),
     "svg external": ("a.svg", f'<!DOCTYPE s [<!ENTITY x SYSTEM "file:///etc/passwd">]><svg {NS}>&x;</svg>', "entity"),
@@ -99,9 +123,12 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
         "found",
     ),
     "svg no outer wall": ("a.svg", f'<svg {NS}><rect width="2" height="2"/></svg>', "closed wall"),
-    "png text": ("a.png", "hello", "PNG"),
+    "png text": ("a.png", "hello", "found another or a broken one"),
+    "float picture": ("a.pgm", b"Pf\n2 2\n-1.0\n" + bytes(16), "floating point"),
     "png bomb": ("a.png", _png(60_000, 60_000), "megapixels"),
     "png large": ("a.png", _png(8_000, 8_000), "megapixels"),
+    "png thin": ("a.png", _png(1, 50), "2 to 20000 pixels a side"),
+    "png long": ("a.png", _png(2, 20_001), "2 to 20000 pixels a side"),
     "png cut": ("a.png", _png(100, 100), "PNG"),
     "pgm cut": ("a.pgm", b"P5\n100 100\n255\n\0\0", "PNG or PGM"),
     "pgm sizes": ("a.pgm", b"P5\n-5 100\n255\n", "PNG or PGM"),
@@ -123,8 +150,14 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "yaml tag of all": ("a.yaml", "!!omap [a: 1]", "tag"),
     "yaml surrogate": ("a.yaml", 'image: "b\\ud800.pgm"\nresolution: 0.05', "picture"),
     "yaml escape": ("a.yaml", 'image: "\\e[2J.pgm"\nresolution: 0.05', "picture"),
+    "yaml beyond unicode": ("a.yaml", 'image: "\\U00110000"\nresolution: 0.05', "a ROS map YAML"),
     "yaml no character": ("a.yaml", 'image: "\\UFFFFFFFF"\nresolution: 0.05', "YAML"),
     "yaml two": ("a.yaml", "a: 1\n---\na: 1", "2 documents"),
+    "yaml thresholds": ("a.yaml", _map("free_thresh: 0.7"), "free_thresh <= occupied_thresh"),
+    "yaml mode": ("a.yaml", _map("mode: grey"), "mode trinary, scale or raw"),
+    "yaml negate": ("a.yaml", _map("negate: 2"), "negate 0 or 1"),
+    "yaml image number": ("a.yaml", "image: 3\nresolution: 0.05", "name a picture, found 3"),
+    "yaml image empty": ("a.yaml", "image: ''\nresolution: 0.05", "name a picture, found ''"),
     "yaml nan": ("a.yaml", "image: b.pgm\nresolution: .nan", "finite"),
     "yaml digits": ("a.yaml", "image: b.pgm\nresolution: " + "9" * 5000, "finite"),
     "yaml date": ("a.yaml", "image: b.pgm\nresolution: 2001-01-01", "resolution"),
@@ -138,6 +171,7 @@ def _refused(*arguments: object, **keywords: object) -> str:
     text = str(caught.value)
     assert "\n" not in text
     assert text.startswith("expected ")
+    assert not re.search(r"['\"]expected ", text), "a message within another"
     assert "found" in text
     assert len(text) < 400
     return text
@@ -188,6 +222,19 @@ def test_bad_starts_and_scales_are_refused(tmp_path):
     (tmp_path / "a.svg").write_text(f"<svg {NS}>{ROOM}</svg>")
     for scale in (0.0, -1.0, float("nan"), float("inf")):
         assert "scale" in _refused(tmp_path / "a.svg", scale=scale)
+
+
+def test_a_scale_is_refused_where_the_file_has_its_own(tmp_path):
+    (tmp_path / "a.json").write_text(_plan())
+    (tmp_path / "a.yaml").write_text("image: b.pgm\nresolution: 0.05")
+    assert "no scale for JSON" in _refused(tmp_path / "a.json", scale=0.1)
+    assert "no scale for a ROS map" in _refused(tmp_path / "a.yaml", scale=0.1)
+
+
+def test_geojson_of_more_pieces_than_can_be_read_soon_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(geojson, "PIECES_MAX", 4)
+    (tmp_path / "a.geojson").write_text(_geo("LineString", [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]))
+    assert "coordinates to hold a list" in _refused(tmp_path / "a.geojson")
 
 
 def test_a_start_given_by_the_caller_overrides_the_drawing():

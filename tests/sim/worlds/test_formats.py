@@ -69,6 +69,15 @@ def test_geojson_is_told_by_its_content(tmp_path, truth, name):
     assert world.labels == {"B": (3.0, 3.0)}
 
 
+def test_a_collection_of_geometries_is_read_part_by_part(tmp_path, truth):
+    lines = [{"type": "LineString", "coordinates": [[a, b], [c, d]]} for a, b, c, d in WALLS]
+    block = {"type": "Polygon", "coordinates": [[*BLOCK, BLOCK[0]]]}
+    _same(
+        load(_save(tmp_path, "map.geojson", json.dumps({"type": "GeometryCollection", "geometries": [*lines, block]}))),
+        truth,
+    )
+
+
 def test_geojson_in_degrees_is_refused(tmp_path):
     ring = [[7.44, 46.94], [7.441, 46.94], [7.441, 46.941], [7.44, 46.94]]
     with pytest.raises(WorldError, match="longitudes"):
