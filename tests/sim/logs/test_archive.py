@@ -39,6 +39,8 @@ def test_arrays_come_back_as_they_were_in_one_type_and_order(tmp_path):
     path = npz(tmp_path / "a.npz", ranges=ranges, extra=np.array([1 + 2j]), some=np.array([True]), word="naïve")
     found = read_archive(path, LAYOUT, {"some": "bool n", "none": "int", "word": "text"})
     assert found.keys() == {"ranges", "time", "some", "word"}
+    whole = read_archive(npz(tmp_path / "b.npz", none=np.zeros(0, dtype=np.uint8)), {"time": "int s", "none": "int n"})
+    assert {array.dtype for array in whole.values()} == {np.dtype(np.int64)}
     np.testing.assert_array_equal(found["ranges"], ranges)
     assert {found[name].dtype for name in LAYOUT} == {np.dtype(np.float64)}
     assert str(found["word"]) == "naïve"

@@ -5,6 +5,7 @@ import gzip
 import numpy as np
 import pytest
 
+from sim.logs import keyframes
 from sim.logs.keyframes import KeyframesConfig
 from sim.logs.recorded_log import is_own_log, read_recorded_log
 from sim.logs.recorded_robot import RecordingError, recording_of
@@ -201,6 +202,13 @@ def test_a_wrong_line_is_told_with_its_number_and_the_scans_before_it_are_kept(t
     assert found in log.trouble
     assert "\n" not in log.trouble
     assert len(log.recording) == 2
+
+
+def test_a_log_of_more_than_can_be_kept_ends_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(keyframes, "LIMIT_BYTES", 3 * 180 * 8)
+    log = read(tmp_path, [flaser(0.2 * k) for k in range(20)])
+    assert len(log.recording) < 20
+    assert "MiB at most, found more" in log.trouble
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from shapely.errors import GEOSException
 
-from sim.worlds import World, WorldError, load
+from sim.worlds import World, WorldError, load, registry
 from sim.worlds.readers import geojson
 
 QUICK = settings(
@@ -102,7 +103,6 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "geo properties": ("a.geojson", '{"type": "Feature", "properties": [1]}', "properties to be an object"),
     "geo collection": ("a.geojson", '{"type": "GeometryCollection", "geometries": 1}', "geometries to hold a list"),
     "geo points": ("a.geojson", _points(), "at most 200 named points, found 201"),
-    "plan labels": ("a.json", _plan(labels={str(i): [1, 1] for i in range(201)}), "at most 200 named points"),
     "svg labels": ("a.svg", _svg("".join(f'<path id="label-{i}" d="M1 1h1"/>' for i in range(201))), "named points"),
     "geo nested": ("a.geojson", '{"type":"Feature","geometry":' * 60 + "null" + "}" * 60, "GeoJSON object"),
     "svg entities": ("a.svg", f"{LAUGHS}<svg {NS}><text>&b;</text>{ROOM}</svg>", "entity"),
@@ -120,8 +120,16 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "svg nan": (
         "a.svg",
         f'<svg {NS} data-metres-per-unit="1">{ROOM}<path d="M0 0 L1e999 5" stroke="red"/></svg>',
-        "found",
+        "finite coordinates",
     ),
+    **{
+        f"svg view box {box}": ("a.svg", f'<svg {NS} viewBox="{box}">{ROOM}</svg>', 'viewBox="x y width height"')
+        for box in ("nan 0 8 6", "0 inf 8 6", "0 0 0 6", "0 0 inf 6", "0 0 8 -6", "0 0 8 nan")
+    },
+    "svg page": ("a.svg", f'<svg {NS} width="widecm">{ROOM}</svg>', "a length such as 900cm"),
+    "svg path": ("a.svg", _svg('<path transform="rotate(a)" d="M1 1h1" stroke="black"/>'), "one that cannot be read"),
+    "svg heading": ("a.svg", _svg('<path id="start" data-heading-deg="north" d="M1 1h1"/>'), "could not convert"),
+    "svg label nowhere": ("a.svg", _svg('<path id="label-a" d="M1e999 1h1"/>'), "finite coordinates"),
     "svg no outer wall": ("a.svg", f'<svg {NS}><rect width="2" height="2"/></svg>', "closed wall"),
     "png text": ("a.png", "hello", "found another or a broken one"),
     "float picture": ("a.pgm", b"Pf\n2 2\n-1.0\n" + bytes(16), "floating point"),
@@ -229,6 +237,21 @@ def test_a_scale_is_refused_where_the_file_has_its_own(tmp_path):
     (tmp_path / "a.yaml").write_text("image: b.pgm\nresolution: 0.05")
     assert "no scale for JSON" in _refused(tmp_path / "a.json", scale=0.1)
     assert "no scale for a ROS map" in _refused(tmp_path / "a.yaml", scale=0.1)
+
+
+def test_a_picture_of_the_wrong_scale_is_refused(tmp_path):
+    room = np.full((60, 60), 255, dtype=np.uint8)
+    room[[5, 54]] = room[:, [5, 54]] = 0
+    Image.fromarray(room).save(tmp_path / "a.png")
+    assert "1000 m, found 3e+03 m" in _refused(tmp_path / "a.png", scale=50.0)
+
+
+def test_outlines_that_cannot_be_mended_are_told(monkeypatch):
+    def broken(*_: object) -> World:
+        raise GEOSException("TopologyException: found non-noded intersection")
+
+    monkeypatch.setattr(registry, "build", broken)
+    assert "outlines that can be mended" in _refused("hall")
 
 
 def test_geojson_of_more_pieces_than_can_be_read_soon_is_refused(tmp_path, monkeypatch):

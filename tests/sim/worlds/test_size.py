@@ -1,12 +1,13 @@
 """However large the input, the answer is a world or one line, soon and without filling the memory."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from sim.worlds import WorldError, load
+from sim.worlds import WorldError, limits, load
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" data-metres-per-unit="1">'
 ROOM = '<rect width="90" height="90" fill="none" stroke="black"/>'
@@ -59,6 +60,24 @@ def test_what_is_too_large_is_told_in_one_line(tmp_path, case):
         load(tmp_path / name)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert "'expected" not in str(caught.value)
+
+
+ROUND = [[0, 0, 9, 0], [9, 0, 9, 9], [9, 9, 0, 9], [0, 9, 0, 0]]
+CROSSED = [[0, 4 + 0.01 * k, 9, 5 - 0.01 * k] for k in range(12)]
+"""Each crosses each: only the pieces between the crossings lie side by side."""
+ZIGZAG = [(0.2 * k, 4.0 + 0.05 * (k % 2)) for k in range(46)]
+SLIT = [[*a, *b] for up in (0.0, 0.11) for a, b in pairwise([(x, y + up) for x, y in ZIGZAG])]
+"""Two walls as far apart that a slit of a centimetre is left between them."""
+
+
+@pytest.mark.parametrize("walls", [CROSSED, SLIT], ids=["crossed", "slit"])
+def test_pieces_that_come_of_a_drawing_are_counted_like_those_in_it(tmp_path, monkeypatch, walls):
+    (tmp_path / "a.json").write_text(json.dumps({"walls": ROUND + walls}))
+    load(tmp_path / "a.json")
+    monkeypatch.setattr(limits, "CLOSE_MAX", 30)
+    with pytest.raises(WorldError, match="more than 30 pairs nearer than"):
+        load(tmp_path / "a.json")
 
 
 def storey(rooms: int) -> dict[str, object]:

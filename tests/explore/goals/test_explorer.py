@@ -1,0 +1,319 @@
+"""What the explorer makes of a goal: begun, dropped, walked to, given up, tried again; its errands follow a script."""
+
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from explore.following.wall_following import Errand, FollowingConfig
+from explore.goals import explorer as module
+from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.outcome import Outcome
+from explore.strategies import Choice, Place
+from slam.map.chains import Chain, OpenEnd
+from slam.robot import MotionCommand
+
+ON = MotionCommand(0.1, 0.0)
+NO_SWEEP = replace(ExplorerConfig(), sweep=False)
+
+
+class Scripted(Errand):
+    """An errand that goes on until its steps are used up; what it was made of and told is kept."""
+
+    made: list["Scripted"]
+    steps = 0
+    looks_done = 0
+    trouble = "a cupboard"
+    walls_to_follow = None
+
+    def _plan(self, around):
+        raise NotImplementedError
+
+    def __init__(self, *given):
+        self.given, self.told, self.doing = given, [], "on its way"
+        self.end = given[0]
+        self.made.append(self)
+
+    def command(self, around):
+        self.steps -= 1
+        return ON if self.steps >= 0 else None
+
+    def follow(self, end):
+        self.told.append(end)
+
+    def interrupt(self, around):
+        self.told.append("interrupted")
+
+
+class First:
+    """Goes to the first open end there is, as long as `holds` says so."""
+
+    holding = True
+
+    def choose(self, situation):
+        self.situation = situation
+        ends = situation.open_ends
+        return Choice(ends[0], "the first", lambda around: self.holding) if ends else None
+
+
+@pytest.fixture
+def scripted(monkeypatch):
+    """The three kinds of errand, each a script."""
+    made = []
+    kinds = {name: type(name, (Scripted,), {"made": made}) for name in ("EndErrand", "PlaceErrand", "WallErrand")}
+    for name, kind in kinds.items():
+        monkeypatch.setattr(module, name, kind)
+    return kinds, made
+
+
+@pytest.fixture
+def scene(scene_of):
+    return scene_of(3)
+
+
+def explorer_at(scene, strategy=None, config=NO_SWEEP):
+    return Explorer(strategy or First(), scene.places[0], config)
+
+
+def around_of(scene):
+    return scene.situation(np.append(scene.places[0], 0.0), []).around
+
+
+def ends_at(*places, wall=0):
+    """Open ends of walls 0, 1, ... at some places."""
+    return [OpenEnd(wall + k, 1, np.array(place, dtype=float)) for k, place in enumerate(places)]
+
+
+def ask(explorer, scene, ends, graph=None):
+    chains = tuple(Chain((end.wall,), np.zeros((0, 2)), (end,)) for end in ends)
+    return explorer.decide(around_of(scene), chains, graph or nx.DiGraph())
+
+
+def names(made):
+    return [type(errand).__name__ for errand in made]
+
+
+def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scripted, scene, monkeypatch):
+    kinds, made = scripted
+    kinds["EndErrand"].steps = 5
+    monkeypatch.setattr(module, "route", lambda graph, current, wall: (7, wall))
+    strategy = First()
+    explorer = explorer_at(scene, strategy)
+    (end,) = ends_at((1, 2), wall=4)
+    decision = ask(explorer, scene, [end])
+    assert decision.command is ON
+    assert decision.words == "on its way (the first)"
+    assert decision.outcome is None
+    goal = decision.goal
+    assert (goal.kind, goal.wall, goal.side, goal.reason) == ("open-end", 4, 1, "the first")
+    np.testing.assert_array_equal(goal.position_world, [1, 2])
+    assert made[0].given == (end, (7, 4), FollowingConfig())
+    assert decision.walls_to_follow == (7, 4)
+    made[0].walls_to_follow = (9,)
+    assert ask(explorer, scene, [end]).walls_to_follow == (9,)
+    assert strategy.situation.step == 0
+    np.testing.assert_array_equal(strategy.situation.start_world, scene.places[0])
+    assert len(made) == 1, "one errand for one goal"
+
+
+@pytest.mark.parametrize("looks", [1, 3])
+def test_an_end_that_is_open_after_its_views_is_set_aside_and_the_next_one_is_the_goal(scripted, scene, looks):
+    kinds, made = scripted
+    kinds["EndErrand"].looks_done = looks
+    ends = ends_at((1, 2), (4, 4))
+    decision = ask(explorer_at(scene), scene, ends)
+    assert [(end.wall, end.reason) for end in decision.given_up.ends] == [
+        (0, f"still open after {looks} views"), (1, f"still open after {looks} views"),
+    ]  # fmt: skip
+    assert names(made) == ["EndErrand", "EndErrand"]
+
+
+def test_an_end_that_nothing_was_seen_of_is_walked_to_once_and_looked_at_again(scripted, scene):
+    kinds, made = scripted
+    kinds["WallErrand"].steps = 1
+    explorer = explorer_at(scene)
+    ends = ends_at((1, 2), wall=3)
+    decision = ask(explorer, scene, ends)
+    assert decision.command is ON
+    assert not decision.given_up.ends
+    assert names(made) == ["EndErrand", "WallErrand"]
+    assert made[1].given == (3, 1, FollowingConfig())
+    decision = ask(explorer, scene, ends)
+    assert names(made) == ["EndErrand", "WallErrand", "EndErrand"]
+    assert made[2].given[1] == (3,)
+    assert [end.reason for end in decision.given_up.ends] == ["a cupboard"]
+
+
+def test_a_goal_goes_with_its_end_its_reason_or_its_strategy(scripted, scene):
+    kinds, made = scripted
+    kinds["EndErrand"].steps = 99
+    strategy = First()
+    explorer = explorer_at(scene, strategy)
+    first, second = ends_at((1, 2), (4, 4))
+    ask(explorer, scene, [first, second])
+    assert ask(explorer, scene, [second]).goal.wall == 1
+    strategy.holding = False
+    assert len(made) == 2
+    ask(explorer, scene, [second])
+    assert len(made) == 3
+    strategy.holding = True
+    explorer.strategy = First()
+    ask(explorer, scene, [second])
+    assert len(made) == 4
+    ask(explorer, scene, [second])
+    assert len(made) == 4
+
+
+def test_an_errand_hears_where_its_end_is_now_and_what_stands_in_its_way(scripted, scene):
+    kinds, made = scripted
+    kinds["EndErrand"].steps = 99
+    explorer = explorer_at(scene)
+    explorer.interrupt(around_of(scene))
+    (end,) = ends_at((1, 2))
+    ask(explorer, scene, [end])
+    moved = replace(end, position_world=np.array([1.1, 2.0]))
+    ask(explorer, scene, [moved])
+    explorer.interrupt(around_of(scene))
+    assert made[0].told == [moved, "interrupted"]
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_an_end_that_comes_and_goes_is_set_aside_in_the_end(scripted, scene, times):
+    kinds, _ = scripted
+    kinds["EndErrand"].steps = 99
+    explorer = explorer_at(scene, config=replace(NO_SWEEP, returns=times))
+    ends = ends_at((1, 2))
+    for _ in range(times):
+        assert not ask(explorer, scene, ends).given_up.ends
+        ask(explorer, scene, [])
+    aside = ask(explorer, scene, ends).given_up.ends
+    assert [end.reason for end in aside] == [f"open again after it was gone {times} times"]
+
+
+@pytest.mark.parametrize(("shift_m", "again"), [(0.19, False), (0.21, True)])
+def test_an_end_set_aside_is_tried_again_where_it_has_moved(scripted, scene, shift_m, again):
+    kinds, made = scripted
+    kinds["EndErrand"].looks_done = 1
+    explorer = explorer_at(scene)
+    (end,) = ends_at((1, 2))
+    ask(explorer, scene, [end])
+    ask(explorer, scene, [])
+    assert len(made) == 1
+    ask(explorer, scene, [replace(end, position_world=end.position_world + np.array([0.0, shift_m]))])
+    assert len(made) == 1 + again
+
+
+@pytest.mark.parametrize(("cells", "again"), [(109, False), (111, True)])
+def test_an_end_that_could_not_be_looked_at_is_tried_again_where_the_floor_has_become_known(
+    scripted, scene, monkeypatch, cells, again
+):
+    _, made = scripted
+    known = [100]
+    monkeypatch.setattr(module, "known_floor", lambda *_: known[0])
+    explorer = explorer_at(scene)
+    ends = ends_at((1, 2))
+    ask(explorer, scene, ends)
+    tried = len(made)
+    ask(explorer, scene, ends)
+    assert len(made) == tried
+    known[0] = cells
+    ask(explorer, scene, ends)
+    assert (len(made) > tried) == again
+
+
+def test_what_lies_beyond_the_fence_is_set_aside_without_a_look(scripted, scene):
+    kinds, made = scripted
+    kinds["EndErrand"].steps = 99
+    fence = ((0.0, 0.0), (3.0, 0.0), (3.0, 6.0), (0.0, 6.0))
+    fenced = replace(scene, grid=FreeSpace(FreeSpaceConfig(fence=fence)))
+    decision = ask(explorer_at(fenced), fenced, ends_at((5, 2), (2, 2)))
+    assert decision.goal.wall == 1
+    assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "beyond the fence")]
+    assert len(made) == 1
+
+
+@pytest.mark.parametrize("aside", [0, 2])
+def test_the_end_says_how_many_ends_cannot_be_closed(scripted, scene, aside):
+    kinds, _ = scripted
+    kinds["EndErrand"].looks_done = 1
+    explorer = explorer_at(scene)
+    ends = ends_at((1, 2), (4, 4))[:aside]
+    decisions = [ask(explorer, scene, ends) for _ in range(3)]
+    # A scan more, since chains may join where ends were given up just now.
+    assert [decision.command is None for decision in decisions] == [not aside, True, True]
+    assert decisions[-1].outcome is (Outcome.ENDS_LEFT if aside else Outcome.ALL_CLOSED)
+    words = "no reachable open end is left; 2 cannot be closed" if aside else "every chain is closed"
+    assert decisions[-1].words == words
+
+
+class Undecided:
+    """Knows nowhere to go."""
+
+    def choose(self, situation):
+        return None
+
+
+def test_without_a_choice_the_robot_goes_straight_to_the_nearest_end(scripted, scene):
+    kinds, _ = scripted
+    kinds["EndErrand"].steps = 99
+    here = scene.places[0]
+    decision = ask(explorer_at(scene, Undecided()), scene, ends_at(here + 2.0, here + 0.5, here - 1.0))
+    assert decision.goal.wall == 1
+    assert "nearest" in decision.goal.reason
+
+
+class Swept:
+    """A sweep that always has the same place."""
+
+    place = Place(np.array([[1.0, 1.0], [1.0, 2.0]]), "unseen floor")
+
+    def __init__(self):
+        self.left = []
+
+    def choose(self, situation):
+        return Choice(self.place, "unseen floor is left") if not self.left else None
+
+    def ended(self, place, trouble):
+        self.left.append((place, trouble))
+
+    def was_in_vain(self, place):
+        return False
+
+
+@pytest.mark.parametrize("patience", [2, 9])
+def test_a_place_is_gone_to_when_no_end_is_left_and_what_came_of_it_is_kept(scripted, scene, patience):
+    kinds, made = scripted
+    kinds["PlaceErrand"].steps = 4
+    explorer = explorer_at(scene, config=replace(NO_SWEEP, patience_m=0.15 * patience))
+    sweep = explorer._sweep = Swept()
+    decision = ask(explorer, scene, [])
+    assert (decision.goal.kind, decision.goal.wall, decision.goal.side) == ("unseen", None, None)
+    np.testing.assert_array_equal(decision.goal.position_world, [1.0, 1.5])
+    assert decision.walls_to_follow == ()
+    assert made[0].given[1:] == ("to where unseen floor", FollowingConfig())
+    for _ in range(4):
+        ask(explorer, scene, [])
+    assert sweep.left == [(Swept.place, f"not reached in {patience} steps" if patience < 4 else "a cupboard")]
+
+
+def test_a_sweep_is_dropped_as_soon_as_there_is_an_end(scripted, scene):
+    kinds, made = scripted
+    kinds["PlaceErrand"].steps = kinds["EndErrand"].steps = 99
+    explorer = explorer_at(scene)
+    explorer._sweep = Swept()
+    ask(explorer, scene, [])
+    assert ask(explorer, scene, ends_at((1, 2))).goal.kind == "open-end"
+    assert names(made) == ["PlaceErrand", "EndErrand"]
+
+
+def test_starting_over_forgets_the_goal_and_what_was_given_up(scripted, scene):
+    kinds, made = scripted
+    kinds["EndErrand"].looks_done = 1
+    explorer = explorer_at(scene)
+    ends = ends_at((1, 2))
+    assert ask(explorer, scene, ends).given_up.ends
+    explorer.start_over()
+    ask(explorer, scene, ends)
+    assert names(made) == ["EndErrand", "EndErrand"]
