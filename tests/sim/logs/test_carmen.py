@@ -170,6 +170,22 @@ def test_of_a_gzip_file_that_was_cut_short_the_whole_lines_are_kept(tmp_path):
         read_recorded_log(packed)
 
 
+@pytest.mark.parametrize("place", [30, -6], ids=["in the middle", "in the sum at its end"])
+def test_a_gzip_file_with_other_bytes_is_told(tmp_path, place):
+    rng = np.random.default_rng(0)
+    content = bytearray(
+        gzip.compress("".join(flaser(0.2 * k, ranges=rng.uniform(1, 9, 180)) + "\n" for k in range(9)).encode())
+    )
+    content[place] ^= 0xFF
+    packed = tmp_path / "b.log.gz"
+    packed.write_bytes(content)
+    try:
+        told = read_recorded_log(packed).trouble
+    except RecordingError as error:
+        told = str(error)
+    assert "found it cut short" in told
+
+
 WRONG = [
     (flaser(9.0, beams=90), "expected 180, 181, 360, 361 beams, found 90"),
     (flaser(9.0, beams=181), "expected 180 beams as before, found 181"),

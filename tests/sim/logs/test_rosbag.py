@@ -10,6 +10,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from sim.logs import rosbag
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordingError
 from slam.geometry.poses import compose, inverse
@@ -178,7 +179,9 @@ def test_without_a_mounting_the_scanner_sits_in_the_middle(tmp_path):
 def test_a_bag_without_such_topics_lists_those_that_there_are(tmp_path, kind):
     with Bag(named(tmp_path, kind), kind) as bag:
         bag.scan(1.0, topic="/front")
-    with pytest.raises(RecordingError, match=r"the bag has /front \(sensor_msgs/msg/LaserScan\)"):
+    with pytest.raises(
+        RecordingError, match=r"expected a topic of LaserScan.* the bag has /front \(sensor_msgs/msg/LaserScan\)"
+    ):
         read_recorded_log(named(tmp_path, kind))
     with Bag(named(tmp_path, kind, "b"), kind) as bag:
         bag.odometry(1.0, (0, 0, 0), topic="/wheels")
@@ -211,6 +214,39 @@ def said_of(path):
         return f"{len(read_recorded_log(path).scan_time_s)} scans"
     except RecordingError as error:
         return str(error)
+
+
+WRONG_SCANS = {
+    "no step": ({"step": 0.0}, "expected beams, found 5 of them 0 rad apart"),
+    "endless step": ({"step": np.inf}, "expected beams, found 5 of them inf rad apart"),
+    "begins nowhere": ({"low": np.nan}, "expected beams, found 5 of them"),
+    "no range": ({"most": 0.0}, "expected the scanner's maximum range, found 0 m"),
+    "endless range": ({"most": np.inf}, "expected the scanner's maximum range, found inf m"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_SCANS)
+def test_a_scan_that_is_none_is_told_with_its_time(tmp_path, case):
+    changes, words = WRONG_SCANS[case]
+    told = said_of(recorded(tmp_path / "a.bag", "ros1", **changes))
+    assert f"scan at 10.000000 s: {words}" in told
+
+
+def test_a_pose_that_is_nowhere_is_told(tmp_path):
+    with Bag(tmp_path / "a.bag", "ros1") as bag:
+        bag.odometry(1.0, (np.nan, 0.0, 0.0))
+        bag.scan(1.0)
+    assert "expected a finite pose in the bag" in said_of(tmp_path / "a.bag")
+
+
+def test_a_bag_that_cannot_be_opened_is_no_damaged_one(tmp_path, monkeypatch):
+    path = recorded(tmp_path / "a.bag", "ros1")
+
+    def refused(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(rosbag, "_scans", refused)
+    assert said_of(path) == "expected a recorded log, found a.bag (Permission denied): name a log that exists"
 
 
 def test_scans_that_tell_no_beams_end_the_log_and_those_before_are_kept(tmp_path):

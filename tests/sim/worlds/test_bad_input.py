@@ -130,6 +130,11 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "svg path": ("a.svg", _svg('<path transform="rotate(a)" d="M1 1h1" stroke="black"/>'), "one that cannot be read"),
     "svg heading": ("a.svg", _svg('<path id="start" data-heading-deg="north" d="M1 1h1"/>'), "could not convert"),
     "svg label nowhere": ("a.svg", _svg('<path id="label-a" d="M1e999 1h1"/>'), "finite coordinates"),
+    "svg far": (
+        "a.svg",
+        f'<svg {NS} data-metres-per-unit="1">{ROOM}<path d="M0 0 L1e9 5" stroke="red"/></svg>',
+        "from the origin",
+    ),
     "svg no outer wall": ("a.svg", f'<svg {NS}><rect width="2" height="2"/></svg>', "closed wall"),
     "png text": ("a.png", "hello", "found another or a broken one"),
     "float picture": ("a.pgm", b"Pf\n2 2\n-1.0\n" + bytes(16), "floating point"),
@@ -218,9 +223,9 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path):
 
 
 def test_pictures_without_walls_or_without_room_are_refused(tmp_path):
-    for grey in (0, 255):
+    for grey, words in ((0, "found only dark or unknown pixels"), (255, "found no dark line")):
         Image.fromarray(np.full((100, 100), grey, dtype=np.uint8)).save(tmp_path / "flat.png")
-        _refused(tmp_path / "flat.png")
+        assert words in _refused(tmp_path / "flat.png")
 
 
 def test_bad_starts_and_scales_are_refused(tmp_path):

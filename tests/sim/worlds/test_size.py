@@ -31,6 +31,11 @@ LARGE = {
     "transform": ("a.svg", f'{SVG}<g transform="{"rotate(1 " * 9000}">{ROOM}</g></svg>', "10000 characters"),
     "polygon": ("a.svg", f'{SVG}{ROOM}<polygon points="{"1 2 3 1 " * 20_000}"/></svg>', "straight pieces"),
     "walls": ("a.json", json.dumps({"walls": [[0, 0, 9, 0]] * 100_000}), "straight pieces"),
+    "walls without length": (
+        "a.json",
+        json.dumps({"walls": [[0, 0, 9, 0], *[[1, 1, 1, 1]] * 20_000]}),
+        "straight pieces",
+    ),
     "crossing walls": ("a.json", json.dumps({"walls": CROSSING}), "meet"),
     "ring": (
         "a.geojson",
