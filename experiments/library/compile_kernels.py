@@ -1,6 +1,6 @@
 """Compile the loops that steps run ahead of the first run: `make setup` does so.
 
-`python -m experiments.library.compile_kernels` drives a short run and replays it with scan matching, and keeps neither.
+`python -m experiments.library.compile_kernels` drives two runs and replays one with scan matching, and keeps none.
 """
 
 import sys
@@ -15,8 +15,8 @@ from explore.floor.carrying_kernels import carried
 
 from ..commands.cli import main
 
-STEPS = "200"
-"""Of `paper-fig9`: its walls meet, close and are merged by then."""
+RUNS = ("paper-fig9", "rooms --seed 2 --backend invariant-ekf")
+"""To their ends: in the first walls meet, close and are merged, in the second walls turn out to be none."""
 
 
 def compile_kernels() -> int:
@@ -24,9 +24,9 @@ def compile_kernels() -> int:
     # No grid is drawn anew in so short a run.
     carried(np.zeros((1, 3)), np.ones(1), np.zeros(1), np.zeros((1, 2, 2)), np.zeros((1, 2)), 0.01)
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()):
-        run, replayed = Path(folder) / "run", Path(folder) / "replayed"
-        status = main(["explore", "paper-fig9", "--max-steps", STEPS, "--out", str(run)])
-        log = str(run / "log.npz")
+        driven, replayed = (Path(folder) / name for name in ("driven", "replayed"))
+        status = max(main(["explore", *run.split(), "--out", f"{driven}{i}"]) for i, run in enumerate(RUNS))
+        log = f"{driven}0/log.npz"
         return status or main(
             ["replay", log, "--backend", "graph", "invariant-ekf", "--odometry", "scans", "--out", str(replayed)]
         )

@@ -81,7 +81,7 @@ class Kernel(Generic[_P, _R]):
         return file_of(cache() / _fingerprint(self.plain), self.plain)
 
     def machine(self) -> Callable[_P, _R]:
-        """Return the function as numba compiles it at a call; what it calls in its module is the same from then on."""
+        """Return the function as numba compiles it at a call."""
         if self._machine is None:
             from numba import config, njit
 
@@ -92,9 +92,7 @@ class Kernel(Generic[_P, _R]):
             self._machine = njit(cache=True, error_model="numpy")(self.plain)
             if not config.DISABLE_JIT:  # type: ignore[attr-defined]
                 self._machine._cache = remembering(self.plain)  # type: ignore[attr-defined]
-            for name, value in _globals(self.plain):
-                if isinstance(value, Kernel):
-                    self.plain.__globals__[name] = value.machine()
+            _let_numba_call_kernels()
         assert self._machine is not None
         return self._machine
 
@@ -103,6 +101,15 @@ def link_kernels() -> None:
     """Link what earlier processes kept of all kernels imported so far, so that the time of no step counts it."""
     for kernel in _KERNELS:
         kernel.link()
+
+
+@lru_cache
+def _let_numba_call_kernels() -> None:
+    """Let numba take a kernel that another one calls for what it makes of it."""
+    from numba import types
+    from numba.extending import typeof_impl
+
+    typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.machine()))
 
 
 @lru_cache
@@ -157,8 +164,7 @@ def _fingerprint(function: Callable[..., object]) -> str:
                 told.update(f"{name}={value!r};".encode())
             if isinstance(value, type) and issubclass(value, tuple):
                 told.update(f"{name}{getattr(value, '_fields', ())};".encode())
-            called = value.plain if isinstance(value, Kernel) else getattr(value, "py_func", None)
-            if called is not None and called.__module__ != module:
-                told.update(_fingerprint(called).encode())
+            if isinstance(value, Kernel) and value.plain.__module__ != module:
+                told.update(_fingerprint(value.plain).encode())
         _FINGERPRINTS[module] = f"{module}-{told.hexdigest()}"
     return _FINGERPRINTS[module]

@@ -26,7 +26,7 @@ def test_once_compiled_no_run_compiles_again_and_every_file_of_kernels_was_calle
     # Only logs of real robots are looked at again.
     assert {name for name in every if "second_looks" not in name} == kept
     out = tmp_path / "run"
-    words = f"explore rooms --seed 2 --max-steps 60 --out {out}".split()
+    words = f"explore hall --max-steps 400 --out {out}".split()
     told = run("experiments.commands.cli", *words, options=("-X", "importtime"))
     assert "compiling" not in told
     assert "llvmlite" in told
