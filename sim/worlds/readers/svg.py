@@ -83,7 +83,7 @@ def _parse(data: bytes) -> Element:
         raise WorldError("expected an SVG file without entity declarations, found some: save it as plain SVG") from None
     except Exception as error:
         raise WorldError(f"expected an SVG file, found broken XML ({shorten(str(error))}): save it again") from None
-    if not isinstance(root.tag, str) or root.tag.rpartition("}")[2] != "svg":
+    if root.tag.rpartition("}")[2] != "svg":
         raise WorldError(f"expected an <svg> element, found <{shorten(root.tag)}>: choose an SVG file")
     _check_words(root)
     if _copies(root) > SHAPES:

@@ -55,7 +55,10 @@ class First:
     def choose(self, situation):
         self.situation = situation
         ends = situation.open_ends
-        return Choice(ends[0], "the first", lambda around: self.holding) if ends else None
+        return Choice(ends[0], "the first", self._holds) if ends else None
+
+    def _holds(self, around):
+        return self.holding and around.walls is not None
 
 
 @pytest.fixture
@@ -114,6 +117,10 @@ def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scri
     made[0].walls_to_follow = (9,)
     assert ask(explorer, scene, [end]).walls_to_follow == (9,)
     assert strategy.situation.step == 0
+    assert [chain.walls for chain in strategy.situation.chains] == [(4,)]
+    assert [chain.open_ends for chain in strategy.situation.chains] == [(end,)]
+    assert strategy.situation.following == FollowingConfig()
+    assert not strategy.situation.was_in_vain(np.zeros(2))
     np.testing.assert_array_equal(strategy.situation.start_world, scene.places[0])
     assert len(made) == 1, "one errand for one goal"
 
@@ -261,7 +268,7 @@ def test_without_a_choice_the_robot_goes_straight_to_the_nearest_end(scripted, s
     here = scene.places[0]
     decision = ask(explorer_at(scene, Undecided()), scene, ends_at(here + 2.0, here + 0.5, here - 1.0))
     assert decision.goal.wall == 1
-    assert "nearest" in decision.goal.reason
+    assert decision.goal.reason == "no way to stand before any open end is known; nearest"
 
 
 class Swept:
@@ -306,6 +313,41 @@ def test_a_sweep_is_dropped_as_soon_as_there_is_an_end(scripted, scene):
     ask(explorer, scene, [])
     assert ask(explorer, scene, ends_at((1, 2))).goal.kind == "open-end"
     assert names(made) == ["PlaceErrand", "EndErrand"]
+
+
+@pytest.mark.parametrize("sweep", [True, False])
+def test_unseen_floor_is_visited_if_it_is_to_be_and_the_trouble_there_is_told(scripted, scene_of, sweep):
+    kinds, _ = scripted
+    kinds["PlaceErrand"].steps = 1
+    scene = scene_of(3, looks=1)
+    explorer = explorer_at(scene, config=replace(NO_SWEEP, sweep=sweep))
+    decision = ask(explorer, scene, [])
+    assert (decision.goal is not None) == sweep
+    if sweep:
+        assert decision.goal.kind == "unseen"
+        left = ask(explorer, scene, []).given_up
+        assert left.troubles_at(decision.goal.position_world)[0] == "a cupboard"
+
+
+class Watcher(First):
+    """Looks at every step."""
+
+    def __init__(self):
+        self.seen = []
+
+    def watch(self, around):
+        self.seen.append(around)
+
+
+def test_a_strategy_that_watches_is_shown_every_step(scripted, scene):
+    kinds, _ = scripted
+    kinds["EndErrand"].steps = 99
+    watcher = Watcher()
+    explorer = explorer_at(scene, watcher)
+    for _ in range(3):
+        ask(explorer, scene, ends_at((1, 2)))
+    assert len(watcher.seen) == 3
+    assert all(around.walls is not None for around in watcher.seen)
 
 
 def test_starting_over_forgets_the_goal_and_what_was_given_up(scripted, scene):

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
 from sim.worlds import WorldError, limits, load
@@ -30,6 +31,11 @@ LARGE = {
     "style sheet": ("a.svg", f"{SVG}{ROOM}<style>{'a' * 100_000}</style></svg>", "10000 characters"),
     "transform": ("a.svg", f'{SVG}<g transform="{"rotate(1 " * 9000}">{ROOM}</g></svg>', "10000 characters"),
     "polygon": ("a.svg", f'{SVG}{ROOM}<polygon points="{"1 2 3 1 " * 20_000}"/></svg>', "straight pieces"),
+    "decoration": (
+        "a.svg",
+        f'{SVG}{ROOM}<polygon fill="none" stroke="#eee" points="{"1 2 3 1 " * 10_500}"/></svg>',
+        "straight pieces",
+    ),
     "walls": ("a.json", json.dumps({"walls": [[0, 0, 9, 0]] * 100_000}), "straight pieces"),
     "walls without length": (
         "a.json",
@@ -83,6 +89,20 @@ def test_pieces_that_come_of_a_drawing_are_counted_like_those_in_it(tmp_path, mo
     monkeypatch.setattr(limits, "CLOSE_MAX", 30)
     with pytest.raises(WorldError, match="more than 30 pairs nearer than"):
         load(tmp_path / "a.json")
+
+
+def test_lines_side_by_side_are_told_before_they_are_put_together(monkeypatch):
+    monkeypatch.setattr(limits, "CLOSE_MAX", 5)
+    lines = [shapely.LineString([(0, 0.05 * k), (9, 0.05 * k)]) for k in range(4)]
+    with pytest.raises(WorldError, match="more than 5 pairs nearer than"):
+        limits.check_size(lines, ())
+
+
+def test_a_drawing_that_is_far_too_small_is_told_by_its_size_and_not_by_how_near_its_walls_are(monkeypatch):
+    monkeypatch.setattr(limits, "CLOSE_MAX", 5)
+    lines = [shapely.LineString([(0, 0.005 * k), (0.09, 0.005 * k)]) for k in range(9)]
+    with pytest.raises(WorldError, match="a building of 1 to 1000 m"):
+        limits.check_size(lines, ())
 
 
 def storey(rooms: int) -> dict[str, object]:
