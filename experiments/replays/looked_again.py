@@ -64,6 +64,6 @@ def _mapped(result: TrialResult, last: Step, survey: Survey) -> TrialResult:
         last=step,
         joint=survey.joint,
         certificate=certificate,
-        smoothed=Smoothed(survey.poses, walls, survey.joint),
+        smoothed=Smoothed(survey.poses, walls, survey.joint, survey.pair_covs),
         summary=result.summary | {"certificate": certificate_record(certificate), "second_looks": told},
     )

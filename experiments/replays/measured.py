@@ -21,7 +21,7 @@ def held_against(result: TrialResult, references: References) -> TrialResult:
 
     `relations` and `reference` are of the path available at each step, `*_smoothed` of the smoothed one. `*_normalised`
     are errors in units of what is stated: of the path available at each step against the reference, and of relations
-    by the joint covariance of two poses, where a back end keeps all poses.
+    by the joint covariance of two poses, where a back end keeps all poses or second looks were taken.
     """
     log, smoothed = result.log, result.smoothed
     if log is None or (references.relations is None and references.path is None):
@@ -47,6 +47,10 @@ def _normalised(result: TrialResult, log: Log, references: References) -> dict[s
             scores["relations_normalised"] = normalised_relations(references.relations, time_s, poses, pair_covs)
         except FAULTS:
             scores["relations_normalised"] = None
+    smoothed = result.smoothed
+    if references.relations is not None and smoothed is not None and smoothed.pair_covs is not None:
+        told = normalised_relations(references.relations, time_s, smoothed.poses_world, smoothed.pair_covs)
+        scores["relations_smoothed_normalised"] = told
     return scores
 
 

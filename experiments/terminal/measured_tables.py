@@ -30,7 +30,11 @@ _KINDS = {"translation_m": ("translation, m", 1.0), "rotation_rad": ("rotation, 
 _TIMES = {"at_scans": "at scans", "interpolated": "interpolated"}
 
 
-_NORMALISED = {"relations_normalised": "relations", "reference_normalised": "each step's pose, by the reference"}
+_NORMALISED = {
+    "relations_normalised": "relations",
+    "relations_smoothed_normalised": "relations, smoothed",
+    "reference_normalised": "each step's pose, by the reference",
+}
 _PARTS = {"all": "", "far": ", 60 s apart"}
 
 

@@ -61,3 +61,15 @@ def arc(forward_m: float, turn_rad: float) -> Float[np.ndarray, "3"]:
     half = 0.5 * turn_rad
     chord = forward_m * np.sinc(half / np.pi)
     return np.array([chord * np.cos(half), chord * np.sin(half), turn_rad])
+
+
+def body_pair_covs(
+    first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"], covs: Float[np.ndarray, "m 6 6"]
+) -> Float[np.ndarray, "m 6 6"]:
+    """Return covariances of two poses' errors together, world frame, with each pose's error in its own frame."""
+    turn = np.zeros((len(covs), 6, 6))
+    for at, poses in ((0, first), (3, second)):
+        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        turn[:, at, at], turn[:, at, at + 1], turn[:, at + 1, at], turn[:, at + 1, at + 1] = c, s, -s, c
+        turn[:, at + 2, at + 2] = 1.0
+    return np.asarray(turn @ covs @ turn.swapaxes(1, 2))

@@ -5,20 +5,18 @@ Matching uses each scan to tell the motion, and the map uses it again. Both driv
 .venv/bin/python -m studies.logs.matched_drives --seeds 20     # goes on where it was interrupted
 """
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import tyro
 from rich.table import Table
 
 from experiments.scenario import OdometrySource, TrialConfig, check
 from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
-from experiments.usage import UsageError
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
 NAMES = ("world", "backend", "odometry", "seed")
@@ -99,15 +97,5 @@ def _cells(rows: Sequence[Row]) -> list[str]:
     ]  # fmt: skip
 
 
-def main() -> int:
-    """Run the command and return its exit status."""
-    try:
-        tyro.cli(MatchedStudy).run()
-    except UsageError as error:
-        print(f"matched drives: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(MatchedStudy)

@@ -74,7 +74,8 @@ def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
     ms = 1e3 * (time.process_time() - began) / max(len(run.log.recording), 1)
     kept = ("status", "reason", "steps", "lines", "lines_crooked", "duplicate_lines", "chains_closed", "path_length_m")
     told: dict[str, Any] = {key: result.summary[key] for key in kept}
-    for key in (f"{kind}{tail}" for kind in ("relations", "reference") for tail in ("", "_smoothed", "_normalised")):
+    tails = ("", "_smoothed", "_normalised", "_smoothed_normalised")
+    for key in (f"{kind}{tail}" for kind in ("relations", "reference") for tail in tails):
         if key in result.summary:
             told[key] = result.summary[key]
     of = {"log": name, "backend": backend, "odometry": study.odometry, "every": study.every}

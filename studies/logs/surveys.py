@@ -6,7 +6,6 @@ bow: every metre or so a corner that is off the line. What the sightings of one 
 .venv/bin/python -m studies.logs.surveys --seeds 10     # goes on where it was interrupted
 """
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,8 +14,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-import tyro
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from rich.table import Table
 
 from experiments.artifacts.settings import record_of, trial_of
@@ -28,12 +26,13 @@ from experiments.scoring.without_truth.normalised import normalised_path, normal
 from experiments.scoring.without_truth.references import References
 from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
-from experiments.usage import UsageError
 from sim.worlds import World
 from slam.association.second_looks.second_looks import Survey
+from slam.association.second_looks.walls import inverse_at
 from slam.evaluation.relations import Relations, between
 from slam.geometry.poses import rotation
 
+from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
 NAMES = ("world", "bow_m", "seed")
@@ -109,12 +108,10 @@ def _bowed(ring: Float[np.ndarray, "n 2"], bow_m: float, chance: np.random.Gener
 def scores(survey: Survey, true_world: Float[np.ndarray, "s 3"]) -> dict[str, Any]:
     """Return the normalised errors of the poses, and of relations between them; both as seen from the first pose."""
     count = len(true_world)
-    cov = np.linalg.inv(survey.information.toarray())
     time_s = np.arange(float(count))
-    at = 3 * np.arange(count)[:, None] + np.arange(3)
-    path = normalised_path(
-        References(None, (time_s, true_world)), time_s, survey.poses, cov[at[:, :, None], at[:, None, :]]
-    )
+    cov = inverse_at(survey.information, np.arange(3 * count)).reshape(count, 3, count, 3)
+    own = cov[np.arange(count), :, np.arange(count)]
+    path = normalised_path(References(None, (time_s, true_world)), time_s, survey.poses, own)
     assert path is not None
     ways = np.append(0.0, np.cumsum(np.hypot(*np.diff(true_world[:, :2], axis=0).T)))
     # First poses are even and second ones odd, so that no three relations close a triangle.
@@ -122,27 +119,9 @@ def scores(survey: Survey, true_world: Float[np.ndarray, "s 3"]) -> dict[str, An
     far = (ways[second] - ways[first] > WAY_M) & (first < second)
     first, second = first[far], second[far]
 
-    def pair_covs(a: Int[np.ndarray, " m"], b: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
-        rows = np.concatenate([at[a], at[b]], axis=1)
-        return in_body_frames(cov[rows[:, :, None], rows[:, None, :]], survey.poses[a], survey.poses[b])
-
     true = Relations(time_s[first], time_s[second], between(true_world[first], true_world[second]))
-    relations = normalised_relations(true, time_s, survey.poses, pair_covs)
+    relations = normalised_relations(true, time_s, survey.poses, survey.pair_covs)
     return {"poses": path["all"], "relations": relations["all"]}
-
-
-def in_body_frames(
-    covs: Float[np.ndarray, "m 6 6"], first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]
-) -> Float[np.ndarray, "m 6 6"]:
-    """Return the covariances of two poses' errors, world frame, each pose's error in its own frame."""
-    turn = np.zeros((len(covs), 6, 6))
-    eye = np.broadcast_to(np.eye(3), (len(covs), 3, 3))
-    for k, poses in enumerate((first, second)):
-        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        part = eye.copy()
-        part[:, 0, 0], part[:, 0, 1], part[:, 1, 0], part[:, 1, 1] = c, s, -s, c
-        turn[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = part
-    return np.asarray(turn @ covs @ turn.swapaxes(1, 2))
 
 
 def table(rows: Sequence[Row]) -> Table:
@@ -167,15 +146,5 @@ def _cells(rows: Sequence[Row], kind: str) -> list[str]:
     ]  # fmt: skip
 
 
-def main() -> int:
-    """Run the command and return its exit status."""
-    try:
-        tyro.cli(SurveyStudy).run()
-    except UsageError as error:
-        print(f"surveys: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(SurveyStudy)

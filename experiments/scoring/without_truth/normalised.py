@@ -1,6 +1,5 @@
 """Does an estimate know how wrong it is, by what others measured? Its errors in units of what it states of them."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,12 +24,11 @@ from slam.geometry.poses import inverse
 from slam.robot import ScannerSpec
 
 from .references import References
+from .smoothing import PairCovs
 
 DOF = 3
 FAULTS = (RuntimeError, ValueError, IndexError)
 """What a solver raises that has no solution any more: then nothing is known of pairs of poses."""
-
-PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
 
 
 def normalised_relations(

@@ -1,5 +1,6 @@
 """What a back end that smooths knows once a run has ended; no score is taken from it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,9 @@ from slam.estimation.backend import Backend, Joint, Smoother
 from slam.estimation.mounting import belief_of_body, body_poses
 from slam.map.stochastic_map import StochasticMap
 from slam.robot import ScannerSpec
+
+PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
+"""Covariances of pairs of poses by their rows."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,8 @@ class Smoothed:
     map: StochasticMap
     joint: Joint
     """The pose at the last step and all lines."""
+    pair_covs: PairCovs | None = None
+    """How poses at two of the steps err together, each in its body frame; None where nobody tells."""
 
 
 def rows_of_steps(unstated_motion: Bool[np.ndarray, " s"]) -> Int[np.ndarray, " s"]:

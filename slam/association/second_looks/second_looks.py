@@ -8,11 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.sparse import csc_array
 
-from ...estimation.backend import Joint
+from ...estimation.backend import POSE, Joint
 from ...extraction.segments import Segments
+from ...geometry.poses import body_pair_covs
 from ...map.stochastic_map import StochasticMap
 from .closures import Drive, closure_links, held, settled
 from .config import SecondLooksConfig
@@ -21,7 +22,7 @@ from .loop_search import LoopSearch
 from .refuted import NO_RAYS, Rays, refuted
 from .solve import begun, normal_equations, solved, without_lines
 from .submaps import Returns
-from .walls import merged, spans, surveyed
+from .walls import inverse_at, merged, spans, surveyed
 
 DEFAULTS = SecondLooksConfig()
 
@@ -38,6 +39,13 @@ class Survey:
     """So many places that the robot came back to hold the path together."""
     information: csc_array
     """About all poses, of which the first is fixed, and then all walls; the floors of walls are not in it."""
+
+    def pair_covs(self, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
+        """Return how two poses err together, each in its body frame."""
+        told, at = np.unique(np.stack([first, second]), return_inverse=True)
+        cov = inverse_at(self.information, (POSE * told[:, None] + np.arange(POSE)).ravel())
+        rows = (POSE * at.reshape(2, -1).T[..., None] + np.arange(POSE)).reshape(len(first), 2 * POSE)
+        return body_pair_covs(self.poses[first], self.poses[second], cov[rows[:, :, None], rows[:, None, :]])
 
 
 def second_looks(

@@ -82,7 +82,7 @@ def surveyed(
     """
     reach, count = spans(at, sightings, owner), len(at.lines)
     rows = np.concatenate([at.poses.size - POSE + np.arange(POSE), at.poses.size + np.arange(2 * count)])
-    cov = _inverse_at(information, rows)
+    cov = inverse_at(information, rows)
     cov = 0.5 * (cov + cov.T)
     half = 0.5 * np.maximum(reach[:, 1] - reach[:, 0], config.least_m)
     lines = POSE + 2 * np.arange(count)
@@ -94,7 +94,7 @@ def surveyed(
     return StochasticMap(belief, reach, np.bincount(owner, minlength=count), none, none.copy()), joint
 
 
-def _inverse_at(information: csc_array, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, "r r"]:
+def inverse_at(information: csc_array, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, "r r"]:
     """Return the inverse at some rows and columns, `AT_ONCE` columns at a time."""
     solver = splu(information, permc_spec="MMD_AT_PLUS_A")
     found = np.empty((len(rows), len(rows)))

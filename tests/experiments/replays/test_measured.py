@@ -73,6 +73,9 @@ def test_a_smoothed_path_is_scored_beside_the_one_of_each_step(scored):
     summary = json.loads((scored / "out" / "graph-batch" / "summary.json").read_text())
     assert summary["relations_smoothed"]["at_scans"]["all"]["count"] == 2
     assert summary["reference_smoothed"]["poses"] == 12
+    told = summary["relations_smoothed_normalised"]
+    assert (told["all"]["count"], told["far"]["count"]) == (2, 1)
+    assert told["far"]["anees"] > 1.0  # off by 0.3 m
     assert (scored / "out" / "graph-batch" / "trajectory_smoothed.tum").is_file()
 
 

@@ -16,7 +16,7 @@ from slam.association.second_looks.submaps import Returns
 from slam.association.second_looks.walls import merged, spans, surveyed
 from slam.extraction.segments import Segments
 from slam.geometry.lines import lines_to_world, through
-from slam.geometry.poses import compose, inverse, to_robot, wrap
+from slam.geometry.poses import compose, inverse, rotation, to_robot, wrap
 from tests.slam.association.drives import driven
 
 WALLS = np.array([[[6, 0], [0, 0]], [[0, 0], [0, 4]], [[0, 4], [6, 4]], [[6, 4], [6, 0]], [[2, 1.5], [4, 1.5]]], float)
@@ -198,6 +198,19 @@ def test_walls_stand_where_the_room_has_them_and_reach_as_far():
     np.testing.assert_allclose(survey.walls.belief.joint([1]).cov, cov[np.ix_([0, 1, 2, 5, 6], [0, 1, 2, 5, 6])])
     assert np.linalg.eigvalsh(cov).min() > 0.0
     assert np.all(np.diag(cov)[4::2] >= CONFIG.floor_m**2)
+
+
+def test_two_poses_err_together_as_the_whole_information_says():
+    _, drifted, motions, segments = drive()
+    survey = second_looks(drifted[0], driven(motions), segments, [np.zeros((0, 2))] * len(drifted))
+    dense = np.linalg.inv(survey.information.toarray())
+    first, second = np.array([3, 10, 3]), np.array([40, 11, 59])
+    for k, (a, b) in enumerate(zip(first, second, strict=True)):
+        rows = np.concatenate([3 * a + np.arange(3), 3 * b + np.arange(3)])
+        turn = np.eye(6)
+        turn[:2, :2], turn[3:5, 3:5] = rotation(-survey.poses[a, 2]), rotation(-survey.poses[b, 2])
+        expected = turn @ dense[np.ix_(rows, rows)] @ turn.T
+        np.testing.assert_allclose(survey.pair_covs(first, second)[k], expected, rtol=1e-5, atol=1e-11)
 
 
 @pytest.mark.parametrize("at_once", [2, 64])
