@@ -11,7 +11,7 @@ from .association.joint_compatibility import Nis
 from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
-from .association.recovery import Localisation, unstated_motion
+from .association.recovery import Localisation, unstated_cov, unstated_motion
 from .association.view import View, may_be_off_m, near_segments
 from .config import MapperConfig
 from .estimation.backend import Backend, Belief, Observations
@@ -169,7 +169,7 @@ class Mapper:
             walls,
             self._is_lost,
             self.config.recovery,
-            lambda: self._view(scan, found.view.segments, walls, anywhere=True),
+            lambda: self._view(scan, found.view.segments, walls, may_have_moved=True),
         )
         # Where scans told the motion it is walls that are wrong, and only a map that goes on can mend them.
         self._is_lost = is_lost and not self._odometry.by_scans
@@ -205,14 +205,16 @@ class Mapper:
             self._noise.see(found.innovation)
         return factor
 
-    def _view(self, scan: Scan, segments: Segments, walls: StochasticMap, anywhere: bool = False) -> View:
-        """Return the scan beside the walls that its segments may be of, or `anywhere` in the scanner's range."""
-        belief, config = walls.belief, self.config.matching
-        near = walls.distances_m < scan.range_max_m + may_be_off_m(belief.pose_cov, config, np.zeros(1))
-        if self._method.looks_near and not anywhere:
+    def _view(self, scan: Scan, segments: Segments, walls: StochasticMap, may_have_moved: bool = False) -> View:
+        """Return the scan beside the walls that its segments may be of, also after a motion that nobody reported."""
+        belief, config, pose_cov = walls.belief, self.config.matching, walls.belief.pose_cov
+        near = walls.distances_m < scan.range_max_m + may_be_off_m(pose_cov, config, np.zeros(1))
+        if may_have_moved and self.config.recovery is not None:
+            pose_cov = pose_cov + unstated_cov(self.config.recovery)
+        if self._method.looks_near:
             in_range = np.flatnonzero(near)
             ends = walls.ends_world[in_range]
-            near = in_range[near_segments(segments, ends, belief.pose_world, belief.pose_cov, config)]
+            near = in_range[near_segments(segments, ends, belief.pose_world, pose_cov, config)]
         known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 

@@ -82,29 +82,29 @@ def unstated_motion(
     walls: StochasticMap,
     was_lost: bool,
     config: RecoveryConfig,
-    anywhere: Callable[[], View],
+    moved: Callable[[], View],
 ) -> tuple[Odometry | None, bool]:
     """Return the motion that explains far more of a scan than `matches` do, as odometry to add, or None; and whether
     the robot is lost, since such a motion must be and none explains the scan.
 
-    Its covariance is as wide as it was sought: where the robot is, the scan tells once it is taken in. `anywhere` shows
-    the scan beside all walls in range, for a robot that may be elsewhere.
+    Its covariance is as wide as it was sought: where the robot is, the scan tells once it is taken in. `moved` shows
+    the scan beside all walls that it may be of after such a motion.
     """
     if not _leaves_much(view.segments, matches, config):
         return None, False
-    near = _nearby(anywhere(), matches, config)
+    near = _nearby(moved(), matches, config)
     is_lost = was_lost and not _explains(view.segments, matches, config)
     if near is None and not is_lost and not is_contradicted(scan, walls, config):
         return None, False
     place = place_of(view.segments, walls, config.place, near)
     if place is None:
         return None, True
-    return Odometry(compose(inverse(view.joint.mean[:3]), place), _cov(config)), False
+    return Odometry(compose(inverse(view.joint.mean[:3]), place), unstated_cov(config)), False
 
 
 def _nearby(view: View, matches: Matches, config: RecoveryConfig) -> Float[np.ndarray, "3"] | None:
     """Return the place nearby from which the walls explain far more of a scan than `matches` do, if there is one."""
-    wide = replace(view, joint=_widened(view.joint, _cov(config)))
+    wide = replace(view, joint=_widened(view.joint, unstated_cov(config)))
     clear = wide.match_clear()
     relocated = wide.localised(clear.observations(view.segments))
     again = wide.match_again(clear, relocated)
@@ -132,7 +132,8 @@ def _widened(joint: Joint, motion_cov: Float[np.ndarray, "3 3"]) -> Joint:
     return replace(joint, cov=cov)
 
 
-def _cov(config: RecoveryConfig) -> Float[np.ndarray, "3 3"]:
+def unstated_cov(config: RecoveryConfig) -> Float[np.ndarray, "3 3"]:
+    """Return the covariance of a motion that was not reported, the same in all directions."""
     return np.diag([config.shift_m, config.shift_m, config.turn_rad]) ** 2
 
 

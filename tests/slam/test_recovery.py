@@ -1,9 +1,12 @@
 """A robot that was moved and does not know: the mapper says so, finds its place, or says that it has none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sim.lidar import LidarConfig, RangeFinder, noisy
+from slam.association.recovery import RecoveryConfig
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
 from slam.geometry.poses import compose, wrap
@@ -103,16 +106,23 @@ def test_a_robot_carried_to_another_building_is_lost_and_keeps_its_map():
     assert drive.off[0] < 0.1
 
 
-def test_a_scan_is_laid_beside_the_walls_near_it_and_beside_all_in_range_where_the_robot_may_be_elsewhere():
+def test_a_scan_is_laid_beside_the_walls_near_it_and_where_the_robot_may_have_moved_beside_those_near_it_then():
     drive = Drive()
     mapper, walls, asked = drive.mapper, drive.updates[-1].map, []
     scan = Scan(drive.finder.bearings_rad, drive.finder.cast(drive.pose)[0], 0.01, CONFIG.range_max_m, 0.0)
     one = drive.updates[-1].segments.take(np.array([0]))
-    near, anywhere = (mapper._view(scan, one, walls, anywhere=lost).walls.ids for lost in (False, True))
-    assert 0 < len(near) < len(anywhere)
-    assert set(near) < set(anywhere) == set(walls.ids[walls.distances_m < CONFIG.range_max_m])
+    near, moved = (mapper._view(scan, one, walls, may_have_moved=so).walls.ids for so in (False, True))
+    in_range = walls.ids[walls.distances_m < CONFIG.range_max_m]
+    assert 0 < len(near) < len(moved)
+    assert set(near) < set(moved) == set(in_range)
+    mapper.config = replace(mapper.config, recovery=RecoveryConfig(shift_m=0.1, turn_rad=0.03))
+    little = mapper._view(scan, one, walls, may_have_moved=True).walls.ids
+    assert set(near) <= set(little) < set(in_range)
+    mapper.config = replace(mapper.config, recovery=RecoveryConfig())
     view = mapper._view
-    mapper._view = lambda *of, anywhere=False: asked.append(anywhere) or view(*of, anywhere=anywhere)
+    mapper._view = lambda *of, may_have_moved=False: (
+        asked.append(may_have_moved) or view(*of, may_have_moved=may_have_moved)
+    )
     drive.move(STEP)
     assert True not in asked
     drive.move(STEP, [0.0, 0.0, np.deg2rad(-8.0)])
