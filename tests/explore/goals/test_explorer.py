@@ -11,6 +11,7 @@ from explore.following.wall_following import Errand, FollowingConfig
 from explore.goals import explorer as module
 from explore.goals.explorer import Explorer, ExplorerConfig
 from explore.outcome import Outcome
+from explore.planning.visibility_graph import followed_wall
 from explore.strategies import Choice, Place
 from slam.map.chains import Chain, OpenEnd
 from slam.robot import MotionCommand
@@ -44,7 +45,7 @@ class Scripted(Errand):
         self.told.append(end)
 
     def interrupt(self, around):
-        self.told.append("interrupted")
+        self.told.append(around)
 
 
 class First:
@@ -101,8 +102,8 @@ def names(made):
 def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scripted, scene, monkeypatch):
     kinds, made = scripted
     kinds["EndErrand"].steps = 5
-    monkeypatch.setattr(module, "route", lambda graph, current, wall: (7, wall))
-    strategy = First()
+    monkeypatch.setattr(module, "route", lambda graph, current, wall: (7, wall) if current == followed else ())
+    strategy, followed = First(), followed_wall(around_of(scene).walls)
     explorer = explorer_at(scene, strategy)
     (end,) = ends_at((1, 2), wall=4)
     decision = ask(explorer, scene, [end])
@@ -182,8 +183,9 @@ def test_an_errand_hears_where_its_end_is_now_and_what_stands_in_its_way(scripte
     ask(explorer, scene, [end])
     moved = replace(end, position_world=np.array([1.1, 2.0]))
     ask(explorer, scene, [moved])
-    explorer.interrupt(around_of(scene))
-    assert made[0].told == [moved, "interrupted"]
+    around = around_of(scene)
+    explorer.interrupt(around)
+    assert made[0].told == [moved, around]
 
 
 @pytest.mark.parametrize("times", [2, 5])
@@ -241,6 +243,16 @@ def test_what_lies_beyond_the_fence_is_set_aside_without_a_look(scripted, scene)
     assert len(made) == 1
 
 
+def test_what_lies_on_something_round_is_set_aside_without_a_look(scripted, scene, monkeypatch):
+    kinds, made = scripted
+    kinds["EndErrand"].steps = 99
+    monkeypatch.setattr(module, "is_round", lambda end, walls, config: end.wall == 0)
+    decision = ask(explorer_at(scene), scene, ends_at((5, 2), (2, 2)))
+    assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "on something round")]
+    assert decision.goal.wall == 1
+    assert len(made) == 1
+
+
 @pytest.mark.parametrize("aside", [0, 2])
 def test_the_end_says_how_many_ends_cannot_be_closed(scripted, scene, aside):
     kinds, _ = scripted
@@ -250,6 +262,9 @@ def test_the_end_says_how_many_ends_cannot_be_closed(scripted, scene, aside):
     decisions = [ask(explorer, scene, ends) for _ in range(3)]
     # A scan more, since chains may join where ends were given up just now.
     assert [decision.command is None for decision in decisions] == [not aside, True, True]
+    if aside:
+        assert decisions[0].command == MotionCommand(0.0, NO_SWEEP.robot.turn_rad)
+    assert decisions[0].words == ("" if aside else "every chain is closed")
     assert decisions[-1].outcome is (Outcome.ENDS_LEFT if aside else Outcome.ALL_CLOSED)
     words = "no reachable open end is left; 2 cannot be closed" if aside else "every chain is closed"
     assert decisions[-1].words == words
@@ -298,6 +313,7 @@ def test_a_place_is_gone_to_when_no_end_is_left_and_what_came_of_it_is_kept(scri
     decision = ask(explorer, scene, [])
     assert (decision.goal.kind, decision.goal.wall, decision.goal.side) == ("unseen", None, None)
     np.testing.assert_array_equal(decision.goal.position_world, [1.0, 1.5])
+    assert decision.goal.reason == "unseen floor is left"
     assert decision.walls_to_follow == ()
     assert made[0].given[1:] == ("to where unseen floor", FollowingConfig())
     for _ in range(4):

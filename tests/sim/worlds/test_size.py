@@ -9,6 +9,8 @@ import shapely
 from PIL import Image
 
 from sim.worlds import WorldError, limits, load
+from sim.worlds.drawing import Drawing
+from sim.worlds.solid import solid_of
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" data-metres-per-unit="1">'
 ROOM = '<rect width="90" height="90" fill="none" stroke="black"/>'
@@ -89,6 +91,15 @@ def test_pieces_that_come_of_a_drawing_are_counted_like_those_in_it(tmp_path, mo
     monkeypatch.setattr(limits, "CLOSE_MAX", 30)
     with pytest.raises(WorldError, match="more than 30 pairs nearer than"):
         load(tmp_path / "a.json")
+
+
+def test_pieces_of_lines_that_cross_are_counted_before_the_walls_are_made_thick(monkeypatch):
+    lines = tuple(shapely.LineString([wall[:2], wall[2:]]) for wall in CROSSED)
+    limits.check_apart(lines, limits.CLOSE_M)
+    monkeypatch.setattr(limits, "CLOSE_MAX", 5)
+    limits.check_apart(lines, limits.CLOSE_M)
+    with pytest.raises(WorldError, match="more than 5 pairs nearer than"):
+        solid_of(Drawing(lines))
 
 
 def test_lines_side_by_side_are_told_before_they_are_put_together(monkeypatch):
