@@ -65,7 +65,7 @@ MATCHING = (
     Switch("hypotheses.dropped", "slam.association.kernels.hypothesis_kernels",
            "wrong = «losses[worst] > unmatched»",
            "False", "a hypothesis drops the pair that contradicts the others"),
-    Switch("mapper.lost", "slam.mapper", "scan.range_max_m + «may_be_off_m(belief.pose_cov, config, np.zeros(1))»",
+    Switch("mapper.lost", "slam.mapper", "scan.range_max_m + «may_be_off_m(pose_cov, config, np.zeros(1))»",
            "config.shared.far_m", "a robot that is lost looks at walls farther off"),
 )  # fmt: skip
 
