@@ -77,7 +77,7 @@ def test_what_is_too_large_is_told_in_one_line(tmp_path, case):
 
 
 ROUND = [[0, 0, 9, 0], [9, 0, 9, 9], [9, 9, 0, 9], [0, 9, 0, 0]]
-CROSSED = [[0, 4 + 0.01 * k, 9, 5 - 0.01 * k] for k in range(12)]
+CROSSED = [[0, 4 + 0.01 * k, 9, 5 - 0.01 * k - 0.002 * k**2] for k in range(12)]
 """Each crosses each: only the pieces between the crossings lie side by side."""
 ZIGZAG = [(0.2 * k, 4.0 + 0.05 * (k % 2)) for k in range(46)]
 SLIT = [[*a, *b] for up in (0.0, 0.11) for a, b in pairwise([(x, y + up) for x, y in ZIGZAG])]
