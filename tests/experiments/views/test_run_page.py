@@ -38,8 +38,8 @@ def test_back_ends_stand_side_by_side(run, tmp_path):
     assert main(["replay", str(run / "log.npz"), "--backend", "block-ekf", "full-ekf", "--out", str(out)]) == 0
     assert main(["report", str(out)]) == 0
     page = (out / "report.html").read_text()
-    assert "block-ekf: complete" in page
-    assert "full-ekf: complete" in page
+    assert "block-ekf: stopped" in page
+    assert "full-ekf: stopped" in page
     assert page.count("<img") == 7
     assert 'data-name="block-ekf"' in page
 
