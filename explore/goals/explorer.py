@@ -165,9 +165,10 @@ class Explorer:
         """Forget what was set aside where the end is gone or has moved: there it may be tried again."""
         for key, aside in self._ledger.set_aside.items():
             end = ends.get(key)
-            if end is None or self._is_hopeless(end.position_world):
+            if end is None:
                 continue
-            if np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m:
+            moved_m = np.hypot(*(end.position_world - aside.position_world))
+            if moved_m > self._config.moved_m and not self._is_hopeless(end.position_world):
                 self._ledger.take_up(key)
 
     def _abandon(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
