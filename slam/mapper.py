@@ -130,7 +130,7 @@ class Mapper:
             found = self._localised(scan, segments, walls)
         matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(found.first, self._reliable(matches, segments))
+        self.backend.update(found.first, self._observed(matches, segments))
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
@@ -153,7 +153,7 @@ class Mapper:
         view = self._view(scan, segments, walls)
         clear = view.match_clear()
         # 3. Localise the robot with matched features (here as a pure function, to match again).
-        first = self._reliable(clear, segments)
+        first = self._observed(clear, segments)
         # 4. Match features with their re-prediction from the new robot pose.
         matches = view.match_again(clear, view.localised(first))
         return Localised(view, first, *view.surprise(first, self._odometry), matches)
@@ -218,12 +218,11 @@ class Mapper:
         known = KnownWalls(walls.ids[near], walls.extents[near], None if walls.whole is None else walls.whole[near])
         return View(segments, known, self.backend.belief.joint(known.ids), self._method, config)
 
-    def _reliable(self, matches: Matches, segments: Segments) -> Observations:
-        """Return the matches that may move the estimate."""
-        rows, observed = matches.pairs[:, 0], matches.observations(segments)
-        reliable = self._keeper.landmarks.reliability.may_move(segments.take(rows), observed.ids)
-        cov = as_told(observed.cov[reliable], segments.take(rows[reliable]), self.config.walls.reliability)
-        return Observations(observed.ids[reliable], observed.lines[reliable], cov)
+    def _observed(self, matches: Matches, segments: Segments) -> Observations:
+        """Return the matches as observations that move the estimate."""
+        observed = matches.observations(segments)
+        cov = as_told(observed.cov, segments.take(matches.pairs[:, 0]), self.config.walls.reliability)
+        return replace(observed, cov=cov)
 
     def _segments(self, scan: Scan, walls: StochasticMap) -> Segments:
         """Return the straight pieces of the scan, cut where the map knows a bend."""

@@ -69,6 +69,8 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.kinks": "mission.mapper.change_points",
     "mission.mapper.torn": None,
     "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
+    "mission.mapper.walls.firmness.heading_rad": "mission.mapper.walls.reliability.clear_rad",
+    "mission.mapper.walls.reliability.heading_rad": "mission.mapper.walls.reliability.clear_rad",
     "mission.mapper.walls.trusted_sightings": None,
     "mission.mapper.walls.established_sightings": None,
     "robot.drive.step_max_m": "robot.step_m",
@@ -142,13 +144,15 @@ DROPPED = {
     "mission.mapper.walls.least_m",
     "mission.mapper.walls.pass_margin_m",
     "mission.mapper.walls.reliability.bend_rad",
+    "mission.mapper.walls.reliability.chance",
     "mission.mapper.walls.reliability.crooked_m",
+    "mission.mapper.walls.reliability.excess",
     "mission.mapper.walls.reliability.few_heading_rad",
     "mission.mapper.walls.reliability.straightness.face_m",
     "mission.mapper.walls.trusted_observations",
 }
 """Settings of older formats whose rules are no more, or that said what another says: the first until format 2, the
-others until format 9 or 10."""
+others until format 9, 10 or 11."""
 VERTICES = "mission.mapper.vertices"
 EXPLORER = "mission.explorer."
 FOLLOWING = f"{EXPLORER}following."

@@ -17,7 +17,7 @@ from slam.evaluation.own_gauge import own_gauge
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
 from slam.extraction.visible_extent import sure_pieces
-from slam.map.reliability import Reliability, as_told
+from slam.map.reliability import as_told
 from slam.map_keeper import seen_centres
 from slam.robot import Odometry
 
@@ -109,7 +109,6 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
     mapper = of_true_lines(trial.mission.mapper) if perfect_extraction else trial.mission.mapper
     rules, extraction = mapper.walls.reliability, mapper.extraction
-    reliability = Reliability(rules)
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k in range(len(recording)):
@@ -120,13 +119,9 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         walls = np.where(faces >= 0, witness.truth.walls[faces], -1)
         known = np.isin(walls, list(true_lines))
         seen = np.flatnonzero(known)
-        seen = seen[reliability.may_move(segments.take(seen), walls[seen])]
         rest = np.flatnonzero(~known)
         begun = rest[begins_a_line(walls[rest], segments.beam_counts[rest], set(true_lines))]
         begun = begun[~segments.is_tentative[begun]]
-        owned = known & ~segments.is_tentative
-        owned[begun] = True
-        reliability.see(segments, np.where(owned, walls, -1), poses_world[k])
         looks = _looks(segments, walls).take(seen)
         again.append(replace(looks, cov=as_told(looks.cov, segments.take(seen), rules)))
         first.append(_looks(segments, walls).take(begun))

@@ -19,17 +19,16 @@ def edge_cov(
     across_m2: Float[np.ndarray, " n"],
     lengths_m: Float[np.ndarray, " n"],
     middles_m: Float[np.ndarray, " n"],
-    least_rad2: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, "n 2 2"]:
     """Return the covariance of (direction rad, distance m) of lines that are off across themselves by so much.
 
     It is that of a line through one point of this variance, which may lie anywhere along the wall: 12 / L^2 times as
-    much in direction, or `least_rad2`. `middles_m` says how far along the line the wall's middle lies from the point at
+    much in direction. `middles_m` says how far along the line the wall's middle lies from the point at
     which the distance is taken.
     """
     cov = np.empty((len(across_m2), 2, 2))
     for k in range(len(cov)):
-        turn = max(12.0 * across_m2[k] / max(lengths_m[k], 1e-3) ** 2, least_rad2[k])
+        turn = 12.0 * across_m2[k] / max(lengths_m[k], 1e-3) ** 2
         cov[k, 0, 0], cov[k, 1, 1] = turn, across_m2[k] + turn * middles_m[k] ** 2
         cov[k, 0, 1] = cov[k, 1, 0] = turn * middles_m[k]
     return cov
@@ -73,4 +72,4 @@ def faces_cov(
         across[k] = misfits_m2[k] + edge_variance(lengths[k], edge_m, face_m)
         x, y = 0.5 * (ends[k, 0, 0] + ends[k, 1, 0]), 0.5 * (ends[k, 0, 1] + ends[k, 1, 1])
         middles[k] = y * math.cos(lines[k, 0]) - x * math.sin(lines[k, 0])
-    return edge_cov(across, lengths, middles, np.zeros(len(lines)))
+    return edge_cov(across, lengths, middles)

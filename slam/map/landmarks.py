@@ -11,7 +11,6 @@ from ..geometry.lines import directions
 from ..robot import Scan
 from .change_points import ChangePoints, ChangePointsConfig
 from .extents import Extents, WallsConfig
-from .kernels.reliability_kernels import off_line_cov
 from .openings import Openings
 from .records import Records
 from .reliability import Reliability
@@ -35,16 +34,15 @@ class Landmarks:
         self.records = Records()
         self.extents = Extents(walls, self.records)
         self.reliability = Reliability(walls.reliability, self.records)
-        self._straightness = walls.reliability.straightness
         self.change_points = ChangePoints(change_points, self.records)
         self.openings = Openings(walls.shared, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""
-        across, turned = self.reliability.misfits(self.records.ids)
-        straightness = float(self._straightness.edge_m), float(self._straightness.shared.face_m)
-        cov = off_line_cov(self.records.columns["extents"], across, turned, *straightness)
-        return self.extents.map(belief, self.reliability.are_crooked(self.records.ids), cov)
+        ids, extents = self.records.ids, self.records.columns["extents"]
+        misfits_m2 = self.reliability.misfits(ids)
+        cov = self.reliability.off_line_cov(ids, extents, misfits_m2)
+        return self.extents.map(belief, misfits_m2 > 0.0, cov)
 
     def observe(
         self,
@@ -59,7 +57,7 @@ class Landmarks:
         `believed` are ids of walls that were seen often before they became walls.
         """
         self.records.rows(belief.ids)
-        self.reliability.see(segments, owners, belief.pose_world)
+        self.reliability.see(segments, owners)
         forgotten = self.extents.see(belief, scan, segments, owners, believed)
         if not len(forgotten):
             return Observed(owners, forgotten)

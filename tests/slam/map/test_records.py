@@ -14,7 +14,7 @@ from slam.map.records import Records
 from slam.map.reliability import Reliability
 
 SETTINGS = (WallsConfig(), ChangePointsConfig())
-SUMS = ("observations", "fits")
+SUMS = ("observations", "residue")
 """Columns that add up over mergers, whatever walls were merged."""
 
 
@@ -22,9 +22,7 @@ def observed(landmarks, ids, rng):
     """Give each of these walls evidence of every kind, as observations would."""
     columns, rows = landmarks.records.columns, landmarks.records.rows(np.asarray(ids))
     columns["observations"][rows] += rng.integers(1, 5, len(rows))
-    columns["fits"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2))
-    columns["directions"][rows] += rng.uniform(1.0, 9.0, (len(rows), 2, 2))
-    columns["first"][rows] = rng.uniform(-1.0, 1.0, len(rows))
+    columns["residue"][rows] += rng.uniform(1.0, 9.0, (len(rows), 3))
     middle = rng.uniform(-2.0, 2.0, len(rows))
     columns["extents"][rows] = np.column_stack([middle - 0.5, middle + 0.5])
     for row in rows.tolist():
@@ -38,7 +36,6 @@ def totals(landmarks):
     return np.concatenate(
         [
             *(np.atleast_1d(columns[name].sum(axis=0)) for name in SUMS),
-            columns["directions"][..., 0].sum(axis=0),
             np.sum(turns, axis=0) if turns else np.zeros(2),
         ]
     )
@@ -134,11 +131,8 @@ def test_the_reliability_of_a_merged_wall_is_that_of_one_that_made_all_observati
     split, whole = Reliability(records=apart), Reliability(records=together)
     for segments, owner in ((first, 0), (second, 1)):
         for k in range(len(segments)):
-            split.see(segments.take(np.array([k])), np.array([owner]), np.zeros(3))
-            whole.see(segments.take(np.array([k])), np.array([0]), np.zeros(3))
+            split.see(segments.take(np.array([k])), np.array([owner]))
+            whole.see(segments.take(np.array([k])), np.array([0]))
     apart.merge(0, 1, 0.0)
-    for name in ("fits", "directions"):
-        scale = np.abs(together.columns[name]).max()
-        # To second order in the milliradians between the first observations of the two.
-        np.testing.assert_allclose(apart.columns[name], together.columns[name], atol=1e-5 * scale)
-    assert apart.columns["crooked"].tolist() == together.columns["crooked"].tolist()
+    for name in ("residue", "longest"):
+        np.testing.assert_allclose(apart.columns[name], together.columns[name], rtol=1e-12)
