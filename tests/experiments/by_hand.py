@@ -55,7 +55,6 @@ def log_of(estimated=None, **changes):
         "bearings_rad": np.linspace(-np.pi, np.pi, BEAMS, endpoint=False),
         "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": np.full(BEAMS, 0.01), "sigma_share": 0.0, "range_max_m": 4.0,
         "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
-        "heard": np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "heard_cov": np.zeros((3, 3, 3)),
         "touched": np.zeros(3, bool),
         "estimated_world": estimated, "estimated_cov": COVS, "true_world": TRUE,
         "face_of_beam": np.full((3, BEAMS), -1), "path_length_m": np.array([0.0, 0.1, 0.25]),
@@ -66,7 +65,8 @@ def log_of(estimated=None, **changes):
         "reasons": ("", "", ""),
     }  # fmt: skip
     kept |= changes
-    return Log(scan_start_s=kept["time_s"] - 0.1, **kept)
+    heard = {"heard": kept["odometry"], "heard_cov": kept["odometry_cov"]}
+    return Log(scan_start_s=kept["time_s"] - 0.1, **heard, **kept)
 
 
 def step_of(walls, chains, **changes):
