@@ -21,7 +21,8 @@ def made(world, make_map, make_chains):
     run = true_map(world, make_map, make_chains)
     columns = {
         name: np.repeat(getattr(run.log, name)[:1], N, axis=0)
-        for name in ("ranges_m", "odometry", "odometry_cov", "heard", "heard_cov", "face_of_beam", "open_ends", "tentative", "closed_chains",
+        for name in ("ranges_m", "odometry", "odometry_cov", "heard", "heard_cov", "face_of_beam", "open_ends",
+                     "tentative", "closed_chains",
                      "set_aside", "seconds", "planning_seconds", "touched", "nis", "nis_dof",
                      "unstated_motion", "is_lost", "wheel_noise_factor")
     }  # fmt: skip
