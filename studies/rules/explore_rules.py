@@ -72,7 +72,7 @@ FOLLOWING = (
 
 EXPLORER = (
     Switch("explorer.revive", "explore.goals.explorer",
-           "if «np.hypot(*(end.position_world - aside.position_world)) > self._config.moved_m»:",
+           "if «moved_m > self._config.moved_m» and not",
            "False", "an end set aside is tried again when it moved"),
     Switch("explorer.hopeless", "explore.goals.explorer",
            "return «self._ledger.count(Event.SET_ASIDE, place) >= self._config.attempts»",
