@@ -69,8 +69,6 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.kinks": "mission.mapper.change_points",
     "mission.mapper.torn": None,
     "mission.mapper.walls.firmness": "mission.mapper.walls.reliability",
-    "mission.mapper.walls.firmness.heading_rad": "mission.mapper.walls.reliability.clear_rad",
-    "mission.mapper.walls.reliability.heading_rad": "mission.mapper.walls.reliability.clear_rad",
     "mission.mapper.walls.trusted_sightings": None,
     "mission.mapper.walls.established_sightings": None,
     "robot.drive.step_max_m": "robot.step_m",

@@ -22,7 +22,7 @@ class ReliabilityConfig:
     """When a direction is clear, and how far a face may be from its line."""
 
     shared: SharedConfig = of_shared()
-    clear_rad: float = 0.15
+    heading_rad: float = 0.15
     """A segment of five beams or more is clear where its direction is known better than this, sigma, that of short
     faces included (`straightness`). One of fewer beams may be turned by as much: it may lie over two faces, and has too
     few beams to show it."""
@@ -33,7 +33,7 @@ class ReliabilityConfig:
 def are_clear(segments: Segments, config: ReliabilityConfig = ReliabilityConfig()) -> Bool[np.ndarray, " s"]:
     """Return which segments have enough beams and a clear direction."""
     turn = segments.cov[:, 0, 0] + cov_of_faces(segments, config.straightness)[:, 0, 0]
-    return ~segments.is_tentative & (turn < config.clear_rad**2)
+    return ~segments.is_tentative & (turn < config.heading_rad**2)
 
 
 def as_told(
@@ -46,7 +46,7 @@ def as_told(
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
     cov = cov + cov_of_faces(segments, config.straightness)
-    return reliability_kernels.as_told(cov, segments.is_tentative, float(config.clear_rad))
+    return reliability_kernels.as_told(cov, segments.is_tentative, float(config.heading_rad))
 
 
 class Reliability:

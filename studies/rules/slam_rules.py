@@ -118,10 +118,10 @@ BENDS = (
 
 FIRMNESS = (
     Switch("reliability.clear", "slam.map.reliability",
-           "~segments.is_tentative & («turn < config.clear_rad**2»)",
+           "~segments.is_tentative & («turn < config.heading_rad**2»)",
            YES, "only sides of clear direction make a bend"),
     Switch("reliability.as_told", "slam.map.kernels.reliability_kernels",
-           "turn = «clear_rad if is_tentative[k] else 0.0»",
+           "turn = «heading_rad if is_tentative[k] else 0.0»",
            "0.0", "beside a clear observation few beams tell no heading"),
     Switch("reliability.short_faces", "slam.extraction.straightness_kernels",
            "return «(edge_m / (1.0 + (length_m / face_m) ** 4)) ** 2»",

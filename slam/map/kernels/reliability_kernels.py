@@ -82,14 +82,14 @@ def off_line_cov(
 
 @compiled
 def as_told(
-    cov: Float[np.ndarray, "m 2 2"], is_tentative: Bool[np.ndarray, " m"], clear_rad: float
+    cov: Float[np.ndarray, "m 2 2"], is_tentative: Bool[np.ndarray, " m"], heading_rad: float
 ) -> Float[np.ndarray, "m 2 2"]:
     """Return the covariances of (alpha, r) of observations that move the estimate (`reliability.as_told`)."""
     told = cov.copy()
     if is_tentative.all():
         return told
     for k in range(len(cov)):
-        turn = clear_rad if is_tentative[k] else 0.0
+        turn = heading_rad if is_tentative[k] else 0.0
         lever = turn * cov[k, 1, 0] / cov[k, 0, 0]
         told[k, 0, 0] += turn * turn
         told[k, 0, 1] += turn * lever

@@ -83,8 +83,8 @@ def test_real_scans_of_straight_walls_give_no_wall_a_misfit(seed):
 
 def test_clear_are_many_beams_and_a_known_direction():
     config = ReliabilityConfig()
-    assert are_clear(observation(0.0, 0.5 * config.clear_rad)).all()
-    assert not are_clear(observation(0.0, 2.0 * config.clear_rad)).any()
+    assert are_clear(observation(0.0, 0.5 * config.heading_rad)).all()
+    assert not are_clear(observation(0.0, 2.0 * config.heading_rad)).any()
     assert not are_clear(observation(0.0, 0.01, beams=4)).any()
 
 
@@ -98,7 +98,7 @@ def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middl
     together = Segments(*(np.concatenate([getattr(each, name) for each in both]) for name in vars(few)))
     wide, clear = as_told(together.cov, together, FACES)
     at_middle = np.linalg.inv(to_robot)
-    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + FACES.clear_rad**2, 4e-6]), atol=1e-12)
+    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + FACES.heading_rad**2, 4e-6]), atol=1e-12)
     np.testing.assert_array_equal(clear, cov)
     np.testing.assert_array_equal(as_told(cov[None], few, FACES), cov[None], "alone it is all that there is")
 

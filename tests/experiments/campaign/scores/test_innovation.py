@@ -147,9 +147,9 @@ def test_the_overheard_matcher_is_asked_just_what_was_asked():
 
 
 def test_what_is_clear_is_told_by_the_ear_s_own_rule():
-    strict = InnovationEar(ReliabilityConfig(clear_rad=1e-4))
+    strict = InnovationEar(ReliabilityConfig(heading_rad=1e-4))
     hear(strict, [(seen(LINES), IDS)])
     assert strict.values == []
-    free = InnovationEar(ReliabilityConfig(clear_rad=3.0))
+    free = InnovationEar(ReliabilityConfig(heading_rad=3.0))
     hear(free, [(seen(LINES, sigma_rad=0.5), IDS)])
     assert free.dofs == [6]
