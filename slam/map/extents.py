@@ -34,7 +34,7 @@ class WallsConfig:
     patience_m: float = 2.25
     """A tentative wall is forgotten once it was not observed for the steps that so long a way takes."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
-    """Which observations may move the estimate."""
+    """How far walls may be off the lines that stand for them."""
     claims: int = 6
     """A wall is forgotten when so many scans in turn gave all its beams to other walls, unless it is established."""
     housekeeping: bool = True
