@@ -110,9 +110,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def process() -> int:
-    """Run one command as a process of its own and return its exit status, which no later signal changes."""
-    status = main()
-    too_late()
+    """Run one command as a process of its own and return its exit status: no signal makes another end of it."""
+    status = INTERRUPTED
+    try:
+        status = main()
+        too_late()
+    except KeyboardInterrupt:
+        # It came while the command was ending: what it has to say is said.
+        too_late()
     return status
 
 

@@ -18,10 +18,11 @@ from experiments.artifacts.files import json_bytes
 from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
+from experiments.commands import cli
 from experiments.commands.cli import main
 from experiments.scenario import MappingMissionConfig, TrialConfig
 from experiments.scoring.summary import TIMED
-from experiments.terminal.interrupts import first_interrupt_waits, nothing_half_built_speaks
+from experiments.terminal.interrupts import STOPS, first_interrupt_waits, nothing_half_built_speaks
 from experiments.usage import UsageError
 from explore.goals.explorer import ExplorerConfig
 
@@ -195,6 +196,40 @@ def test_a_signal_that_comes_when_all_is_done_changes_no_status(number):
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
+def test_a_second_ctrl_c_at_any_line_of_a_commands_end_changes_no_status(monkeypatch):
+    """It comes, in one run after the other, at every line of ours that is run once the first has stopped the work."""
+    stopped, at, lines = False, 0, 0
+
+    def work(arguments):
+        nonlocal stopped
+        stopped = True
+        raise KeyboardInterrupt
+
+    def trace(frame, event, _):
+        nonlocal lines
+        ours = frame.f_code.co_filename.startswith(str(ROOT / "experiments"))
+        if stopped and ours and event == "line":
+            lines += 1
+            if lines == at:
+                os.kill(os.getpid(), signal.SIGINT)
+        return trace
+
+    monkeypatch.setattr(cli, "_parse", work)
+    handlers = {number: signal.getsignal(number) for number in STOPS}
+    tracer = sys.gettrace()
+    while lines >= at:
+        stopped, at, lines = False, at + 1, 0
+        sys.settrace(trace)
+        try:
+            status = cli.process()
+        finally:
+            sys.settrace(tracer)
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        assert status == 130, at
+    assert at > 20
+
+
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
     out = tmp_path / "run"
@@ -214,8 +249,7 @@ def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
             time.sleep(0.3)
             process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "Traceback" not in said
+    assert (process.returncode, "Traceback" in said) == (130, False), said
     assert "interrupted" in said
     assert not list(out.glob(".*"))
     if times == 1:
