@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 12,
+    CONFIG: 13,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -32,7 +32,8 @@ format 5 the body and the step stood at several places (`MOVED`), until format 6
 (`mission.lost`, `mission.mapper.recovery`), until format 7 short faces were taken for what they seem
 (`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
 Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
-Until format 11 no scan told a drive's motion (`odometry`).
+Until format 11 no scan told a drive's motion (`odometry`). Until format 12 a place in the whole map was sought by
+pairs of walls (`DROPPED`).
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -123,6 +124,12 @@ DROPPED = {
     "mission.mapper.recovery.contradicted",
     "mission.mapper.recovery.inside_m",
     "mission.mapper.recovery.noise.chance",
+    "mission.mapper.recovery.place.across_m",
+    "mission.mapper.recovery.place.explained",
+    "mission.mapper.recovery.place.least_segments",
+    "mission.mapper.recovery.place.overlap",
+    "mission.mapper.recovery.place.seeds",
+    "mission.mapper.recovery.place.turn_rad",
     "mission.mapper.vertices.across_m",
     "mission.mapper.vertices.beside_m",
     "mission.mapper.vertices.cut_reach_m",

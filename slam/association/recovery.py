@@ -45,7 +45,8 @@ class RecoveryConfig:
     """... of so many at least, towards walls a short face from their ends and the beams as far past them."""
     noise: MotionNoiseConfig | None = field(default_factory=MotionNoiseConfig)
     """None where the wheels are never taken for worse than they state."""
-    place: PlaceSearchConfig = field(default_factory=PlaceSearchConfig)
+    place: PlaceSearchConfig = field(default_factory=lambda: PlaceSearchConfig(least=0.7))
+    """One scan proves less than a submap: more of it must lie on walls."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ NEAR = {
     "segment_kernels": "extract split_kernels",
     "fit_kernels": "extract noise_of_each_beam line_kernels",
     "loop_search": "where_places_are_sought loop_search places_of_drives",
-    "submap_match": "where_places_are_sought loop_search",
+    "place_search": "where_places_are_sought loop_search",
     "submaps": "where_places_are_sought loop_search",
     "closures": "where_places_are_sought loop_search second_looks",
     "second_looks": "second_looks refuted",

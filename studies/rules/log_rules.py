@@ -3,7 +3,7 @@
 from .slam_rules import NO, YES
 from .switches import Switch
 
-SEARCH, MATCH = "slam.association.second_looks.loop_search", "slam.association.second_looks.submap_match"
+SEARCH, MATCH = "slam.association.second_looks.loop_search", "slam.association.place_search"
 LINES, WALLS = "slam.association.second_looks.landmarks", "slam.association.second_looks.walls"
 CLOSED, WHOLE = "slam.association.second_looks.closures", "slam.association.second_looks.second_looks"
 
@@ -68,12 +68,12 @@ PLACES = (
            "False", "poses are solved for only where a closure moves them"),
     Switch("loop_search.turned_back", SEARCH, "if «between»:",
            "False", "a closure over a slip first turns all that came after it"),
-    Switch("submap_match.refined", MATCH, "return Place(«pose», float(found[best, 0]), rival)",
+    Switch("place_search.refined", MATCH, "return Place(«pose», float(found[best, 0]), rival)",
            "poses[best]", "a place is refined below the cells of its search"),
-    Switch("submap_match.apart_turn", MATCH, "| «(np.abs(wrap(off[:, 2])) > config.apart_rad)»",
+    Switch("place_search.apart_turn", MATCH, "| «(np.abs(wrap(off[:, 2])) > config.apart_rad)»",
            NO, "a place turned otherwise is another"),
     Switch("submaps.joined", "slam.association.second_looks.submaps",
-           "thinned(«joined(each, c.cell_m, c.gap_m)», 0.5 * c.cell_m)",
+           "thinned(«joined(each, c.place.cell_m, c.gap_m)», 0.5 * c.place.cell_m)",
            "each", "neighbouring returns of one surface have a surface between them"),
     Switch("closures.slips", CLOSED, "covs[«np.array(self.slipped, dtype=np.int64) - 1»] =",
            "on()[:0]", "a motion in which the robot slipped holds little"),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...odometry.config import ScanMatchingConfig
+from ..place_search import PlaceSearchConfig
 
 
 @dataclass(frozen=True)
@@ -39,24 +40,13 @@ class ClosuresConfig:
     """A scan of which a smaller share of points lies near those before it was taken after a slip: the turn between may
     have been any."""
     fit_scans: int = 8
-    """So many scans before it are looked at."""
+    """So many scans before it are looked at. A point lies near if it is within two cells of the search."""
     places: int = 3
     """So many stretches of the old path are tried, the nearest first."""
-    cell_m: float = 0.1
-    """Size of a cell of the search, and the standard deviation by which likelihood falls with the distance from an old
-    point. Points within two of these lie near."""
     gap_m: float = ScanMatchingConfig.gap_m
     """Neighbouring returns that are nearer to each other are of one surface."""
-    step_rad: float = ScanMatchingConfig.step_rad
-    """Between two turns that are tried."""
-    least: float = ScanMatchingConfig.slip_score
-    """A place must have so large a mean likelihood, ..."""
-    rival: float = 0.9
-    """... and no other place more than this share of it, ..."""
-    apart_m: float = 0.5
-    """... where places farther apart than this, or than ..."""
-    apart_rad: float = float(np.deg2rad(10.0))
-    """... this, are others."""
+    place: PlaceSearchConfig = field(default_factory=PlaceSearchConfig)
+    """How a place is sought, and when it is believed."""
     least_points: int = 100
     """With fewer points no place is sought."""
     sigma_m: float = 0.05

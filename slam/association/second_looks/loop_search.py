@@ -5,15 +5,17 @@ where two searches agree. Where a scan does not fit those before it, the robot h
 are tried then, from either side of it and whenever the robot comes by again.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from ...geometry.poses import compose, inverse, wrap
+from ..place_search import Place, Window, apart, place_on
 from .closures import Closure, Drive, settled
 from .config import SecondLooksConfig
-from .submap_match import Place, Window, apart, place_on
 from .submaps import Returns
 
 SLIP_M = 1e4
@@ -80,14 +82,14 @@ class LoopSearch:
             return None
         found: list[tuple[Place, int]] = []
         for old, window in self._windows(new):
-            place = place_on(self._returns.surface(self._around(old, new), self.poses), points, window, c)
+            place = place_on(self._returns.surface(self._around(old, new), self.poses), points, window, c.place)
             if place is not None:
                 found.append((place, old))
         if not found:
             return None
         best, old = max(found, key=lambda each: each[0].score)
-        others = [each.score for each, _ in found if apart(each.pose[None], best.pose, c)[0]]
-        if best.score < c.least or max([best.rival, *others]) > c.rival * best.score:
+        others = [each.score for each, _ in found if apart(each.pose[None], best.pose, c.place)[0]]
+        if not replace(best, rival=max([best.rival, *others])).is_right(c.place):
             return None
         return Closure(old, new, compose(inverse(self.poses[old]), best.pose))
 

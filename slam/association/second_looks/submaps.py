@@ -24,16 +24,18 @@ class Returns:
     def surfaces(self) -> list[np.ndarray]:
         """The points of each with others between neighbours on one surface, thinned to cells."""
         c = self.config
-        return [thinned(joined(each, c.cell_m, c.gap_m), 0.5 * c.cell_m) for each in self.points]
+        return [thinned(joined(each, c.place.cell_m, c.gap_m), 0.5 * c.place.cell_m) for each in self.points]
 
     def seen_from(self, scans: range, poses: Float[np.ndarray, "s 3"], of: int) -> Float[np.ndarray, "n 2"]:
         """Return the returns of some scans in the frame of one scan, thinned to cells."""
         world = np.concatenate([to_world(self.points[k], poses[k]) for k in scans])
-        return thinned(to_robot(world, poses[of]), self.config.cell_m)
+        return thinned(to_robot(world, poses[of]), self.config.place.cell_m)
 
     def surface(self, scans: range, poses: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "n 2"]:
         """Return the surfaces of some scans in the world frame, thinned to half cells."""
-        return thinned(np.concatenate([to_world(self.surfaces[k], poses[k]) for k in scans]), 0.5 * self.config.cell_m)
+        return thinned(
+            np.concatenate([to_world(self.surfaces[k], poses[k]) for k in scans]), 0.5 * self.config.place.cell_m
+        )
 
     def fit(self, scan: int, before: range, poses: Float[np.ndarray, "s 3"]) -> float:
         """Return the share of a scan's returns that lie near some of the scans before; 1 where there is none."""
@@ -41,6 +43,6 @@ class Returns:
         if not earlier or not len(self.points[scan]):
             return 1.0
         away, _ = cKDTree(np.concatenate(earlier)).query(
-            to_world(self.points[scan], poses[scan]), distance_upper_bound=2.0 * self.config.cell_m
+            to_world(self.points[scan], poses[scan]), distance_upper_bound=2.0 * self.config.place.cell_m
         )
         return float(np.isfinite(away).mean())

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import shapely
 
+from slam.association.kernels.correlation_kernels import best_in_blocks, largest_ahead, mean_at
+from slam.association.place_search import Window, place_on
 from slam.association.second_looks.closures import Closure, held, settled
 from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.correlation_kernels import best_in_blocks, largest_ahead, mean_at
 from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.submap_match import Window, place_on
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
 from tests.slam.association.drives import drifting, driven, followed, motions_of, off_m, returns_at, round_the_ring
@@ -71,13 +71,13 @@ def test_of_two_equal_rooms_each_is_the_others_rival(rooms):
     pose = np.array([0.7, 1.0, 0.4])
     window = Window(pose + np.array([0.4, -0.3, 0.1]), 3.2, 0.3)
     surface = np.concatenate([room(x) for x in rooms])
-    place = place_on(surface, to_robot(room(0.0), pose), window, PLACES)
+    place = place_on(surface, to_robot(room(0.0), pose), window, PLACES.place)
     assert place.score > 0.9
     if len(rooms) == 1:
-        assert place.rival < PLACES.rival * place.score
+        assert place.rival < PLACES.place.rival * place.score
         np.testing.assert_allclose(place.pose, pose, atol=0.02)
     else:
-        assert place.rival > PLACES.rival * place.score
+        assert place.rival > PLACES.place.rival * place.score
 
 
 def test_equal_rooms_close_no_loop():

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from slam.association.place_search import Place, apart
 from slam.association.second_looks import loop_search
 from slam.association.second_looks.closures import Closure, settled
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.submap_match import Place, apart
 from slam.association.second_looks.submaps import Returns
 from slam.geometry.poses import compose, inverse
 from tests.slam.association.drives import driven, followed
@@ -232,12 +232,14 @@ def test_a_motion_in_which_the_robot_slipped_gives_way_to_closures():
 
 def test_another_place_is_one_half_a_metre_away_or_turned_by_ten_degrees():
     poses = np.array([[0.0, 0.0, 0.1], [0.4, 0.0, 0.1], [0.4, 0.4, 0.1], [0.0, 0.0, -3.1], [0.0, 0.0, 0.25]])
-    np.testing.assert_array_equal(apart(poses, np.array([0.0, 0.0, 0.1]), PLACES), [False, False, True, True, False])
+    np.testing.assert_array_equal(
+        apart(poses, np.array([0.0, 0.0, 0.1]), PLACES.place), [False, False, True, True, False]
+    )
 
 
 def test_between_neighbouring_returns_of_one_surface_there_is_surface():
     corner = np.array([[1.0, 0.0], [1.0, 0.28], [1.0, 0.7]])
     (surface,) = Returns([corner], PLACES).surfaces
     y = np.sort(surface[:, 1])
-    assert np.diff(y[y < 0.29]).max() <= PLACES.cell_m
+    assert np.diff(y[y < 0.29]).max() <= PLACES.place.cell_m
     assert np.diff(y).max() == pytest.approx(0.42)

@@ -59,21 +59,24 @@ def best_in_blocks(
     square of `size` cells of `fine`.
     """
     blocks = (2 * reach + size) // size
-    turns = len(rows)
-    upper = np.empty(turns * blocks * blocks)
-    for a in range(turns):
+    upper, of, count = np.empty(64), np.empty((64, 3), np.int64), 0
+    for a in range(len(rows)):
         for i in range(blocks):
             for j in range(blocks):
-                upper[(a * blocks + i) * blocks + j] = mean_at(
-                    bounds, rows[a], columns[a], i * size - reach, j * size - reach
-                )
-    order = np.argsort(-upper)
+                bound = mean_at(bounds, rows[a], columns[a], i * size - reach, j * size - reach)
+                if bound < least:
+                    continue
+                if count == len(upper):
+                    upper, of = np.concatenate((upper, np.empty(count))), np.concatenate((of, np.empty_like(of)))
+                upper[count], of[count, 0], of[count, 1], of[count, 2] = bound, a, i, j
+                count += 1
+    order = np.argsort(-upper[:count])
     found = np.empty((len(order), 4))
     count, best = 0, least
     for index in order:
-        if upper[index] < max(least, share * best):
+        if upper[index] < share * best:
             break
-        a, i, j = index // (blocks * blocks), (index // blocks) % blocks, index % blocks
+        a, i, j = of[index, 0], of[index, 1], of[index, 2]
         top, at_y, at_x = -1.0, 0, 0
         for dy in range(i * size - reach, min(i * size - reach + size, reach + 1)):
             for dx in range(j * size - reach, min(j * size - reach + size, reach + 1)):
