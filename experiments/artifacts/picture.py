@@ -62,6 +62,7 @@ def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> 
         subtitle=";  ".join(words),
         odometry_path_world=odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)]),
         radius_m=config.robot.radius_m,
+        was_explored=config.strategy != STRATEGY_OF_REPLAYS,
     )
 
 

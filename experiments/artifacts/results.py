@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from explore.floor.free_space import FreeSpace
 from sim.logs.keyframes import RecordedLog
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
@@ -26,6 +27,7 @@ from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
 from .maps.dimensions import dimensions
+from .maps.drawn_floor import drawn_floor
 from .maps.dxf import map_dxf
 from .maps.geojson import map_geojson
 from .maps.mapped import corners_of
@@ -110,10 +112,13 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _picture(result),
     }
-    if last.free_space.evidence.size:
-        # Both come from one pass over the grid; a recorded robot keeps none.
-        files["map.pgm"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[0]
-        files["map.yaml"] = lambda: occupancy_files(last.free_space, log.estimated_world[0])[1]
+    floor: FreeSpace | None = last.free_space
+    if recorded is not None and not last.free_space.evidence.size:
+        # Nobody planned, so nobody kept the floor while the robot drove.
+        floor = drawn_floor(recorded.recording, shown.estimated_world, result.scenario.config.mission.free_space)
+    if floor is not None and np.any(floor.evidence):
+        files["map.pgm"] = lambda: occupancy_files(floor, shown.estimated_world[0])[0]
+        files["map.yaml"] = lambda: occupancy_files(floor, shown.estimated_world[0])[1]
     return files
 
 

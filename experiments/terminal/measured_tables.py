@@ -42,7 +42,7 @@ def _normalised(summaries: Sequence[dict[str, Any]]) -> Table:
     table = Table(title="squared errors in units of what is stated: 1 is honest, more overconfident")
     table.title_justify = "left"
     for name in ("", "count", "mean", "median", "in 95 %", "error, m", "stated, m"):
-        table.add_column(name, justify="left" if not name else "right", no_wrap=not name)
+        table.add_column(name, justify="left" if not name else "right", no_wrap=bool(name))
     for summary in summaries:
         for (key, words), (part, far) in product(_NORMALISED.items(), _PARTS.items()):
             found = (summary.get(key) or {}).get(part)
@@ -54,9 +54,9 @@ def _normalised(summaries: Sequence[dict[str, Any]]) -> Table:
 
 def _relations(title: str, kind: str, scale: float, told: Sequence[tuple[str, dict[str, Any]]]) -> Table:
     table = Table(title=title, title_justify="left")
-    table.add_column("", no_wrap=True)
+    table.add_column("")
     for name in ("count", "mean", "median", "sd", "max"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     for name, scores in told:
         for (times, words), (part, far) in product(_TIMES.items(), (("all", ""), ("far", ", 60 s apart"))):
             found = scores[times][part]

@@ -60,6 +60,8 @@ class Picture:
     title: str
     subtitle: str = ""
     set_aside: tuple[SetAside, ...] = ()
+    was_explored: bool = True
+    """Whether the robot chose its way; open ends of a drive that others chose are of no use to anybody."""
     true_path_world: Float[np.ndarray, "s 3"] | None = None
     corners_world: Float[np.ndarray, "c 2"] = field(default_factory=lambda: np.zeros((0, 2)))
     """Corners whose covariance is known, m."""
@@ -222,7 +224,7 @@ def _paths(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
 def _ends(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     aside = {(end.wall, end.side) for end in picture.set_aside}
     handles: list[Patch | Line2D] = []
-    ends = [end for chain in picture.chains for end in chain.open_ends]
+    ends = [end for chain in picture.chains for end in chain.open_ends if picture.was_explored]
     kinds = ((False, palette.ALARM, "open end"), (True, palette.TENTATIVE, "open end, set aside"))
     for set_aside, colour, label in kinds:
         places = [end.position_world for end in ends if ((end.wall, end.side) in aside) == set_aside]

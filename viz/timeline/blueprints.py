@@ -24,43 +24,48 @@ Bounds = tuple[tuple[float, float], tuple[float, float]]
 """From and to along x and along y of a view, y down."""
 
 
-def one_run(backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -> rrb.Horizontal:
+def one_run(
+    backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds, knows_truth: bool = True
+) -> rrb.Horizontal:
     """Return the layout of one run: the map large, the estimate's insides beside it, the reasons below."""
     below = rrb.Horizontal(_decisions(backend), _legend(), column_shares=[1.2, 1])
-    left = rrb.Vertical(map_view(backend, seen_world), below, row_shares=[2.1, 1])
+    left = rrb.Vertical(map_view(backend, seen_world, knows_truth), below, row_shares=[2.1, 1])
     right = rrb.Vertical(
         rrb.Horizontal(model_view(backend, plane), graph_view(backend, seen_world)),
-        nees_view(legend=True),
+        nees_view(legend=True) if knows_truth else curve_view(NIS, NIS_NAME, NIS_SPAN),
         rrb.Horizontal(curve_view(TRACE, TRACE_NAME), curve_view(STEP_MS, STEP_MS_NAME, STEP_MS_SPAN)),
         rrb.Horizontal(
             curve_view(ENDS, "open ends"),
             curve_view(LINES, "walls"),
             curve_view((CHAINS, CLOSED), "chains"),
             curve_view(PATH, "path, m"),
-            curve_view(NIS, NIS_NAME, NIS_SPAN),
+            *([curve_view(NIS, NIS_NAME, NIS_SPAN)] if knows_truth else []),
         ),
         row_shares=[2.2, 1.4, 1, 1],
     )
     return rrb.Horizontal(left, right, column_shares=[1.25, 1], name="run")
 
 
-def comparison(backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], plane: Bounds) -> rrb.Vertical:
+def comparison(
+    backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], plane: Bounds, knows_truth: bool = True
+) -> rrb.Vertical:
     """Return the layout of several back ends side by side, and their curves in common plots."""
     columns = rrb.Horizontal(
         *(
             rrb.Vertical(
-                map_view(backend, seen_world),
+                map_view(backend, seen_world, knows_truth),
                 rrb.Tabs(model_view(backend, plane), graph_view(backend, seen_world)),
                 row_shares=[1.6, 1],
             )
             for backend in backends
         )
     )
+    of_the_error = [
+        curve_view(LOG_NEES, "log₁₀ of the pose's NEES, its 95 % band in grey", (-1.5, 6.5), legend=True),
+        nees_view(legend=True),
+    ]
     curves = rrb.Horizontal(
-        rrb.Tabs(
-            curve_view(LOG_NEES, "log₁₀ of the pose's NEES, its 95 % band in grey", (-1.5, 6.5), legend=True),
-            nees_view(legend=True),
-        ),
+        rrb.Tabs(*of_the_error) if knows_truth else curve_view(NIS, NIS_NAME, NIS_SPAN, legend=True),
         curve_view(TRACE, TRACE_NAME),
         rrb.Tabs(
             curve_view(LINES, "walls"), curve_view(ENDS, "open ends"), curve_view((CHAINS, CLOSED), "chains"),
@@ -73,14 +78,15 @@ def comparison(backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], pl
     return rrb.Vertical(columns, curves, row_shares=[2.4, 1], name="side by side")
 
 
-def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.Spatial2DView:
-    """Return the map of one back end over the truth."""
+def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"], knows_truth: bool = True) -> rrb.Spatial2DView:
+    """Return the map of one back end, over the truth where that is known."""
+    over = " over the truth" if knows_truth else ""
     start, end = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     so_far = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=end) for line in (STEP, SIM_TIME)])
     return rrb.Spatial2DView(
         origin="/", contents=["/world/truth/**", f"{WHEELS}/**", f"/world/{backend}/**"],
         visual_bounds=_bounds(seen_world, 0.6),
-        name=f"{backend}: map over the truth  (robot's 3σ ×{POSE_TIMES:.0f})", background=WHITE,
+        name=f"{backend}: map{over}  (robot's 3σ ×{POSE_TIMES:.0f})", background=WHITE,
         defaults=[style(2.6, 24.0)],
         overrides=dict.fromkeys(("/world/truth/path", WHEELS, f"/world/{backend}/path"), so_far),
     )  # fmt: skip

@@ -33,6 +33,8 @@ class Lane:
         self._keeper = Keeper()
         self._kept: list[DrawnStep] = []
         self._r_span = (0.0, 0.0)
+        self.seen_world = np.zeros((0, 2))
+        """Ends of the walls of the last step, m."""
         kinds = (
             SweptLayer,
             WallsLayer,
@@ -59,6 +61,7 @@ class Lane:
 
     def add(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> None:
         """Keep a step; its belief is asked at once, before the back end moves on."""
+        self.seen_world = step.map.ends_world.reshape(-1, 2)
         self._kept.append(self._keeper.keep(step, true_pose_world))
 
     def flush(self) -> None:

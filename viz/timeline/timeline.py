@@ -94,19 +94,22 @@ class Timeline:
             (1, "swept", packed(palette.SWEPT)),
         ]
         self._out.fixed("/world", rr.AnnotationContext(classes))
-        self._out.fixed("/legend", rr.TextDocument(legend(title, len(self._lanes) == 1), media_type="text/markdown"))
+        self._out.fixed(
+            "/legend",
+            rr.TextDocument(legend(title, len(self._lanes) == 1, bool(self._rings)), media_type="text/markdown"),
+        )
 
     def _layout(self) -> rrb.Blueprint:
         plane = self._plane()
         self._out.fixed("/model", rr.Transform3D(scale=[plane.alpha_units, -1.0, 1.0]))
         self._out.fixed("/model/axes", *plane.axes())
-        seen = np.concatenate(self._rings) if self._rings else np.zeros((0, 2))
+        seen = np.concatenate(self._rings or [np.zeros((0, 2)), *(lane.seen_world for lane in self._lanes.values())])
         backends = list(self._lanes)
         uses: list[rrb.Horizontal | rrb.Vertical] = []
         if len(backends) == 1:
-            uses = [one_run(backends[0], seen, plane.bounds())]
+            uses = [one_run(backends[0], seen, plane.bounds(), bool(self._rings))]
         elif backends:
-            uses = [comparison(backends, seen, plane.bounds())]
+            uses = [comparison(backends, seen, plane.bounds(), bool(self._rings))]
         return blueprint(*uses, *([] if self._summary is None else [self._summary.layout()]))
 
     def _plane(self) -> Plane:

@@ -4,18 +4,33 @@ import json
 
 import numpy as np
 import pytest
+import yaml
+from PIL import Image
 from rerun.chunk import RrdReader
 
 from experiments.commands.cli import main
 from experiments.replays.real_log import RealOptions, read_real_run
 from experiments.scenario import TrialConfig
+from viz.timeline.blueprints import comparison, one_run
+from viz.timeline.words import legend
 
 ROOM = (6.0, 4.0)
 STRAIGHTNESS = "mission.mapper.walls.reliability.straightness"
 MADE = {
     *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.dxf", "map.png", "steps.csv"),
-    *("trajectory_estimated.tum", "trajectory_odometry.tum"),
+    *("map.pgm", "map.yaml", "trajectory_estimated.tum", "trajectory_odometry.tum"),
 }
+
+
+NO_BOUNDS = np.zeros((0, 2)), ((0.0, 1.0), (0.0, 1.0))
+
+
+def names_of(part):
+    """The names of all views of a layout."""
+    inner = [
+        name for each in getattr(part, "contents", None) or [] if not isinstance(each, str) for name in names_of(each)
+    ]
+    return [*([part.name] if part.name else []), *inner]
 
 
 def seen_from(pose):
@@ -87,11 +102,37 @@ def test_the_timeline_has_the_wheels_path_beside_the_result_and_no_truth(replaye
     paths = {str(path) for path in RrdReader(replayed / "a.rrd").store().schema().entity_paths()}
     assert "/world/odometry/path" in paths
     assert not [path for path in paths if path.startswith("/world/truth")]
+    words = legend("room.log", plans=False, knows_truth=False)
+    assert "truth" not in words
+    assert "NEES" not in words
+    assert "NEES" in legend("room.log", plans=False)
+    for layout in (one_run("graph", *NO_BOUNDS, False), comparison(["graph"], *NO_BOUNDS, False)):
+        assert not [name for name in names_of(layout) if "truth" in name or "NEES" in name]
+        assert [name for name in names_of(layout) if "NIS" in name]
     rows = sum(
         chunk.num_rows for chunk in RrdReader(replayed / "a.rrd").stream().filter(content="/world/odometry/path")
     )
     steps = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
     assert rows == steps + 1, "one row for each step, sent once for both back ends, and one for the style"
+
+
+def test_the_ros_map_of_it_is_the_floor_that_its_scans_show(replayed):
+    grey = np.asarray(Image.open(replayed / "out" / "full-ekf" / "map.pgm"))[::-1]
+    told = yaml.safe_load((replayed / "out" / "full-ekf" / "map.yaml").read_text())
+    assert told["image"] == "map.pgm"
+
+    def at(x, y):
+        """Grey at a place in the true room, whose corner the first pose knows."""
+        column, row = np.floor((np.array([x - 1.0, y - 1.5]) - told["origin"][:2]) / told["resolution"]).astype(int)
+        return grey[row, column]
+
+    assert {at(x, y) for x in (2.0, 3.0, 4.0) for y in (0.6, 1.5, 3.0)} == {254}
+    assert at(3.0, 4.15) == at(6.15, 2.0) == 205
+    occupied = np.argwhere(grey == 0)[:, ::-1] * told["resolution"] + told["origin"][:2] + np.array([1.0, 1.5])
+    off = np.abs(np.concatenate([occupied[:, [0]] - [0.0, ROOM[0]], occupied[:, [1]] - [0.0, ROOM[1]]], axis=1)).min(
+        axis=1
+    )
+    assert off.max() < 0.1
 
 
 def test_a_report_is_made_of_it(replayed, capsys):
