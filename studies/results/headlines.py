@@ -10,6 +10,7 @@ from .plans import apartments, courts, navigation, real_plans, schools, whole_sc
 from .worlds import bundled, intervals, paper, paper_method
 
 STORED = Path("studies/results/rows")
+REAL_PLANS = "real-plans.md"
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Headline:
     """What makes its rows."""
     rows: Path
     make: Callable[[Sequence[Row]], Found]
+    page: str = "results.md"
+    """Where it stands in `docs`."""
 
 
 HEADLINES = (
@@ -66,6 +69,7 @@ HEADLINES = (
         "make apartments",
         STORED / "apartments.jsonl",
         apartments,
+        REAL_PLANS,
     ),
     Headline(
         "The paper's question in real plans: six back ends on the same drives",
@@ -73,6 +77,7 @@ HEADLINES = (
         "make real-plans",
         STORED / "real-plans.jsonl",
         real_plans,
+        REAL_PLANS,
     ),
     Headline(
         "Schools and offices, eight back ends",
@@ -80,6 +85,7 @@ HEADLINES = (
         "make schools",
         STORED / "schools.jsonl",
         schools,
+        REAL_PLANS,
     ),
     Headline(
         "Schools and offices, to the end",
@@ -87,6 +93,7 @@ HEADLINES = (
         "make schools-whole",
         STORED / "schools-whole.jsonl",
         whole_schools,
+        REAL_PLANS,
     ),
     Headline(
         "Courts: a start without a wall in sight",

@@ -1,4 +1,4 @@
-"""The page of results, made from stored rows; says which of them are of another code than this one.
+"""The pages of results, made from stored rows; says which of them are of another code than this one.
 
 .venv/bin/python -m studies.results.page
 """
@@ -14,24 +14,26 @@ import tyro
 from ..runner.rows import Row, fingerprint
 from .headlines import HEADLINES, STORED, Headline
 
-PAGE = Path("docs/results.md")
+DOCS = Path("docs")
 BEGIN, END = "<!-- made by `make results` -->", "<!-- end -->"
 
 
 @dataclass(frozen=True)
 class Results:
-    """Put the headline tables between two marks of the page, and print which rows are stale."""
+    """Put the headline tables between two marks of their pages, and print which rows are stale."""
 
-    page: Path = PAGE
-    """The page; all else on it stays."""
+    docs: Path = DOCS
+    """The folder of the pages; all else on them stays."""
 
     def run(self) -> None:
-        """Write the page and print a line for each table."""
-        text = self.page.read_text()
-        head, tail = text[: text.index(BEGIN)], text[text.index(END) :]
+        """Write the pages and print a line for each table."""
         found = [(headline, newest(headline.rows)) for headline in HEADLINES]
-        body = "\n".join(section(headline, rows) for headline, rows in found if rows)
-        self.page.write_text(f"{head}{BEGIN}\n\n{body}\n{tail}")
+        for name in dict.fromkeys(headline.page for headline in HEADLINES):
+            page = self.docs / name
+            text = page.read_text()
+            head, tail = text[: text.index(BEGIN)], text[text.index(END) :]
+            body = "\n".join(section(headline, rows) for headline, rows in found if rows and headline.page == name)
+            page.write_text(f"{head}{BEGIN}\n\n{body}\n{tail}")
         for headline, rows in found:
             print(f"{state(rows)}: {headline.title} ({len(rows)} rows in {headline.rows}; {headline.command})")
 

@@ -16,13 +16,14 @@ def row(code, world, **more):
     return {"code": code, "world": world, "status": "complete", "errorless": True, **scores, **more}
 
 
-def test_the_page_is_the_one_that_the_stored_rows_make(request, tmp_path, capsys):
-    page = request.config.rootpath / "docs" / "results.md"
-    copy = tmp_path / "results.md"
-    text = page.read_text()
-    copy.write_text(text[: text.index(BEGIN)] + BEGIN + END + text[text.index(END) + len(END) :])
-    Results(copy).run()
-    assert copy.read_text() == text, "run `make results`"
+def test_the_pages_are_those_that_the_stored_rows_make(request, tmp_path, capsys):
+    docs = request.config.rootpath / "docs"
+    texts = {name: (docs / name).read_text() for name in {headline.page for headline in HEADLINES}}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text[: text.index(BEGIN)] + BEGIN + END + text[text.index(END) + len(END) :])
+    Results(tmp_path).run()
+    assert {name: (tmp_path / name).read_text() for name in texts} == texts, "run `make results`"
+    assert len(texts) == 2
     assert len(capsys.readouterr().out.splitlines()) == len(HEADLINES) <= 12
 
 
