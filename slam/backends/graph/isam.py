@@ -54,6 +54,10 @@ class Isam:
         """Take the factor of this number out; it must have been pushed."""
         self._removals.append(self._slots.pop(number))
 
+    def holds(self, number: int) -> bool:
+        """Whether the factor of this number was pushed."""
+        return number in self._slots
+
     def forget(self, line: int) -> None:
         """No longer prepare for questions about a line."""
         self._near = [key for key in self._near if key != line_key(line)]

@@ -1,5 +1,6 @@
 """Which observations of a factor graph must be linearised anew, because their line turned after they were entered."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from math import atan2, cos, sin, sqrt
 
@@ -61,9 +62,9 @@ class Loose:
         self._lines.pop(line, None)
         self._touched.pop(line, None)
 
-    def touched(self) -> dict[int, list[int]]:
-        """Return the lines seen since `calm`, with the observations that are new since it was last asked."""
-        touched = {line: self._touched[line] for line in sorted(self._touched)}
+    def touched(self, more: Collection[int] = ()) -> dict[int, list[int]]:
+        """Return the lines seen since `calm` and `more`, with the observations that are new since it was last asked."""
+        touched = {line: self._touched.get(line, []) for line in sorted({*self._touched, *more})}
         self._touched = {line: [] for line in touched}
         return touched
 
@@ -71,10 +72,13 @@ class Loose:
         """Take all lines as looked after."""
         self._touched.clear()
 
-    def suspects(self, line: int, new: list[int], alpha: float) -> list[int]:
-        """Return the observations to look after now that the line has direction `alpha`: the new, or all the loose."""
+    def suspects(self, line: int, new: list[int], alpha: float, anew: bool) -> list[int]:
+        """Return the observations to look after now that the line has direction `alpha`.
+
+        The new, and all the loose where it turned far or is linearised `anew`.
+        """
         at = self._lines[line]
-        if not at.numbers or abs(wrapped(alpha - at.alpha)) <= at.turn:
+        if not at.numbers or (not anew and abs(wrapped(alpha - at.alpha)) <= at.turn):
             return new
         at.alpha = alpha
         return sorted({*at.numbers, *new})

@@ -6,7 +6,7 @@ Here the first pose is the origin. What is entered is collected, and handed over
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.special import chdtri
 
 from ...geometry.poses import compose
@@ -167,9 +167,11 @@ class Solver:
         if self._is_settled:
             return
         self._expected_cov = self.pose_cov() if self._settled_at >= 0 else np.zeros((0, 0))
+        self._tighten(self._astray > 1.0)
         self._push()
         for _ in range(self._config.passes):
-            if not self._tighten() and self._astray.max(initial=0.0) <= self._config.closure:
+            far = self._astray > self._config.closure
+            if not self._tighten(far) and not np.any(far):
                 break
             self._push()
         if self.isam.is_waiting:
@@ -213,17 +215,23 @@ class Solver:
                 f"expected a pose within chi-square {self._beyond:.0f} of its prediction, found {beyond:.3g}"
             )
 
-    def _tighten(self) -> int:
-        """Collect anew the observations that their line's present direction puts wrong; return how many."""
-        count = 0
-        for line, numbers in self._loose.touched().items():
-            row = int(np.searchsorted(self.ids, line))
-            alpha = float(self.lines[row, 0])
-            for number in self._loose.suspects(line, numbers, alpha):
+    def _tighten(self, anew: Bool[np.ndarray, " n"]) -> int:
+        """Collect anew the observations that their line's present direction puts wrong; return how many.
+
+        Of the lines that are linearised `anew` these are all loose ones: where a line follows a turn and some of its
+        observations do not, each solution undoes the one before it, in every step from then on.
+        """
+        count, again = 0, set(self.ids[anew].tolist())
+        for line, numbers in self._loose.touched(again).items():
+            alpha = float(self.lines[int(np.searchsorted(self.ids, line)), 0])
+            for number in self._loose.suspects(line, numbers, alpha, line in again):
+                if not self.isam.holds(number):  # It is on its way in, linearised at this direction.
+                    continue
                 index, seen = self._record.seen_from[number], self._record.seen[number]
                 heading = float(self.pose[2] if index == self.last else self.isam.pose(index)[2])
                 epsilon = wrapped(seen[0] - alpha + heading)
-                if abs(epsilon - self._record.epsilons[number]) > self._loose.turn(seen):
+                off = abs(epsilon - self._record.epsilons[number])
+                if off > (0.0 if line in again else self._loose.turn(seen)):
                     self.leave_observations(line, [number])
                     self.enter_observation(line, number, epsilon, alpha, again=True)
                     count += 1
