@@ -18,7 +18,7 @@ from ..extraction.segments import Segments
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
 from .kernels.matching_kernels import matched, refused
 
-MatchingMethod = Literal["joint", "paper"]
+MatchingMethod = Literal["joint", "paper", "assignment"]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def match(
     count, ids = len(segments), walls.ids
     if not len(ids) or not count:
         return replace(NO_MATCHES, unmatched=np.arange(count))
-    limits, together = _limits(config), pair_levels(config.doubt, count)
+    limits, together = limits_of(config), pair_levels(config.doubt, count)
     seen = Seen(segments.lines, segments.cov, segments.ends, segments.is_tentative)
     whole = np.zeros(len(ids), dtype=bool) if walls.whole is None else walls.whole
     known = Known(joint.mean, np.ascontiguousarray(joint.cov), joint.anchors, walls.extents, whole)
@@ -123,12 +123,13 @@ def match(
         distances,
         np.flatnonzero(~is_matched),
         np.flatnonzero(~is_matched & doubtful),
-        {int(found.segment[pair]): _why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
+        {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
     )
 
 
 @lru_cache
-def _limits(config: MatchingConfig) -> Limits:
+def limits_of(config: MatchingConfig) -> Limits:
+    """Return the numbers as the loops read them."""
     shared = config.shared
     return Limits(
         gate_level(config.gate, 2),
@@ -145,7 +146,7 @@ def _limits(config: MatchingConfig) -> Limits:
     )
 
 
-def _why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:
+def why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:
     """Return why a candidate was refused."""
     wall, d2, gap = ids[found.line[pair]], found.d2[pair], found.gap[pair]
     if gap > -limits.overlap_m:

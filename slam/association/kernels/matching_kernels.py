@@ -27,16 +27,12 @@ def matched(
         covers[c] = found.gap[c] <= -limits.overlap_m
     if clear_only:
         chosen = _agreed(found, np.flatnonzero(covers), seen, known, limits, together)
-        chosen = _still_overlapping(chosen, found, seen, known, limits)
+        chosen = still_overlapping(chosen, found, seen, known, limits)
     else:
         for c in range(len(covers)):
             covers[c] = covers[c] and found.d2[c] <= limits.level
         chosen = _nearest(found, np.flatnonzero(covers), known, limits)
-    doubtful = np.zeros(len(seen.lines), np.bool_)
-    for c in range(len(covers)):
-        beside = _is_beside(c, found, seen, limits)
-        if beside or (found.d2[c] <= limits.doubt and found.gap[c] <= 0.0):
-            doubtful[found.segment[c]] = True
+    doubtful = near_a_wall(found, seen, limits)
     pairs = np.empty((len(chosen), 2), np.int64)
     for k in range(len(chosen)):
         pairs[k, 0], pairs[k, 1] = found.segment[chosen[k]], found.line[chosen[k]]
@@ -64,7 +60,7 @@ def _agreed(
 
 
 @compiled
-def _still_overlapping(
+def still_overlapping(
     chosen: Int[np.ndarray, " m"], found: Candidates, seen: Seen, known: Known, limits: Limits
 ) -> Int[np.ndarray, " k"]:
     """Drop pairs that no longer overlap at the pose that all of them lead to.
@@ -95,6 +91,17 @@ def _nearest(found: Candidates, rows: Int[np.ndarray, " r"], known: Known, limit
     segment, e, R = found.segment[rows], found.e[rows].ravel(), found.R[rows]
     _, S = taken_together(known.cov, found.line[rows], found.H_pose[rows], found.H_line[rows], R)
     return rows[nearest_alone(segment, found.d2[rows], e, S, R, limits.one_wall, limits.level)]
+
+
+@compiled
+def near_a_wall(found: Candidates, seen: Seen, limits: Limits) -> Bool[np.ndarray, " s"]:
+    """Return which segments lie too near a wall to be a new one."""
+    doubtful = np.zeros(len(seen.lines), np.bool_)
+    for c in range(len(found.segment)):
+        beside = _is_beside(c, found, seen, limits)
+        if beside or (found.d2[c] <= limits.doubt and found.gap[c] <= 0.0):
+            doubtful[found.segment[c]] = True
+    return doubtful
 
 
 @compiled

@@ -91,7 +91,7 @@ def nearest_alone(
             stop += 1
         is_alone = True
         for c in range(start, stop):
-            differ = c != best and _apart(c, best, e, S, R) > one_wall
+            differ = c != best and apart(c, best, e, S, R) > one_wall
             rivals = differ and d2[c] < d2[best] + clear
             is_alone = is_alone and not rivals
         if is_alone:
@@ -102,7 +102,7 @@ def nearest_alone(
 
 
 @compiled
-def _apart(
+def apart(
     one: int,
     other: int,
     e: Float[np.ndarray, " k"],
