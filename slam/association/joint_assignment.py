@@ -78,8 +78,9 @@ def hypotheses(
         gains = _log_ratios(left[others], cov[others], limits.density)
         choice = np.full(count, NEW)
         choice[segment[seed]] = seed
-        for c in others[np.argsort(gains, kind="stable")][gains[np.argsort(gains, kind="stable")] > 0.0].tolist():
-            choice[segment[c]] = c
+        for k in np.argsort(gains, kind="stable"):  # the likeliest comes last, and stays
+            if gains[k] > 0.0:
+                choice[segment[others[k]]] = others[k]
         score = _without_the_unlikely(choice, e, blocks, limits)
         choices[tuple(choice.tolist())] = score
     scores = np.array(list(choices.values()))
