@@ -1,6 +1,6 @@
 """What passes between a robot and this software: a scan and odometry come, a motion command goes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol, runtime_checkable
 
@@ -121,6 +121,15 @@ class Scan:
         if self.sigma_share <= 0.0:
             return sigmas
         return np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
+
+    def within(self, reach_m: float) -> "Scan":
+        """Return the scan of a scanner that reaches so far: what lies beyond is free up to there.
+
+        A beam that never came back tells nothing then: a real one does not from glass and black walls, either.
+        """
+        reach_m = min(reach_m, self.range_max_m)
+        ranges_m = np.where(self.ranges_m > reach_m, np.inf, self.ranges_m)
+        return replace(self, ranges_m=np.where(np.isposinf(self.ranges_m), np.nan, ranges_m), range_max_m=reach_m)
 
     @cached_property
     def step_rad(self) -> float:

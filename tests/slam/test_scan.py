@@ -127,3 +127,11 @@ def test_returns_below_the_minimum_range_tell_nothing():
     np.testing.assert_array_equal(scan.ranges_m[~np.isnan(scan.ranges_m)], np.delete(RANGES, [3, 5, 7]))
     with pytest.raises(RobotError, match="1 of 12 at 0"):
         Scan.ordered(FULL, np.where(np.arange(12) == 5, 0.0, RANGES), 0.01, 4.0, 0.0)
+
+
+def test_a_scanner_that_reaches_less_far_sees_the_way_there_free_and_what_never_came_back_not_at_all():
+    ranges = np.array([2.0, 30.0, np.inf, np.nan, 14.9])
+    near = Scan(np.deg2rad(np.arange(5.0)), ranges, 0.02, 80.0, 0.0).within(15.0)
+    np.testing.assert_array_equal(near.ranges_m, [2.0, np.inf, np.nan, np.nan, 14.9])
+    assert near.range_max_m == 15.0
+    assert near.within(40.0).range_max_m == 15.0

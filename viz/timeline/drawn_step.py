@@ -26,6 +26,8 @@ EVERY_SWEPT = 20
 EVERY_OWN_SCAN = 4
 """Without a grid of the mission's own (a replay plans nothing), every so many scans are drawn into one."""
 OWN_CELL_M = 0.1
+OWN_REACH_M = 15.0
+"""What scanners of a longer reach do not see again is not drawn as floor."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,8 @@ class Keeper:
         if not free_space.evidence.size:
             free_space = self._own = self._own or FreeSpace(FreeSpaceConfig(step.robot, OWN_CELL_M))
             if last or step.index % EVERY_OWN_SCAN == 0:
-                free_space.integrate(step.pose_world, step.scan)
+                is_far = step.scan.range_max_m > OWN_REACH_M
+                free_space.integrate(step.pose_world, step.scan.within(OWN_REACH_M) if is_far else step.scan)
         if not last and step.index % EVERY_SWEPT:
             return None
         return _picture(free_space)

@@ -1,10 +1,16 @@
 """The ROS map of a recorded drive: what its scans show of the floor, and what they leave open."""
 
+from unittest.mock import Mock
+
 import numpy as np
+import pytest
 
 from experiments.artifacts.maps.drawn_floor import drawn_floor
-from explore.floor.free_space import FreeSpaceConfig
+from explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from explore.step import Step
 from sim.logs.recorded_robot import Recording
+from slam.robot import RobotSpec, Scan
+from viz.timeline.drawn_step import Keeper
 
 BEARINGS = np.deg2rad(np.arange(-90.0, 91.0))
 
@@ -25,3 +31,13 @@ def test_what_a_real_scanner_does_not_see_again_is_neither_floor_nor_wall():
 def test_a_log_of_poses_that_no_grid_holds_has_no_ros_map():
     poses = np.array([[0.0, 0.0, 0.0], [1e5, 0.0, 0.0]])
     assert drawn_floor(recorded(np.full((2, 181), 2.0)), poses, FreeSpaceConfig()) is None
+
+
+@pytest.mark.parametrize(("reach_m", "floor"), [(80.0, False), (8.0, True)])
+def test_a_timeline_draws_floor_where_nothing_came_back_for_short_scanners_alone(reach_m, floor):
+    """A simulated scanner of 8 m gets nothing where there is nothing; one of 80 m gets nothing from glass."""
+    pose = np.zeros(3)
+    scan = Scan(BEARINGS, np.full(181, np.inf), 0.02, reach_m, 0.0)
+    step = Mock(Step, free_space=FreeSpace(), robot=RobotSpec(), index=0, pose_world=pose, scan=scan)
+    swept = Keeper()._swept(step, last=True)
+    assert (swept is not None and swept.free.size > 1000) == floor
