@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from explore.floor.carrying_kernels import carried
+from slam.association.place_search import Window, place_on
 
 from ..commands.cli import main
 
@@ -23,6 +24,8 @@ def compile_kernels() -> int:
     """Call the kernels of a step, of the graph and of scan matching once and return the exit status."""
     # No grid is drawn anew in so short a run.
     carried(np.zeros((1, 3)), np.ones(1), np.zeros(1), np.zeros((1, 2, 2)), np.zeros((1, 2)), 0.01)
+    # Nor is a robot lost.
+    place_on(np.zeros((1, 2)), np.zeros((1, 2)), Window(np.zeros(3), 0.1, 0.1))
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()):
         driven, replayed = (Path(folder) / name for name in ("driven", "replayed"))
         status = max(main(["explore", *run.split(), "--out", f"{driven}{i}"]) for i, run in enumerate(RUNS))
