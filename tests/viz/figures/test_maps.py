@@ -53,6 +53,11 @@ def test_ellipses_of_corners_that_could_not_be_seen_are_enlarged_and_the_legend_
     assert f"3σ ellipse of a corner{words}" in shown
 
 
+def test_open_ends_of_a_drive_that_others_chose_are_not_circled():
+    assert "open end" in labels(draw_map(picture(closed=False)))
+    assert "open end" not in labels(draw_map(replace(picture(closed=False), was_explored=False)))
+
+
 def test_the_grid_lies_on_the_floor_and_below_the_paths():
     (axes,) = draw_map(picture(closed=True)).axes
     floor, paths = max(patch.zorder for patch in axes.patches[:2]), min(line.zorder for line in axes.lines)
