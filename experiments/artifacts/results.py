@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from explore.floor.free_space import FreeSpace
 from sim.logs.keyframes import RecordedLog
 from slam.evaluation.consistency import pose_errors
 from slam.geometry.poses import wrap
@@ -86,8 +85,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     }
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()
-    log, last = result.log, result.last
-    certificate = result.certificate
+    log, last, certificate = result.log, result.last, result.certificate
     if log is None or last is None or certificate is None:
         return files
     smoothed, recorded = result.smoothed, result.recorded
@@ -112,13 +110,12 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _picture(result),
     }
-    floor: FreeSpace | None = last.free_space
-    if recorded is not None and not last.free_space.evidence.size:
-        # Nobody planned, so nobody kept the floor while the robot drove.
+    floor = last.free_space
+    if recorded is not None and not floor.evidence.size:  # Nobody planned, so nobody kept it.
         floor = drawn_floor(recorded.recording, shown.estimated_world, result.scenario.config.mission.free_space)
-    if floor is not None and np.any(floor.evidence):
-        files["map.pgm"] = lambda: occupancy_files(floor, shown.estimated_world[0])[0]
-        files["map.yaml"] = lambda: occupancy_files(floor, shown.estimated_world[0])[1]
+    if np.any(floor.evidence):
+        ros_map = cache(lambda: occupancy_files(floor, shown.estimated_world[0]))
+        files |= {"map.pgm": lambda: ros_map()[0], "map.yaml": lambda: ros_map()[1]}
     return files
 
 

@@ -8,14 +8,12 @@ from sim.logs.recorded_robot import Recording
 from slam.odometry.config import ScanMatchingConfig
 
 
-def drawn_floor(
-    recording: Recording, poses_world: Float[np.ndarray, "s 3"], config: FreeSpaceConfig
-) -> FreeSpace | None:
-    """Return the free floor by a recording's scans at these poses; None where no grid is large enough for them."""
+def drawn_floor(recording: Recording, poses_world: Float[np.ndarray, "s 3"], config: FreeSpaceConfig) -> FreeSpace:
+    """Return the free floor by a recording's scans at these poses; none of it where no grid is large enough."""
     floor = FreeSpace(config)
     try:
         for index, pose_world in enumerate(poses_world):
             floor.integrate(pose_world, recording.scan(index).within(ScanMatchingConfig.reach_m))
     except FloorTooLargeError:
-        return None
+        return FreeSpace(config)
     return floor

@@ -30,7 +30,7 @@ def test_what_a_real_scanner_does_not_see_again_is_neither_floor_nor_wall():
 
 def test_a_log_of_poses_that_no_grid_holds_has_no_ros_map():
     poses = np.array([[0.0, 0.0, 0.0], [1e5, 0.0, 0.0]])
-    assert drawn_floor(recorded(np.full((2, 181), 2.0)), poses, FreeSpaceConfig()) is None
+    assert drawn_floor(recorded(np.full((2, 181), 2.0)), poses, FreeSpaceConfig()).evidence.size == 0
 
 
 @pytest.mark.parametrize(("reach_m", "floor"), [(80.0, False), (8.0, True)])
