@@ -32,8 +32,8 @@ def views() -> list[View]:
     world, seen = load("paper-fig9"), []
 
     class Watched(Mapper):
-        def _view(self, *scan_segments_walls) -> View:
-            view = super()._view(*scan_segments_walls)
+        def _view(self, *scan_segments_walls, **asked) -> View:
+            view = super()._view(*scan_segments_walls, **asked)
             seen.append(view)
             return view
 
