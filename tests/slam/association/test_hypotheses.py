@@ -111,6 +111,15 @@ def test_no_hypothesis_holds_a_pair_outside_the_gate_or_less_likely_than_a_new_w
             assert pair == NEW or log_weight(choice, seen) > log_weight(without, seen)
 
 
+def test_a_segment_of_which_a_new_wall_is_likelier_does_not_wait_for_a_known_one():
+    """Its wall is known so badly that it fits, and so would anything."""
+    sigmas = np.array([0.01, 0.01, 1.0, 3.0])
+    seen = Scene(np.arange(2), np.array([0.0, 0.0, 2.0, 0.0]), np.diag(sigmas**2))
+    chosen, waits = acting(seen.segment, seen.e, seen.S, np.zeros((2, 2, 2)), *seen.hypotheses(), LIMITS)
+    assert chosen.tolist() == [0]
+    assert waits.tolist() == [False, False]
+
+
 def test_segments_of_few_beams_begin_no_hypothesis():
     choices, weights = scene(np.random.default_rng(1)).hypotheses(np.zeros(6, dtype=bool))
     assert choices.tolist() == [[NEW] * 3]
