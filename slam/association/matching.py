@@ -1,8 +1,7 @@
-"""Which wall of the map each segment of a scan belongs to (paper, section 2.1): one joint assignment.
+"""Which wall of the map each segment of a scan belongs to (paper, section 2.1).
 
-Each segment goes to a wall, to a new one or to none, by the weights of hypotheses on all segments of the scan. What
-hypotheses of nearly all the weight share acts; what they differ in waits. A segment overlaps its wall along the line
-(so that the two walls beside a door stay two), and was seen from its side (so that two faces of a thin wall stay two).
+A chi-square gate on the joint covariance of the pose and the lines, an overlap along the line (so that the two walls
+beside a door stay two), and the side from which each was seen (so that two faces of a thin wall stay two).
 """
 
 from dataclasses import dataclass, replace
@@ -13,13 +12,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import Joint, Observations
-from ..estimation.gates import gate_level
+from ..estimation.gates import gate_level, pair_levels
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
-from .kernels.matching_kernels import assigned, refused
+from .kernels.matching_kernels import matched, refused
 
-MatchingMethod = Literal["joint", "paper"]
+MatchingMethod = Literal["joint", "paper", "assignment"]
 
 
 @dataclass(frozen=True)
@@ -28,10 +27,11 @@ class MatchingConfig:
 
     shared: SharedConfig = of_shared()
     method: MatchingMethod = "joint"
-    """All segments of a scan together, or each alone by `gate` and `shared.short_m`, as in the paper (`methods`)."""
+    """All segments of a scan together, or each alone by `gate` and `shared.short_m`, as in the paper, or assigned
+    by the weights of hypotheses (`methods`)."""
     gate: float = 0.99
-    """Probability level of the chi-square gate of each segment given all others; and the share of the weight of
-    hypotheses with which a segment is of a wall, or of none."""
+    """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to
+    be clear."""
     angle_rad: float = 1.05
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
     beside_rad: float = 0.35
@@ -43,10 +43,9 @@ class MatchingConfig:
     overlap_m: float = 0.02
     """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
     apart than a wall is thick."""
-    density: float = 0.01
-    """Walls that nobody has seen where the map has one, per radian of direction and metre of offset: five in sight of
-    4 m are 0.1, and of the walls that the map expects in sight a tenth is not seen. A segment is of a known wall only
-    where that is likelier; the only pair of a scan may lie beyond the gate."""
+    density: float = 0.1
+    """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
+    sight is matched beyond the gate too where a new one would be less likely."""
 
     @property
     def doubt(self) -> float:
@@ -106,18 +105,17 @@ def match(
 ) -> Matches:
     """Match segments to the lines of `joint`, which are those of `walls` in the same order.
 
-    A segment is matched that is of one wall with the probability `gate`; one that is of none with as much is unmatched.
-    All others are doubtful. `clear_only` asks for an overlap at the pose that the pairs lead to, too: what is safe
-    enough to relocate the robot by.
+    With `clear_only`, keep only segments with one candidate that stands out, and of these only a jointly
+    compatible set: what is safe enough to relocate the robot by.
     """
     count, ids = len(segments), walls.ids
     if not len(ids) or not count:
         return replace(NO_MATCHES, unmatched=np.arange(count))
-    limits = limits_of(config)
+    limits, together = limits_of(config), pair_levels(config.doubt, count)
     seen = Seen(segments.lines, segments.cov, segments.ends, segments.is_tentative)
     whole = np.zeros(len(ids), dtype=bool) if walls.whole is None else walls.whole
     known = Known(joint.mean, np.ascontiguousarray(joint.cov), joint.anchors, walls.extents, whole)
-    pairs, distances, doubtful, found = assigned(seen, known, limits, clear_only)
+    pairs, distances, doubtful, found = matched(seen, known, limits, together, clear_only)
     is_matched = np.zeros(count, dtype=bool)
     is_matched[pairs[:, 0]] = True
     pairs[:, 1] = ids[pairs[:, 1]]
@@ -126,7 +124,7 @@ def match(
         distances,
         np.flatnonzero(~is_matched),
         np.flatnonzero(~is_matched & doubtful),
-        {int(found.segment[pair]): _why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
+        {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
     )
 
 
@@ -138,7 +136,6 @@ def limits_of(config: MatchingConfig) -> Limits:
         gate_level(config.gate, 2),
         gate_level(config.doubt, 2),
         gate_level(config.one_wall, 2),
-        float(config.gate),
         float(np.cos(config.angle_rad)),
         float(config.overlap_m),
         float(config.beside_rad),
@@ -150,7 +147,7 @@ def limits_of(config: MatchingConfig) -> Limits:
     )
 
 
-def _why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:
+def why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:
     """Return why a candidate was refused."""
     wall, d2, gap = ids[found.line[pair]], found.d2[pair], found.gap[pair]
     if gap > -limits.overlap_m:

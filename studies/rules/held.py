@@ -27,8 +27,8 @@ OPTIONS = (
 NEAR = {
     "candidate_kernels": "gate matching",
     "joint_kernels": "gate matching extract split_kernels",
-    "matching_kernels": "gate matching scenes hypotheses joint_compatibility",
-    "hypothesis_kernels": "gate hypotheses scenes matching",
+    "matching_kernels": "gate matching hypotheses joint_compatibility",
+    "hypothesis_kernels": "gate hypotheses matching",
     "rest_kernels": "gate hypotheses matching joint_compatibility",
     "mapper": "mapper matching vertices change_points candidates merge reliability recovery view",
     "map_keeper": "mapper matching vertices change_points candidates merge reliability straightness",

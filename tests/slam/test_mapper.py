@@ -201,10 +201,7 @@ def test_extents_and_ends_follow_the_line_they_are_measured_along():
 
 @pytest.mark.parametrize("backend", list(BACKENDS))
 def test_walls_that_were_entered_twice_are_merged(backend):
-    """Matching is blind for two scans, so that all walls are entered again.
-
-    By the diagonal blocks alone some are not seen again as what they are: young as they are, they are forgotten.
-    """
+    """Matching is blind for two scans, so that all walls are entered again."""
     scans = {"at": 0}
 
     def blind(segments, walls, joint, config, *, clear_only=False):
@@ -215,8 +212,7 @@ def test_walls_that_were_entered_twice_are_merged(backend):
 
     updates = list(walk(SQUARE, PLACES * 2, backend, matcher=blind, config=AT_ITS_WORD))
     last = updates[-1]
-    assert max(len(update.map) for update in updates) >= 8
-    assert sum(len(update.merged) for update in updates) >= (0 if "block" in backend else 4)
+    assert sum(len(update.merged) for update in updates) >= 4
     assert len(last.map) == 4
     assert [chain.is_closed for chain in last.chains] == [True]
     assert set(last.walls_of_segments.tolist()) <= {-1, *last.map.ids.tolist()}

@@ -19,8 +19,6 @@ class Limits(NamedTuple):
     doubt: float
     """Of what is not ruled out."""
     one_wall: float
-    sure: float
-    """Share of the weight of hypotheses with which a pair acts."""
     angle_cosine: float
     overlap_m: float
     beside_rad: float

@@ -1,9 +1,8 @@
-"""Joint hypotheses on what the segments of a scan are of, and what hypotheses of nearly all the weight share.
+"""Which pairs of segment and wall agree on where the robot is: each pair in turn is believed, and the others judged.
 
 The wheels may have slipped by a degree or two in the last step, which is as much as many walls bend: each segment by
 itself then fits its neighbour's wall best. All of them together fit only after one and the same slip (joint
-compatibility, Neira and Tardos 2001; with one pair as the seed of each hypothesis nothing branches). Hypotheses are
-weighed by their likelihood, with the density of new walls for each segment that is of none (Reid 1979).
+compatibility, Neira and Tardos 2001; with one pair as the seed of each hypothesis nothing branches).
 """
 
 import math
@@ -13,146 +12,158 @@ from jaxtyping import Bool, Float, Int
 
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import squared_distance
-from .candidate_kernels import Limits
-from .rest_kernels import apart, judged_by_the_rest, own_distance
-
-NEW = -1
-"""In the place of a candidate: the segment is of no known wall."""
+from .rest_kernels import UNMATCHED, judged_by_the_rest, own_distance
 
 
 @compiled
-def hypotheses(
+def agree(
     segment: Int[np.ndarray, " c"],
+    line: Int[np.ndarray, " c"],
     e: Float[np.ndarray, " k"],
     S: Float[np.ndarray, "k k"],
     may_seed: Bool[np.ndarray, " c"],
-    count: int,
-    limits: Limits,
-) -> tuple[Int[np.ndarray, "h s"], Float[np.ndarray, " h"]]:
-    """Return the candidate of each of `count` segments in each hypothesis, `NEW` for none, and posterior weights.
-
-    Candidates are pairs of `segment`, ascending, with a wall; they differ from what is predicted by e, together of
-    covariance S, k = 2 c. Each that is not ruled out is believed in turn, and each other segment has its likeliest
-    given that, if it is likelier than a new wall. What is less likely than that given all others is given up. In one
-    more hypothesis all segments are new.
-    """
-    choices = np.full((len(segment) + 1, count), NEW)
-    logs, found = np.zeros(len(choices)), 1
-    for seed in range(len(segment)):
-        if may_seed[seed] and own_distance(seed, e, S) <= limits.doubt:
-            choice = choices[found]
-            _likeliest_given(choice, seed, segment, e, S, limits.density)
-            logs[found] = _without_the_unlikely(choice, e, S, limits)
-            found += 0 if _is_among(choice, choices[:found]) else 1
-    choices, weights = choices[:found].copy(), np.exp(logs[:found] - logs[:found].max())
-    return choices, weights / weights.sum()
-
-
-@compiled
-def acting(
-    segment: Int[np.ndarray, " c"],
-    e: Float[np.ndarray, " k"],
-    S: Float[np.ndarray, "k k"],
-    R: Float[np.ndarray, "c 2 2"],
-    choices: Int[np.ndarray, "h s"],
-    weights: Float[np.ndarray, " h"],
-    limits: Limits,
-) -> tuple[Int[np.ndarray, " m"], Bool[np.ndarray, " s"]]:
-    """Return the candidates that have enough of the weight, by segment, and which segments are sure of nothing.
-
-    Neither of a wall nor of none. Two landmarks that may be one wall count together. `R` is the noise of each
-    candidate's segment.
-    """
-    count = choices.shape[1]
-    chosen, found, waits = np.empty(count, np.int64), 0, np.zeros(count, np.bool_)
-    for s in range(count):
-        share = np.zeros(len(segment) + 1)
-        for h in range(len(choices)):
-            share[choices[h, s]] += weights[h]
-        best, weight = NEW, share[NEW]
-        for c in range(len(segment)):
-            if share[c] > weight:
-                best, weight = c, share[c]
-        if best != NEW:
-            for c in range(len(segment)):
-                if c != best and share[c] > 0.0 and apart(c, best, e, S, R) <= limits.one_wall:
-                    weight += share[c]
-        waits[s] = weight < limits.sure
-        if best != NEW and not waits[s]:
-            chosen[found] = best
-            found += 1
-    return chosen[:found].copy(), waits
-
-
-@compiled
-def _likeliest_given(
-    choice: Int[np.ndarray, " s"],
-    seed: int,
-    segment: Int[np.ndarray, " c"],
-    e: Float[np.ndarray, " k"],
-    S: Float[np.ndarray, "k k"],
+    level: float,
+    unmatched: float,
     density: float,
-) -> None:
-    """Choose, in place, the seed, and for each other segment its likeliest candidate given that the seed is right."""
-    choice[:] = NEW
-    choice[segment[seed]] = seed
-    best = np.zeros(len(choice))
-    for c in range(len(segment)):
-        s = segment[c]
-        if s != segment[seed]:
-            likelier = _log_ratio_given(c, seed, e, S, density)
-            if likelier > best[s]:
-                choice[s], best[s] = c, likelier
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    """Return the candidates (pairs of `segment`, ascending, and `line`) that the best hypothesis keeps, and margins.
+
+    They differ from what is predicted by e, together of covariance S, k = 2 c. Each candidate within the level
+    `unmatched` is the seed of a hypothesis: with it, for each segment, goes its best candidate within the gate's
+    `level` given the seed, less those that contradict the others. A hypothesis costs the squared distance of its pairs
+    taken together, and `unmatched` for each segment without one: what lies along a wall is hardly ever another. The
+    cheapest wins; a lone pair beyond the gate only if it is likelier so than a wall that nobody has seen, of which
+    there are `density` per rad m.
+
+    The margin of a pair is by how much the best hypothesis that gives the segment to another wall costs more; infinite
+    where there is none.
+    """
+    column = _columns(segment)
+    choices = _choices(segment, column, e, S, may_seed, level, unmatched)
+    count = choices.shape[1]
+    costs = np.empty(len(choices))
+    for h in range(len(choices)):
+        costs[h] = _drop_contradictions(choices[h], e, S, unmatched)
+        first, matched = UNMATCHED, 0
+        for k in range(count):
+            if choices[h, k] != UNMATCHED:
+                first = choices[h, k] if matched == 0 else first
+                matched += 1
+        costs[h] += unmatched * (count - matched)
+        if matched == 1:
+            alone = max(level, _unlike_new(first, S, density))
+            if own_distance(first, e, S) > alone:
+                costs[h] = math.inf
+    winner = np.argmin(costs) if len(costs) else -1
+    if winner < 0 or not math.isfinite(costs[winner]):
+        return np.zeros(0, np.int64), np.zeros(0)
+    pairs, margins, kept = np.empty(count, np.int64), np.empty(count), 0
+    for k in range(count):
+        pair = choices[winner, k]
+        if pair == UNMATCHED:
+            continue
+        least = math.inf
+        for h in range(len(choices)):
+            if choices[h, k] != UNMATCHED and line[choices[h, k]] != line[pair]:
+                least = min(least, costs[h])
+        pairs[kept], margins[kept] = pair, least - costs[winner]
+        kept += 1
+    return pairs[:kept].copy(), margins[:kept].copy()
 
 
 @compiled
-def _without_the_unlikely(
-    choice: Int[np.ndarray, " s"], e: Float[np.ndarray, " k"], S: Float[np.ndarray, "k k"], limits: Limits
-) -> float:
-    """Give up, in place, pairs that are outside the gate given all others, or less likely than new walls, worst first.
+def _columns(segment: Int[np.ndarray, " c"]) -> Int[np.ndarray, " c"]:
+    """Return for each candidate which of the segments that have one is its own."""
+    column = np.zeros(len(segment), np.int64)
+    for c in range(1, len(segment)):
+        column[c] = column[c - 1] + (segment[c] != segment[c - 1])
+    return column
 
-    Returns the logarithm of how much likelier the rest is than that all segments are of new walls.
+
+@compiled
+def _choices(
+    segment: Int[np.ndarray, " c"],
+    column: Int[np.ndarray, " c"],
+    e: Float[np.ndarray, " k"],
+    S: Float[np.ndarray, "k k"],
+    may_seed: Bool[np.ndarray, " c"],
+    level: float,
+    unmatched: float,
+) -> Int[np.ndarray, "h s"]:
+    """Return the candidate of each segment in each hypothesis, each hypothesis once, in ascending order."""
+    count = column[-1] + 1 if len(column) else 0
+    choices, found = np.empty((len(segment), count), np.int64), 0
+    choice, best = np.empty(count, np.int64), np.empty(count)
+    for seed in range(len(segment)):
+        if not (may_seed[seed] and own_distance(seed, e, S) <= unmatched):
+            continue
+        choice[:], best[:] = UNMATCHED, level
+        for c in range(len(segment)):
+            # A segment is one observation.
+            if segment[c] != segment[seed]:
+                distance = _distance_given(c, seed, e, S)
+                if distance <= best[column[c]]:
+                    choice[column[c]], best[column[c]] = c, distance
+        choice[column[seed]] = seed
+        found = _insert(choices, found, choice)
+    return choices[:found].copy()
+
+
+@compiled
+def _insert(choices: Int[np.ndarray, "h s"], found: int, choice: Int[np.ndarray, " s"]) -> int:
+    """Insert a choice among so many in ascending order, unless it is there; return how many there are then."""
+    at = found
+    while at > 0:
+        order = 0
+        for k in range(len(choice)):
+            if choice[k] != choices[at - 1, k]:
+                order = -1 if choice[k] < choices[at - 1, k] else 1
+                break
+        if order == 0:
+            return found
+        if order > 0:
+            break
+        at -= 1
+    for h in range(found, at, -1):
+        choices[h] = choices[h - 1]
+    choices[at] = choice
+    return found + 1
+
+
+@compiled
+def _drop_contradictions(
+    choice: Int[np.ndarray, " s"], e: Float[np.ndarray, " k"], S: Float[np.ndarray, "k k"], unmatched: float
+) -> float:
+    """Drop, in place, what costs more given all others than a segment without a wall, the worst first.
+
+    Returns the squared distance of what is left, taken together.
     """
     while True:
-        held = np.flatnonzero(choice != NEW)
-        if not len(held):
+        columns = np.flatnonzero(choice != UNMATCHED)
+        squared, losses = judged_by_the_rest(choice[columns], e, S)
+        if not len(columns):
             return 0.0
-        squared, log_det, distances, log_dets = judged_by_the_rest(choice[held], e, S)
-        worst = np.argmax(distances)
-        if len(held) == 1 or distances[worst] <= limits.level:
-            worst = np.argmax(distances + log_dets)
-            if log_ratio(distances[worst], log_dets[worst], limits.density) > 0.0:
-                return log_ratio(squared, log_det, limits.density) - (len(held) - 1) * math.log(_even(limits.density))
-        choice[held[worst]] = NEW
+        worst = np.argmax(losses)
+        wrong = losses[worst] > unmatched
+        if not wrong:
+            return squared
+        choice[columns[worst]] = UNMATCHED
 
 
 @compiled
-def log_ratio(squared: float, log_det: float, density: float) -> float:
-    """Return the logarithm of how much likelier a pair of such a distance is than a new wall.
+def _unlike_new(c: int, S: Float[np.ndarray, "k k"], density: float) -> float:
+    """Return the squared distance up to which an observation is likelier of its wall than of a new one.
 
-    There are `density` of them per rad m; the pair's density is exp(-squared / 2) / (2 pi sqrt(det)).
+    There the Gaussian's own density, exp(-d2 / 2) / (2 pi sqrt(det S)), is that of new walls.
     """
-    return -0.5 * (squared + log_det) - math.log(_even(density))
+    i = 2 * c
+    det = S[i, i] * S[i + 1, i + 1] - S[i, i + 1] * S[i + 1, i]
+    return -2.0 * math.log(2.0 * math.pi * density) - math.log(det)
 
 
 @compiled
-def _even(density: float) -> float:
-    return 2.0 * math.pi * density
-
-
-@compiled
-def _is_among(choice: Int[np.ndarray, " s"], choices: Int[np.ndarray, "h s"]) -> bool:
-    is_among = False
-    for h in range(len(choices)):
-        is_among = is_among or bool((choices[h] == choice).all())
-    return is_among
-
-
-@compiled
-def _log_ratio_given(
-    c: int, seed: int, e: Float[np.ndarray, " k"], S: Float[np.ndarray, "k k"], density: float
-) -> float:
-    """Return the logarithm of how much likelier a pair is than a new wall, given that the seed is right."""
+def _distance_given(c: int, seed: int, e: Float[np.ndarray, " k"], S: Float[np.ndarray, "k k"]) -> float:
+    """Return the squared Mahalanobis distance of an observation, given that the seed is right."""
     i, j = 2 * c, 2 * seed
     det = S[j, j] * S[j + 1, j + 1] - S[j, j + 1] * S[j + 1, j]
     gain, left = np.empty((2, 2)), np.empty(2)
@@ -163,5 +174,4 @@ def _log_ratio_given(
     s00 = S[i, i] - gain[0, 0] * S[i, j] - gain[0, 1] * S[i, j + 1]
     s01 = S[i, i + 1] - gain[0, 0] * S[i + 1, j] - gain[0, 1] * S[i + 1, j + 1]
     s11 = S[i + 1, i + 1] - gain[1, 0] * S[i + 1, j] - gain[1, 1] * S[i + 1, j + 1]
-    squared = squared_distance(left[0], left[1], s00, s01, s11)
-    return log_ratio(squared, math.log(s00 * s11 - s01 * s01), density)
+    return squared_distance(left[0], left[1], s00, s01, s11)

@@ -1,4 +1,4 @@
-"""From candidates to pairs: each segment to one wall, to a new one or to none, all together."""
+"""From candidates to pairs: those that agree and stand out, or for each segment the nearest that is alone."""
 
 import math
 
@@ -8,29 +8,55 @@ from jaxtyping import Bool, Float, Int
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import gain_of, whitening
 from .candidate_kernels import Candidates, Known, Limits, Seen, along_line, candidates, gap_to
-from .hypothesis_kernels import acting, hypotheses
+from .hypothesis_kernels import agree
 from .joint_kernels import taken_together
+from .rest_kernels import UNMATCHED, compatible, nearest_alone
 
 
 @compiled
-def assigned(
-    seen: Seen, known: Known, limits: Limits, clear_only: bool
+def matched(
+    seen: Seen, known: Known, limits: Limits, together: Float[np.ndarray, " l"], clear_only: bool
 ) -> tuple[Int[np.ndarray, "m 2"], Float[np.ndarray, " m"], Bool[np.ndarray, " s"], Candidates]:
-    """Return pairs (segment, line) and their distances, which segments are in doubt, and the candidates."""
+    """Return pairs (segment, line) and their distances, which segments are in doubt, and the candidates.
+
+    `together` are the levels of so many clear pairs together.
+    """
     found = candidates(seen, known, limits)
-    rows = np.flatnonzero(found.gap <= -limits.overlap_m)
-    segment, e, R = found.segment[rows], found.e[rows].ravel(), found.R[rows]
-    _, S = taken_together(known.cov, found.line[rows], found.H_pose[rows], found.H_line[rows], R)
-    choices, weights = hypotheses(segment, e, S, ~seen.is_tentative[segment], len(seen.lines), limits)
-    chosen, doubtful = acting(segment, e, S, R, choices, weights, limits)
-    chosen = rows[chosen]
+    covers = np.empty(len(found.segment), np.bool_)
+    for c in range(len(covers)):
+        covers[c] = found.gap[c] <= -limits.overlap_m
     if clear_only:
+        chosen = _agreed(found, np.flatnonzero(covers), seen, known, limits, together)
         chosen = still_overlapping(chosen, found, seen, known, limits)
-    doubtful |= near_a_wall(found, seen, limits)
+    else:
+        for c in range(len(covers)):
+            covers[c] = covers[c] and found.d2[c] <= limits.level
+        chosen = _nearest(found, np.flatnonzero(covers), known, limits)
+    doubtful = near_a_wall(found, seen, limits)
     pairs = np.empty((len(chosen), 2), np.int64)
     for k in range(len(chosen)):
         pairs[k, 0], pairs[k, 1] = found.segment[chosen[k]], found.line[chosen[k]]
     return pairs, found.d2[chosen], doubtful, found
+
+
+@compiled
+def _agreed(
+    found: Candidates,
+    rows: Int[np.ndarray, " r"],
+    seen: Seen,
+    known: Known,
+    limits: Limits,
+    together: Float[np.ndarray, " l"],
+) -> Int[np.ndarray, " k"]:
+    """Return the candidates among `rows` that agree on where the robot is, where no other choice is nearly as good."""
+    segment, line, e = found.segment[rows], found.line[rows], found.e[rows].ravel()
+    _, S = taken_together(known.cov, line, found.H_pose[rows], found.H_line[rows], found.R[rows])
+    sure = np.empty(len(rows), np.bool_)
+    for k in range(len(rows)):
+        sure[k] = not seen.is_tentative[segment[k]]
+    pairs, margins = agree(segment, line, e, S, sure, limits.level, limits.doubt, limits.density)
+    clear = pairs[margins >= limits.level]
+    return rows[compatible(clear, e, S, limits.level, together)]
 
 
 @compiled
@@ -57,6 +83,14 @@ def still_overlapping(
         low, high = along_line(ends, known.anchors[line[k]], known.mean[3 + 2 * line[k]], pose)
         overlap[k] = gap_to(low, high, known.extents[line[k]]) <= -limits.overlap_m
     return chosen[overlap]
+
+
+@compiled
+def _nearest(found: Candidates, rows: Int[np.ndarray, " r"], known: Known, limits: Limits) -> Int[np.ndarray, " k"]:
+    """Return for each segment its nearest candidate among `rows`, unless another is nearly as near."""
+    segment, e, R = found.segment[rows], found.e[rows].ravel(), found.R[rows]
+    _, S = taken_together(known.cov, found.line[rows], found.H_pose[rows], found.H_line[rows], R)
+    return rows[nearest_alone(segment, found.d2[rows], e, S, R, limits.one_wall, limits.level)]
 
 
 @compiled
@@ -87,9 +121,9 @@ def _is_beside(c: int, found: Candidates, seen: Seen, limits: Limits) -> bool:
 @compiled
 def refused(found: Candidates, is_matched: Bool[np.ndarray, " s"]) -> Int[np.ndarray, " u"]:
     """Return the nearest candidate of each segment without a wall that has one."""
-    nearest = np.full(len(is_matched), -1)
+    nearest = np.full(len(is_matched), UNMATCHED)
     for c in range(len(found.segment)):
         s = found.segment[c]
-        if not is_matched[s] and (nearest[s] < 0 or found.d2[c] <= found.d2[nearest[s]]):
+        if not is_matched[s] and (nearest[s] == UNMATCHED or found.d2[c] <= found.d2[nearest[s]]):
             nearest[s] = c
-    return nearest[nearest >= 0]
+    return nearest[nearest != UNMATCHED]

@@ -1,4 +1,4 @@
-"""Observations judged by the others: each given all of the rest, and how far two candidates are apart."""
+"""Observations judged by the others: each given all of the rest, and each against its rivals for one segment."""
 
 import math
 
@@ -8,15 +8,15 @@ from jaxtyping import Float, Int
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import squared_distance, whitening
 
+UNMATCHED = -1
+"""In the place of a candidate, where there is none."""
+
 
 @compiled
 def judged_by_the_rest(
     chosen: Int[np.ndarray, " m"], e: Float[np.ndarray, " k"], S: Float[np.ndarray, "k k"]
-) -> tuple[float, float, Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-    """Return the squared distance of m observations taken together, and that of each given all others.
-
-    And after each of them the logarithm of the determinant of its covariance.
-    """
+) -> tuple[float, Float[np.ndarray, " m"]]:
+    """Return the squared distance of m observations taken together, and that of each given all others."""
     m = len(chosen)
     part, left = np.empty((2 * m, 2 * m)), np.empty(2 * m)
     for i in range(2 * m):
@@ -24,13 +24,12 @@ def judged_by_the_rest(
         for j in range(2 * m):
             part[i, j] = S[2 * chosen[i // 2] + i % 2, 2 * chosen[j // 2] + j % 2]
     W = whitening(part)
-    squared, log_det, white = 0.0, 0.0, np.zeros(2 * m)
+    squared, white = 0.0, np.zeros(2 * m)
     for i in range(2 * m):
         for j in range(i + 1):
             white[i] += W[i, j] * left[j]
         squared += white[i] * white[i]
-        log_det -= 2.0 * math.log(W[i, i])
-    distances, log_dets = np.empty(m), np.empty(m)
+    losses = np.empty(m)
     for o in range(m):
         a, b, s00, s01, s11 = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(2 * o, 2 * m):
@@ -39,11 +38,67 @@ def judged_by_the_rest(
             s00 += W[i, 2 * o] * W[i, 2 * o]
             s01 += W[i, 2 * o] * W[i, 2 * o + 1]
             s11 += W[i, 2 * o + 1] * W[i, 2 * o + 1]
-        # What the sum of squares loses when one observation is left out is its own, given all others; and its block of
-        # the inverse is the inverse of its own covariance.
-        distances[o] = squared_distance(a, b, s00, s01, s11)
-        log_dets[o] = -math.log(s00 * s11 - s01 * s01)
-    return squared, log_det, distances, log_dets
+        # What the sum of squares loses when one observation is left out is its own, given all others.
+        losses[o] = squared_distance(a, b, s00, s01, s11)
+    return squared, losses
+
+
+@compiled
+def compatible(
+    rows: Int[np.ndarray, " r"],
+    e: Float[np.ndarray, " k"],
+    S: Float[np.ndarray, "k k"],
+    level: float,
+    levels: Float[np.ndarray, " l"],
+) -> Int[np.ndarray, " k"]:
+    """Drop of some rows of e the worst first, until each passes the gate's `level` given all others.
+
+    And all together the level of so many of them in `levels`: a bad slip alone takes all together far out. After a step
+    in which the wheels may have slipped by a degree each wall alone allows for that error; the other walls tell what it
+    was. Returns the rows of those that are left.
+    """
+    kept = rows.copy()
+    while len(kept) > 1:
+        squared, losses = judged_by_the_rest(kept, e, S)
+        worst = np.argmax(losses)
+        if squared <= levels[len(kept)] and losses[worst] <= level:
+            break
+        kept[worst:-1] = kept[worst + 1 :].copy()
+        kept = kept[:-1].copy()
+    return kept
+
+
+@compiled
+def nearest_alone(
+    segment: Int[np.ndarray, " c"],
+    d2: Float[np.ndarray, " c"],
+    e: Float[np.ndarray, " k"],
+    S: Float[np.ndarray, "k k"],
+    R: Float[np.ndarray, "c 2 2"],
+    one_wall: float,
+    clear: float,
+) -> Int[np.ndarray, " k"]:
+    """Return for each segment its nearest candidate, unless another wall costs hardly more (by less than `clear`).
+
+    Two landmarks of one wall are not another: by the level `one_wall` their covariance does not tell them apart. `R` is
+    the noise of each candidate's segment, which is the same for all candidates of one. Segments ascend.
+    """
+    alone, kept, start = np.empty(len(segment), np.int64), 0, 0
+    while start < len(segment):
+        best, stop = start, start
+        while stop < len(segment) and segment[stop] == segment[start]:
+            best = stop if d2[stop] < d2[best] else best
+            stop += 1
+        is_alone = True
+        for c in range(start, stop):
+            differ = c != best and apart(c, best, e, S, R) > one_wall
+            rivals = differ and d2[c] < d2[best] + clear
+            is_alone = is_alone and not rivals
+        if is_alone:
+            alone[kept] = best
+            kept += 1
+        start = stop
+    return alone[:kept].copy()
 
 
 @compiled

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from slam.association.kernels.hypothesis_kernels import NEW, hypotheses
-from slam.association.matching import KnownWalls, MatchingConfig, limits_of, match
+from slam.association.kernels.hypothesis_kernels import agree
+from slam.association.kernels.rest_kernels import compatible
+from slam.association.matching import KnownWalls, match
 from slam.estimation.backend import Joint
+from slam.estimation.gates import gate_level, pair_levels
 from slam.extraction.segments import Segments
 
 SURE = np.zeros(1, bool)
@@ -34,21 +37,21 @@ def known(pose_sigmas, line_sigmas, shared=0.0):
     return Joint(np.zeros(5), correlation * np.outer(sigmas, sigmas), np.array([[2.0, 0.0]]))
 
 
-@pytest.mark.parametrize(("share", "is_matched"), [(0.98, True), (1.02, True), (2.98, False)])
-def test_the_only_segment_may_lie_beyond_the_gate_but_not_where_its_wall_is_ruled_out(share, is_matched):
-    """Chi-square exceeds three times that level once in a million times; `match` refuses it from there on."""
+@pytest.mark.parametrize(("share", "is_matched"), [(0.98, True), (1.02, False), (1.2, False)])
+def test_a_segment_beyond_the_level_of_two_degrees_of_freedom_is_refused(share, is_matched):
     joint = known([1e-5, 1e-5, 1e-6], [1e-6, 1e-5])
     for segment in (seen(turn_rad=0.01 * np.sqrt(share * LEVEL)), seen(nearer_m=0.01 * np.sqrt(share * LEVEL))):
         assert len(match(segment, WALL, joint).pairs) == is_matched
 
 
-@pytest.mark.parametrize(("share", "kept"), [(0.98, [0, 1]), (1.02, [0, NEW]), (1.2, [0, NEW])])
-def test_of_two_observations_the_one_beyond_that_level_is_given_up(share, kept):
-    """Though both are far likelier than new walls, by variances of 1e-4."""
-    e, begins = np.array([0.0, 0.0, np.sqrt(share * LEVEL), 0.0]), np.array([True, False])
-    one = 1e-2 * e, 1e-4 * np.eye(4), begins, 2, limits_of(MatchingConfig())
-    choices, weights = hypotheses(np.array([0, 1]), *one)
-    assert choices[weights.argmax()].tolist() == kept
+@pytest.mark.parametrize(("share", "kept"), [(0.98, 2), (1.02, 1), (1.2, 1)])
+def test_of_two_observations_the_one_beyond_that_level_is_dropped(share, kept):
+    e = np.array([0.0, 0.0, np.sqrt(share * LEVEL), 0.0])
+    two, level = np.array([0, 1]), gate_level(0.99, 2)
+    assert len(compatible(two, e, np.eye(4), level, pair_levels(0.999999, 2))) == kept
+    begins = np.array([True, False])
+    pairs, _ = agree(two, two, e, np.eye(4), begins, level, gate_level(0.999999, 2), 0.1)
+    assert len(pairs) == kept
 
 
 def test_what_pose_and_wall_share_makes_no_gate_wider():
@@ -111,16 +114,23 @@ def test_a_segment_and_its_wall_overlap_by_more_than_a_touch(overlap_m, is_match
         assert len(found.pairs) == is_matched
 
 
-@pytest.mark.parametrize(("turn_rad", "is_candidate"), [(0.9, True), (-0.9, True), (1.2, False), (-1.2, False)])
-def test_a_line_that_faces_another_way_is_no_candidate_however_vague_its_direction(turn_rad, is_candidate):
-    found = match(seen(turn_rad, sigma_rad=0.6), WALL, known([0.5, 0.5, 0.1], [0.1, 0.1]))
-    assert list(found.refusals) == [0] * is_candidate
+@pytest.mark.parametrize(("turn_rad", "is_matched"), [(0.9, True), (-0.9, True), (1.2, False), (-1.2, False)])
+def test_a_line_that_faces_another_way_is_no_candidate_however_vague_its_direction(turn_rad, is_matched):
+    assert len(match(seen(turn_rad, sigma_rad=0.6), WALL, known([0.5, 0.5, 0.1], [0.1, 0.1])).pairs) == is_matched
 
 
 @pytest.mark.parametrize("beams", [4, 5])
-def test_few_beams_alone_do_not_say_where_the_robot_is_and_are_no_new_wall(beams):
+def test_few_beams_alone_do_not_say_where_the_robot_is_but_belong_to_their_wall(beams):
     segment, joint = replace(seen(), is_tentative=np.array([beams < 5])), known([0.01, 0.01, 0.01], [0.01, 0.01])
-    for clear_only in (True, False):
-        found = match(segment, WALL, joint, clear_only=clear_only)
-        assert len(found.pairs) == (beams >= 5)
-        assert len(found.doubtful) == (beams < 5)
+    assert len(match(segment, WALL, joint, clear_only=True).pairs) == (beams >= 5)
+    assert len(match(segment, WALL, joint).pairs) == 1
+
+
+@pytest.mark.parametrize("squared", [7.0, 8.0, 9.0])
+def test_observations_of_which_each_passes_are_dropped_until_all_together_do(squared):
+    count = 16
+    e = np.tile([np.sqrt(squared), 0.0], count)
+    within = [k for k in range(2, count + 1) if k * squared <= chi2.ppf(0.999999, 2 * k)]
+    levels = gate_level(0.99, 2), pair_levels(0.999999, count)
+    kept = compatible(np.arange(count), e, np.eye(2 * count), *levels)
+    assert len(kept) == max(within)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from slam.association.joint_compatibility import relocate
-from slam.association.kernels.hypothesis_kernels import NEW, hypotheses
-from slam.association.matching import MatchingConfig, limits_of
+from slam.association.kernels.rest_kernels import compatible
 from slam.estimation.backend import Joint, Observations
+from slam.estimation.gates import gate_level, pair_levels
 from slam.estimation.models import innovations, lines_robot
 from slam.geometry.poses import wrap
 
@@ -71,7 +71,7 @@ def test_relocation_by_nothing_is_no_relocation():
     assert relocate(joint, np.array([5]), nothing) is joint
 
 
-def test_the_observation_that_the_others_contradict_is_given_up_though_alone_it_would_pass():
+def test_the_observation_that_the_others_contradict_is_dropped_though_alone_it_would_pass():
     """One error of 20 mm is common to four observations, each known to 1 mm in itself; one of them is 8 mm off."""
     shared, own = 0.02, 0.001
     S = shared**2 * np.kron(np.ones((4, 4)), np.eye(2)) + own**2 * np.eye(8)
@@ -79,5 +79,6 @@ def test_the_observation_that_the_others_contradict_is_given_up_though_alone_it_
     e[4] += 0.008
     alone = [e[k : k + 2] @ np.linalg.solve(S[k : k + 2, k : k + 2], e[k : k + 2]) for k in range(0, 8, 2)]
     assert max(alone) < 9.2
-    choices, weights = hypotheses(np.arange(4), e, S, np.ones(4, dtype=bool), 4, limits_of(MatchingConfig()))
-    assert choices[weights.argmax()].tolist() == [0, 1, NEW, 3]
+    levels = gate_level(0.99, 2), pair_levels(0.99, 4)
+    assert compatible(np.arange(4), e, S, *levels).tolist() == [0, 1, 3]
+    assert compatible(np.array([0, 1, 3]), e, S, *levels).tolist() == [0, 1, 3]
