@@ -27,9 +27,10 @@ class MapKeeper:
         self.backend = backend
         self.config = config
         change_points = config.change_points or ChangePointsConfig()
-        self.landmarks = Landmarks(config.walls, change_points)
-        same = config.matching.gate, config.matching.angle_rad
-        self._candidates = LandmarkCandidates(*same, config.extraction.sure_beams, config.candidates)
+        gate, sure_beams = config.matching.gate, config.extraction.sure_beams
+        self.landmarks = Landmarks(config.walls, change_points, gate, sure_beams)
+        rules = config.candidates, config.walls.existence
+        self._candidates = LandmarkCandidates(gate, config.matching.angle_rad, sure_beams, *rules)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""
@@ -51,7 +52,7 @@ class MapKeeper:
         `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
         the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one wall.
         """
-        owners = self._observed(scan, segments, *self._initialised(segments, matches, sides))
+        owners = self._observed(scan, segments, *self._initialised(scan, segments, matches, sides))
         walls, merged = self._merged(owners, self._ended(scan))
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
@@ -64,7 +65,7 @@ class MapKeeper:
         return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.shared)
 
     def _initialised(
-        self, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
     ) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " b"]]:
         """Grow the map by the segments that belong to no wall; return the wall of each segment, and those believed."""
         owners = np.full(len(segments), -1, dtype=np.int64)
@@ -73,7 +74,7 @@ class MapKeeper:
         doubtful = set(matches.doubtful.tolist())
         fresh = np.array([row for row in matches.unmatched.tolist() if row not in doubtful], dtype=np.int64)
         few, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
-        believed = few[self._candidates.see(self.backend.belief.pose_world, segments.take(few))]
+        believed = few[self._candidates.see(self.backend.belief.pose_world, scan, segments.take(few))]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = seen_centres(segments, fresh)

@@ -30,9 +30,12 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig) -> None:
+    def __init__(
+        self, walls: WallsConfig, change_points: ChangePointsConfig, sure: float = 0.99, sure_beams: int = 5
+    ) -> None:
+        """`sure` is how likely it has to be that a wall exists, `sure_beams` are those of a sure segment."""
         self.records = Records()
-        self.extents = Extents(walls, self.records)
+        self.extents = Extents(walls, self.records, sure, sure_beams)
         self.reliability = Reliability(walls.reliability, self.records)
         self.change_points = ChangePoints(change_points, self.records)
         self.openings = Openings(walls.shared, self.records)
@@ -54,7 +57,7 @@ class Landmarks:
     ) -> Observed:
         """Take in one scan, of which `owners` holds the wall of each segment, those of new walls among them.
 
-        `believed` are ids of walls that were seen often before they became walls.
+        `believed` are ids of walls that were likely enough to exist before they became walls.
         """
         self.records.rows(belief.ids)
         self.reliability.see(segments, owners)
