@@ -15,8 +15,10 @@ from ..estimation.shared import SharedConfig, of_shared
 from ..robot import RobotSpec, Scan, of_robot
 from .kernels.existence_kernels import Odds, crossing, look
 
+JUST_BEGUN = np.full(2, np.nan)
+"""The place of the last look at a wall that begins in this scan."""
 NOWHERE = np.full(2, np.inf)
-"""The place of the last look at a wall that was never looked at since it began."""
+"""And of one that was not looked at since."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import RobotSpec, Scan, of_robot
-from .existence import NOWHERE, ExistenceConfig, log_odds, looked_at
+from .existence import JUST_BEGUN, ExistenceConfig, log_odds, looked_at
 from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
@@ -63,7 +63,7 @@ class Extents:
             against=0,
             whole=0,
             log_odds=float(config.existence.begins(np.zeros(1, dtype=bool))[0]),
-            place=NOWHERE,
+            place=JUST_BEGUN,
         )
 
     def map(

@@ -63,8 +63,14 @@ def look(
     places: Float[np.ndarray, "n 2"],
     odds: Odds,
 ) -> None:
-    """Take one scan into the log odds of walls, in place; `beams` reach each, and `seen` are those that it showed."""
+    """Take one scan into the log odds of walls, in place; `beams` reach each, and `seen` are those that it showed.
+
+    The scan in which a wall begins is no look at it: its place is not a number.
+    """
     for n in range(len(log_odds)):
+        if math.isnan(places[n, 0]):
+            places[n] = np.inf
+            continue
         if not seen[n] and beams[n] < odds.beams:
             continue
         if math.hypot(pose_world[0] - places[n, 0], pose_world[1] - places[n, 1]) < odds.apart_m:
