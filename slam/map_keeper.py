@@ -10,9 +10,9 @@ from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
-from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
+from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
 from .map.stochastic_map import StochasticMap
@@ -29,8 +29,8 @@ class MapKeeper:
         change_points = config.change_points or ChangePointsConfig()
         gate, sure_beams = config.matching.gate, config.extraction.sure_beams
         self.landmarks = Landmarks(config.walls, change_points, gate, sure_beams)
-        rules = config.candidates, config.walls.existence
-        self._candidates = LandmarkCandidates(gate, config.matching.angle_rad, sure_beams, *rules)
+        same = gate, config.matching.angle_rad
+        self._candidates = LandmarkCandidates(*same, sure_beams, config.walls.existence)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""

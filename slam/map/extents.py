@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
-from ..robot import RobotSpec, Scan, of_robot
+from ..robot import Scan
 from .existence import JUST_BEGUN, ExistenceConfig, log_odds, looked_at
 from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
@@ -28,7 +28,6 @@ class WallsConfig:
     thickness, and as far from its ends. A wall cut back to less than ends are known to is forgotten.
     """
 
-    robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
     existence: ExistenceConfig = field(default_factory=ExistenceConfig)
     """It is tentative until it is likely enough to exist, and forgotten once it is likelier not to."""
@@ -43,15 +42,15 @@ class Extents:
 
     def __init__(
         self,
-        config: WallsConfig = WallsConfig(),
-        records: Records | None = None,
-        sure: float = 0.99,
-        sure_beams: int = 5,
+        config: WallsConfig,
+        records: Records,
+        sure: float,
+        sure_beams: int,
     ) -> None:
         """`sure` is how likely it has to be that a wall exists, `sure_beams` are those of a sure segment."""
         self._config = config
         self._sure, self._odds = log_odds(sure), config.existence.odds(sure_beams)
-        self._records = Records() if records is None else records
+        self._records = records
         self._scans = 0
         self._records.declare(
             self._merge,

@@ -30,9 +30,7 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(
-        self, walls: WallsConfig, change_points: ChangePointsConfig, sure: float = 0.99, sure_beams: int = 5
-    ) -> None:
+    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig, sure: float, sure_beams: int) -> None:
         """`sure` is how likely it has to be that a wall exists, `sure_beams` are those of a sure segment."""
         self.records = Records()
         self.extents = Extents(walls, self.records, sure, sure_beams)
