@@ -43,19 +43,29 @@ class ExistenceConfig:
     """What the pose may have drifted between two observations of a line of few beams, sigma."""
 
     def odds(self, sure_beams: int) -> Odds:
-        """Return them as logarithms of odds; no wall is surer than what is ruled out by chance lets it be."""
+        """Return them as logarithms of odds, for segments that are sure with so many beams."""
         return Odds(
             log(self.shown / self.shown_over_faces),
             log((1.0 - self.shown) / (1.0 - self.shown_over_faces)),
-            log_odds(1.0 - self.shared.chance),
+            self.most,
             sure_beams + 2,
             0.5 * self.robot.step_m,
             float(self.shared.beams_m),
         )
 
+    @property
+    def believed(self) -> float:
+        """A wall is believed once more than one sure segment speaks for it: log odds above these."""
+        return log_odds(1.0 - self.over_faces)
+
+    @property
+    def most(self) -> float:
+        """No wall is surer: what is ruled out by chance lets none be. In log odds."""
+        return log_odds(1.0 - self.shared.chance)
+
     def begins(self, is_tentative: Bool[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
         """Return the log odds that segments are of one face, by whether they have few beams."""
-        return np.where(is_tentative, log_odds(1.0 - self.few_over_faces), log_odds(1.0 - self.over_faces))
+        return np.where(is_tentative, log_odds(1.0 - self.few_over_faces), self.believed)
 
 
 def log_odds(probability: float) -> float:
@@ -68,14 +78,17 @@ def looked_at(
     scan: Scan,
     lines: tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]],
     seen: Bool[np.ndarray, " n"],
+    unsure: Bool[np.ndarray, " n"],
     columns: tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
     odds: Odds,
 ) -> None:
     """Take one scan into the log odds and the places of the last looks, in place.
 
-    `lines` are anchors, means (alpha rad, d m) and extents, m, world frame; `seen` are those that the scan shows.
+    `lines` are anchors, means (alpha rad, d m) and extents, m, world frame; `seen` are those that the scan
+    shows; of the others it may show those that are `unsure`, and says nothing of them.
     """
     beams = crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, odds.margin_m)
+    beams[unsure] = 0
     look(pose_world, beams, seen, *columns, odds)
 
 
@@ -92,19 +105,20 @@ class LandmarkCandidates:
         sure_beams: int,
         config: ExistenceConfig = ExistenceConfig(),
     ) -> None:
-        """Lines of which two observations are farther apart than this gate, or turn by more, are never one.
-
-        The gate is also how sure it has to be that a line is a wall.
-        """
+        """Lines of which two observations are farther apart than this gate, or turn by more, are never one."""
         self._same = Same(gate_level(gate, 2), float(np.cos(angle_rad)), float(config.slack_m))
-        self._config, self._odds, self._sure = config, config.odds(sure_beams), log_odds(gate)
+        self._config, self._odds = config, config.odds(sure_beams)
         self._lines, self._places, self._log_odds = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0)
 
     def __len__(self) -> int:
         return len(self._lines)
 
-    def see(self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments) -> Int[np.ndarray, " m"]:
+    def see(
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments
+    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
         """Take in one scan, of which `segments` have few beams and lie on no wall; return those to be believed now.
+
+        And their log odds.
 
         A line keeps its first observation, so that it does not wander off step by step.
         """
@@ -117,9 +131,10 @@ class LandmarkCandidates:
             np.column_stack([known[:, 0], np.zeros(len(known))]),
             known[:, 5:] * [-1.0, 1.0],
         )
-        looked_at(pose_world, scan, of_known, seen, (self._log_odds, self._places), self._odds)
-        due = self._log_odds >= self._sure
+        looked_at(pose_world, scan, of_known, seen, np.zeros_like(seen), (self._log_odds, self._places), self._odds)
+        due = self._log_odds > self._config.believed
         believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
+        surely = self._log_odds[line_of[believed]]
         kept = ~due & (self._log_odds >= 0.0)
         fresh = np.flatnonzero(line_of < 0)
         if len(fresh) or not kept.all():
@@ -127,4 +142,4 @@ class LandmarkCandidates:
             self._places = np.concatenate([self._places[kept], np.tile(NOWHERE, (len(fresh), 1))])
             begun = self._config.begins(segments.is_tentative[fresh])
             self._log_odds = np.concatenate([self._log_odds[kept], begun])
-        return believed
+        return believed, surely

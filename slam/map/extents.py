@@ -1,5 +1,6 @@
 """How far along its line each wall has been seen, how often, and whether it deserves trust."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from sys import maxsize
 
@@ -10,7 +11,7 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
-from .existence import JUST_BEGUN, ExistenceConfig, log_odds, looked_at
+from .existence import JUST_BEGUN, ExistenceConfig, looked_at
 from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
@@ -18,6 +19,8 @@ from .stochastic_map import StochasticMap
 
 NOBODY = np.zeros(0, dtype=np.int64)
 """Ids of no walls."""
+NO_ODDS: Mapping[int, float] = {}
+"""No walls begin more likely than others."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +43,10 @@ class WallsConfig:
 class Extents:
     """How far each wall has been seen, and for how long; walls stand in the order of the belief's ids."""
 
-    def __init__(
-        self,
-        config: WallsConfig,
-        records: Records,
-        sure: float,
-        sure_beams: int,
-    ) -> None:
-        """`sure` is how likely it has to be that a wall exists, `sure_beams` are those of a sure segment."""
+    def __init__(self, config: WallsConfig, records: Records, sure_beams: int) -> None:
+        """Keep the extents in these records; `sure_beams` are those of a sure segment."""
         self._config = config
-        self._sure, self._odds = log_odds(sure), config.existence.odds(sure_beams)
+        self._odds = config.existence.odds(sure_beams)
         self._records = records
         self._scans = 0
         self._records.declare(
@@ -61,7 +58,7 @@ class Extents:
             overlaid=np.zeros(2, dtype=np.int64),
             against=0,
             whole=0,
-            log_odds=float(config.existence.begins(np.zeros(1, dtype=bool))[0]),
+            log_odds=config.existence.believed,
             place=JUST_BEGUN,
         )
 
@@ -73,7 +70,7 @@ class Extents:
     ) -> StochasticMap:
         """Return the belief together with the extents, and how far walls may be from their lines."""
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
-        tentative = self._records.columns["log_odds"] < self._sure
+        tentative = self._records.columns["log_odds"] <= self._config.existence.believed
         whole = self._records.columns["whole"] >= self._config.shared.scans
         return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
@@ -83,15 +80,17 @@ class Extents:
         scan: Scan,
         segments: Segments,
         owners: Int[np.ndarray, " s"],
-        believed: Int[np.ndarray, " b"],
+        begun: Mapping[int, float] = NO_ODDS,
+        ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Int[np.ndarray, " f"]:
         """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
 
-        `believed` are walls that were likely enough to exist before they became walls.
+        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
+        `ambiguous` ones, too.
         """
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
-        rows, sure = self._records.rows(owners[used]), self._records.rows(believed)
+        rows, likely = self._records.rows(owners[used]), self._records.rows(np.array(list(begun), dtype=np.int64))
         columns, shared = self._records.columns, self._config.shared
         scans = shared.scans if self._config.housekeeping else maxsize
         extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
@@ -103,13 +102,13 @@ class Extents:
         last_seen[rows] = self._scans
         seen = last_seen == self._scans
         of_walls = belief.anchors, belief.means, extents
-        looked_at(belief.pose_world, scan, of_walls, seen, (columns["log_odds"], columns["place"]), self._odds)
-        likely = columns["log_odds"]
-        likely[sure] = np.maximum(likely[sure], self._sure)
+        unsure = np.isin(self._records.ids, ambiguous)
+        looked_at(belief.pose_world, scan, of_walls, seen, unsure, (columns["log_odds"], columns["place"]), self._odds)
+        columns["log_odds"][likely] = np.maximum(columns["log_odds"][likely], list(begun.values()))
         if not self._config.housekeeping:
             return NOBODY
         self._weigh(belief, scan)
-        return self._records.ids[(likely < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
+        return self._records.ids[(columns["log_odds"] < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
 
     def _weigh(self, belief: Belief, scan: Scan) -> None:
         """Cut walls back where beams pass through them."""

@@ -56,10 +56,10 @@ def test_a_face_is_believed_once_three_scans_showed_it_from_two_places(seed: int
     free_side = -np.array([np.cos(turn), np.sin(turn)])
     poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(4)]
     moving, standing = candidates(), candidates()
-    believed = [len(moving.see(pose, scan_of([face], pose), look(face, pose, rng, beams))) for pose in poses[:3]]
+    believed = [len(moving.see(pose, scan_of([face], pose), look(face, pose, rng, beams))[0]) for pose in poses[:3]]
     assert believed == [0, 0, 1]
     assert not any(
-        len(standing.see(poses[0], scan_of([face], poses[0]), look(face, poses[0], rng, 4))) for _ in range(10)
+        len(standing.see(poses[0], scan_of([face], poses[0]), look(face, poses[0], rng, 4))[0]) for _ in range(10)
     )
 
 
@@ -69,7 +69,7 @@ def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
     for k in range(15):
         face = np.array([[1.0 + 0.08 * k, 0.05], [1.0 + 0.08 * k, -0.05]])[::-1]
         pose = np.array([0.0, 0.06 * k, 0.0])
-        assert not len(faint.see(pose, scan_of([face], pose), look(face, pose, rng)))
+        assert not len(faint.see(pose, scan_of([face], pose), look(face, pose, rng))[0])
 
 
 @pytest.mark.parametrize("existence", [CONFIG, ExistenceConfig(shown=0.5, shown_over_faces=0.5)])

@@ -15,7 +15,7 @@ from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
 from slam.robot import Scan
 
-SETTINGS = (WallsConfig(), ChangePointsConfig(), 0.99, 5)
+SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)
 CONFIG = WallsConfig()
 
 
@@ -41,9 +41,7 @@ def see(walls, known, shown, owners, pose):
     scan = scan_of(shown, pose)
     segments = extract(scan)
     assert len(segments) == len(owners)
-    observed = walls.observe(
-        belief_of(known, pose), scan, segments, np.array(owners, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    )
+    observed = walls.observe(belief_of(known, pose), scan, segments, np.array(owners, dtype=np.int64))
     return observed.forgotten.tolist()
 
 
@@ -174,8 +172,7 @@ def test_a_wall_shorter_than_its_ends_are_known_is_none(length_m, is_kept):
     segments = extract(scan)
     assert len(segments) == 1
     segments.ends[0, :, 1] = [-0.5 * length_m, 0.5 * length_m]
-    nothing = np.zeros(0, dtype=np.int64)
-    forgotten = walls.observe(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64), nothing).forgotten
+    forgotten = walls.observe(belief_of([face], pose), scan, segments, np.zeros(1, dtype=np.int64)).forgotten
     assert forgotten.tolist() == ([] if is_kept else [0])
 
 
