@@ -68,7 +68,7 @@ class Matches:
     refusals: dict[int, str]
     """For each unmatched segment with a wall near it, why that wall was refused."""
     ambiguous: Int[np.ndarray, " a"] = field(default_factory=partial(np.zeros, 0, dtype=np.int64))
-    """Ids of walls that an unmatched sure segment fits: it may show them."""
+    """Ids of walls along which an unmatched sure segment lies: it may show them."""
 
     def observations(self, segments: Segments) -> Observations:
         """Return the matched segments as observations of their walls."""
@@ -127,7 +127,7 @@ def match(
         np.flatnonzero(~is_matched),
         np.flatnonzero(~is_matched & doubtful),
         {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
-        fitting(found, ~is_matched & ~segments.is_tentative, ids, limits),
+        along(found, ~is_matched & ~segments.is_tentative, ids, limits, config.shared.straight_rad),
     )
 
 
@@ -150,12 +150,16 @@ def limits_of(config: MatchingConfig) -> Limits:
     )
 
 
-def fitting(
-    found: Candidates, among: Bool[np.ndarray, " s"], ids: Int[np.ndarray, " n"], limits: Limits
+def along(
+    found: Candidates,
+    among: Bool[np.ndarray, " s"],
+    ids: Int[np.ndarray, " n"],
+    limits: Limits,
+    straight_rad: float,
 ) -> Int[np.ndarray, " f"]:
-    """Return the ids of walls that some of these segments fit: they pass the gate and overlap."""
-    fits = (found.d2 <= limits.level) & (found.gap <= -limits.overlap_m) & among[found.segment]
-    return np.unique(ids[found.line[fits]])
+    """Return the ids of walls along which some of these segments lie: they pass the gate, overlap, and hardly turn."""
+    lies = (found.d2 <= limits.level) & (found.gap <= -limits.overlap_m) & (np.abs(found.e[:, 0]) < straight_rad)
+    return np.unique(ids[found.line[lies & among[found.segment]]])
 
 
 def why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:
