@@ -102,7 +102,7 @@ class Extents:
         last_seen[rows] = self._scans
         seen = last_seen == self._scans
         of_walls = belief.anchors, belief.means, extents
-        unsure = np.isin(self._records.ids, ambiguous)
+        unsure = np.isin(self._records.ids, ambiguous) | (not self._config.housekeeping)
         looked_at(belief.pose_world, scan, of_walls, seen, unsure, (columns["log_odds"], columns["place"]), self._odds)
         columns["log_odds"][likely] = np.maximum(columns["log_odds"][likely], list(begun.values()))
         if not self._config.housekeeping:
