@@ -52,7 +52,8 @@ class MapKeeper:
         `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
         the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one wall.
         """
-        owners = self._observed(scan, segments, *self._initialised(scan, segments, matches, sides))
+        begun = self._initialised(scan, segments, matches, sides)
+        owners = self._observed(scan, segments, *begun, matches.ambiguous)
         walls, merged = self._merged(owners, self._ended(scan))
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
@@ -98,9 +99,10 @@ class MapKeeper:
         segments: Segments,
         owners: Int[np.ndarray, " s"],
         begun: dict[int, float],
+        ambiguous: Int[np.ndarray, " a"],
     ) -> Int[np.ndarray, " s"]:
         """Note what was seen of each wall, and forget those that are none; return the wall of each segment."""
-        observed = self.landmarks.observe(self.backend.belief, scan, segments, owners, begun)
+        observed = self.landmarks.observe(self.backend.belief, scan, segments, owners, begun, ambiguous)
         if len(observed.forgotten):
             self.backend.remove(observed.forgotten.tolist())
         return observed.owners

@@ -78,15 +78,17 @@ def looked_at(
     scan: Scan,
     lines: tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]],
     seen: Bool[np.ndarray, " n"],
+    unsure: Bool[np.ndarray, " n"],
     columns: tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
     odds: Odds,
 ) -> None:
     """Take one scan into the log odds and the places of the last looks, in place.
 
     `lines` are anchors, means (alpha rad, d m) and extents, m, world frame; `seen` are those that the scan
-    shows.
+    shows; of the others it may show those that are `unsure`, and says nothing of them.
     """
     beams = crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, odds.margin_m)
+    beams[unsure] = 0
     look(pose_world, beams, seen, *columns, odds)
 
 
@@ -129,7 +131,7 @@ class LandmarkCandidates:
             np.column_stack([known[:, 0], np.zeros(len(known))]),
             known[:, 5:] * [-1.0, 1.0],
         )
-        looked_at(pose_world, scan, of_known, seen, (self._log_odds, self._places), self._odds)
+        looked_at(pose_world, scan, of_known, seen, np.zeros_like(seen), (self._log_odds, self._places), self._odds)
         due = self._log_odds > self._config.believed
         believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
         surely = self._log_odds[line_of[believed]]

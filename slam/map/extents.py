@@ -72,10 +72,7 @@ class Extents:
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
         tentative = self._records.columns["log_odds"] <= self._config.existence.believed
         whole = self._records.columns["whole"] >= self._config.shared.scans
-        surest = self._records.columns["log_odds"] >= self._config.existence.most
-        return StochasticMap(
-            belief, extents.copy(), observations.copy(), tentative, crooked, whole, surest, off_line_cov
-        )
+        return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
     def see(
         self,
@@ -84,10 +81,12 @@ class Extents:
         segments: Segments,
         owners: Int[np.ndarray, " s"],
         begun: Mapping[int, float] = NO_ODDS,
+        ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Int[np.ndarray, " f"]:
         """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
 
-        `begun` holds ids of walls that begin more likely than others, and their log odds.
+        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
+        `ambiguous` ones, too.
         """
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
@@ -103,8 +102,8 @@ class Extents:
         last_seen[rows] = self._scans
         seen = last_seen == self._scans
         of_walls = belief.anchors, belief.means, extents
-        odds = self._odds if self._config.housekeeping else self._odds._replace(missed=0.0)
-        looked_at(belief.pose_world, scan, of_walls, seen, (columns["log_odds"], columns["place"]), odds)
+        unsure = np.isin(self._records.ids, ambiguous) | (not self._config.housekeeping)
+        looked_at(belief.pose_world, scan, of_walls, seen, unsure, (columns["log_odds"], columns["place"]), self._odds)
         columns["log_odds"][likely] = np.maximum(columns["log_odds"][likely], list(begun.values()))
         if not self._config.housekeeping:
             return NOBODY

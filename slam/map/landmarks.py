@@ -11,7 +11,7 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
 from .change_points import ChangePoints, ChangePointsConfig
-from .extents import NO_ODDS, Extents, WallsConfig
+from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
 from .openings import Openings
 from .records import Records
 from .reliability import Reliability
@@ -53,14 +53,16 @@ class Landmarks:
         segments: Segments,
         owners: Int[np.ndarray, " s"],
         begun: Mapping[int, float] = NO_ODDS,
+        ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Observed:
         """Take in one scan, of which `owners` holds the wall of each segment, those of new walls among them.
 
-        `begun` holds ids of walls that begin more likely than others, and their log odds.
+        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
+        `ambiguous` ones, too.
         """
         self.records.rows(belief.ids)
         self.reliability.see(segments, owners)
-        forgotten = self.extents.see(belief, scan, segments, owners, begun)
+        forgotten = self.extents.see(belief, scan, segments, owners, begun, ambiguous)
         if not len(forgotten):
             return Observed(owners, forgotten)
         self.records.remove(forgotten)

@@ -29,8 +29,6 @@ class StochasticMap:
     much."""
     whole: Bool[np.ndarray, " n"] | None = None
     """Walls of which scan after scan showed both ends, hidden by nothing: they reach no farther. None where unknown."""
-    surest: Bool[np.ndarray, " n"] | None = None
-    """Walls as sure to exist as can be. None where unknown."""
     off_line_cov: Float[np.ndarray, "n 2 2"] | None = None
     """How far each wall may be from its line, as a covariance of (alpha rad, d m): what no single beam's noise explains
     (`straightness`). A back end's own belief has none of it."""
@@ -49,7 +47,7 @@ class StochasticMap:
     @property
     def established(self) -> Bool[np.ndarray, " n"]:
         """Walls that were seen often."""
-        return self.observations >= ESTABLISHED if self.surest is None else self.surest
+        return self.observations >= ESTABLISHED
 
     @property
     def ids(self) -> Int[np.ndarray, " n"]:

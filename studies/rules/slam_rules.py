@@ -143,6 +143,8 @@ UPKEEP = (
            NO, "a wall is tentative while no more than a sure segment speaks for it"),
     Switch("existence.forgotten", "slam.map.extents", "«columns[\"log_odds\"] < 0.0»",
            NO, "a wall that is likelier not to be is forgotten"),
+    Switch("existence.unsure", "slam.map.existence", "beams[«unsure»] = 0",
+           NO, "a scan of which a segment may be a wall's says nothing against it"),
     Switch("existence.beams", "slam.map.kernels.existence_kernels", "if not seen[n] and «beams[n] < odds.beams»:",
            "False", "nor does one of which too few beams reach it"),
     Switch("existence.apart", "slam.map.kernels.existence_kernels",

@@ -17,6 +17,7 @@ from slam.robot import Scan
 CONFIG = ExistenceConfig()
 ODDS = CONFIG.odds(5)
 ORIGIN = np.zeros(3)
+SURE, UNSURE = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 WALL = [[1.0, -0.5], [1.0, 0.5]]
 seeds = st.integers(0, 2**32)
 
@@ -78,13 +79,15 @@ def test_the_odds_are_those_of_the_shares():
     np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.85 / 0.15), log(0.97 / 0.03)])
 
 
-def looks(shown, places, config=CONFIG):
+def looks(shown, places, config=CONFIG, unsure=SURE):
     """Return the log odds of `WALL` after looks at faces from places; it is seen where it is one of the faces."""
     odds = np.array([log_odds(0.97)])
     columns = odds, np.tile(NOWHERE, (1, 1))
     for faces, place in zip(shown, places, strict=True):
         pose = np.array([*place, 0.0])
-        looked_at(pose, scan_of(faces, pose), lines_of([WALL]), np.array([WALL in faces]), columns, config.odds(5))
+        looked_at(
+            pose, scan_of(faces, pose), lines_of([WALL]), np.array([WALL in faces]), unsure, columns, config.odds(5)
+        )
     return float(odds[0])
 
 
@@ -93,6 +96,7 @@ def test_two_faces_in_its_place_undo_a_wall_and_from_one_place_they_are_one_look
     faces = [[[1.0, -0.5], [1.3, 0.0]], [[1.3, 0.0], [1.0, 0.5]]]
     moving = [(0.0, 0.1 * k) for k in range(2)]
     assert looks([faces] * 2, moving) < 0.0 < looks([faces] * 2, [(0.0, 0.0)] * 2)
+    assert looks([faces] * 2, moving, unsure=UNSURE) == log_odds(0.97)
 
 
 def test_a_wall_that_was_seen_for_long_is_no_surer_than_chance_lets_it_be_and_can_be_undone():
