@@ -26,7 +26,7 @@ NOWHERE = np.full(2, np.inf)
 
 @dataclass(frozen=True)
 class ExistenceConfig:
-    """What the first segment and each look say: shares of 12 apartments, scored by true faces."""
+    """What the first segment and each look say: shares in apartments, by true faces (docs/association.md)."""
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()

@@ -41,7 +41,8 @@ def crossing(
         nx, ny = math.cos(means[n, 0]), math.sin(means[n, 0])
         east, north = anchors[n, 0] - pose_world[0], anchors[n, 1] - pose_world[1]
         r, foot = means[n, 1] + nx * east + ny * north, ny * east - nx * north
-        if not 0.0 < r < range_m:
+        farthest = max(-extents[n, 0], extents[n, 1])
+        if r <= 0.0 or math.hypot(east, north) - farthest > range_m:
             continue
         for beam in range(k):
             cosine = x[beam] * nx + y[beam] * ny
