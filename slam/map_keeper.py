@@ -9,7 +9,7 @@ from .association.matching import Matches
 from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
-from .extraction.straightness import cov_of_bows, cov_of_misfits
+from .extraction.straightness import cov_of_faces
 from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
@@ -79,7 +79,7 @@ class MapKeeper:
             centres = seen_centres(segments, fresh)
             begun = segments.take(fresh)
             straightness = self.config.walls.reliability.straightness
-            cov = begun.cov + cov_of_bows(begun, straightness) + cov_of_misfits(begun, straightness)
+            cov = begun.cov + cov_of_faces(begun, straightness)
             owners[fresh] = self.backend.grow(begun.lines, cov, centres)
         known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:

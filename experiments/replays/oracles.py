@@ -117,7 +117,8 @@ class PerfectExtraction:
         alpha, r = self._witness.truth.lines[faces].T
         exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
         draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
-        return replace(segments, lines=as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2)))
+        lines = as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2))
+        return replace(segments, lines=lines, faces_cov=None)
 
 
 def of_true_lines(config: MapperConfig) -> MapperConfig:

@@ -42,6 +42,9 @@ class Segments:
     """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom."""
     is_tentative: Bool[np.ndarray, " n"]
     """Which have so few beams that their first-order covariance is not to be trusted."""
+    faces_cov: Float[np.ndarray, "n 2 2"] | None = None
+    """What `cov` lacks since an outer beam may be another face's (`straightness_kernels`); None where each is known to
+    be of one face."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -60,7 +63,9 @@ class Segments:
         G = np.tile(np.eye(2), (len(self), 1, 1))
         G[:, 1, 0] = directions(alpha) @ mount[:2]
         cov = G @ self.cov @ G.transpose(0, 2, 1)
-        return replace(self, lines=np.stack([alpha, r], axis=-1), cov=cov, ends=to_world(self.ends, mount))
+        faces_cov = None if self.faces_cov is None else G @ self.faces_cov @ G.transpose(0, 2, 1)
+        lines, ends = np.stack([alpha, r], axis=-1), to_world(self.ends, mount)
+        return replace(self, lines=lines, cov=cov, ends=ends, faces_cov=faces_cov)
 
     def take(self, index: np.ndarray) -> "Segments":
         """Return the chosen segments (integer or boolean index), in the order asked for."""
@@ -74,4 +79,5 @@ class Segments:
             self.end_kinds.take(rows, 0),
             self.chi2.take(rows),
             self.is_tentative.take(rows),
+            None if self.faces_cov is None else self.faces_cov.take(rows, 0),
         )

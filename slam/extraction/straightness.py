@@ -33,10 +33,8 @@ class StraightnessConfig:
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
-    edges = faces_cov(
-        segments.lines, segments.ends, _misfits_m2(segments, config), float(config.edge_m), float(config.shared.face_m)
-    )
-    return edges + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else edges
+    faces = np.zeros((len(segments), 2, 2)) if segments.faces_cov is None else segments.faces_cov
+    return faces + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else faces
 
 
 def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
@@ -46,7 +44,7 @@ def cov_of_misfits(segments: Segments, config: StraightnessConfig = Straightness
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
     """Return what they lack since no wall is straight: any direction and distance is that of the part in sight."""
-    middles = _middles_m(segments)
+    middles = middles_of(segments)
     cov = np.empty((len(middles), 2, 2))
     cov[:, 0, 0], cov[:, 1, 1] = config.bow_rad**2, config.bow_m**2 + (config.bow_rad * middles) ** 2
     cov[:, 0, 1] = cov[:, 1, 0] = config.bow_rad**2 * middles
@@ -58,6 +56,6 @@ def _misfits_m2(segments: Segments, config: StraightnessConfig) -> Float[np.ndar
     return misfit_variances(segments.cov, segments.chi2, segments.beam_counts, sigmas)
 
 
-def _middles_m(segments: Segments) -> Float[np.ndarray, " s"]:
+def middles_of(segments: Segments) -> Float[np.ndarray, " s"]:
     """Return how far along its line the middle of each segment lies from the foot of the robot."""
     return np.asarray(np.vecdot(segments.ends.mean(axis=1), directions(segments.lines[:, 0])))

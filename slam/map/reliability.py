@@ -11,9 +11,9 @@ from jaxtyping import Bool, Float, Int
 
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
-from ..extraction.straightness import StraightnessConfig, cov_of_faces
+from ..extraction.straightness import StraightnessConfig, cov_of_faces, middles_of
 from .kernels import reliability_kernels
-from .kernels.reliability_kernels import add_fits, add_lengths, keep_longest
+from .kernels.reliability_kernels import add_faces, add_fits, add_lengths, keep_least, keep_longest
 from .records import Merger, Records
 
 
@@ -61,6 +61,8 @@ class Reliability:
             residue=np.zeros(3),
             # The two longest pieces that scans saw of it, m.
             longest=np.zeros(2),
+            # The two least variances (turn rad^2, across m^2) of its segments since they may be of two faces.
+            faces=np.full((2, 2), np.inf),
         )
 
     def see(self, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
@@ -70,6 +72,8 @@ class Reliability:
         rows, columns = self._records.rows(owners[used]), self._records.columns
         add_fits(rows, seen.cov, seen.chi2, seen.beam_counts, columns["residue"])
         add_lengths(rows, seen.ends, columns["longest"])
+        if seen.faces_cov is not None:
+            add_faces(rows, seen.faces_cov, middles_of(seen), columns["faces"])
 
     def _merge(self, merger: Merger) -> None:
         """Add what was seen of the dropped wall to the kept one's."""
@@ -77,6 +81,9 @@ class Reliability:
         residue[merger.keep] += residue[merger.drop]
         for length in longest[merger.drop].tolist():
             keep_longest(longest[merger.keep], length)
+        faces = self._records.columns["faces"]
+        for turn, across in faces[merger.drop].tolist():
+            keep_least(faces[merger.keep], turn, across)
 
     def misfits(self, ids: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """Return how far the faces of walls are off their line, as variances across it, m^2.
@@ -95,6 +102,5 @@ class Reliability:
         What one scan alone shows of a wall, longer than any other, may be of two faces: a short one and another behind
         it. So a wall counts as long as two scans saw it.
         """
-        straightness, longest = self._config.straightness, self._records.columns["longest"][self._records.rows(ids)]
-        edges = float(straightness.edge_m), float(straightness.shared.face_m)
-        return reliability_kernels.off_line_cov(extents, longest, misfits_m2, *edges)
+        rows, columns = self._records.rows(ids), self._records.columns
+        return reliability_kernels.off_line_cov(extents, columns["longest"][rows], misfits_m2, columns["faces"][rows])

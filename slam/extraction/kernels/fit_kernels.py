@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
+from .faces_kernels import odds_of_end, spread_over_faces
 from .joint_kernels import Joints
 from .line_kernels import Line, line_of, met_at, put, refit, variance_met
 from .returns_kernels import Returns, Rules
@@ -21,6 +22,8 @@ class Fitted(NamedTuple):
     counts: Int[np.ndarray, " n"]
     """How many it used."""
     chi2: Float[np.ndarray, " n"]
+    spread: Float[np.ndarray, "n 3"]
+    """What the covariance of (a, b) lacks since outer beams may be another face's: of a, of both, of b."""
 
 
 @compiled
@@ -28,23 +31,28 @@ def fitted(joints: Joints, returns: Returns, rules: Rules) -> Fitted:
     """Return the pieces that keep `least_beams` returns, with their lines."""
     n = len(joints.pieces)
     lines, place, counts, chi2 = np.empty((n, 5)), np.empty((n, 2), np.int64), np.empty(n, np.int64), np.empty(n)
-    kept = 0
+    spread, kept = np.empty((n, 3)), 0
     for k in range(n):
-        line, first, last, count, squares = _fitted_piece(k, joints, returns, rules)
+        line, first, last, count, squares, spread[kept] = _fitted_piece(k, joints, returns, rules)
         if count >= rules.least_beams and np.isfinite(line.a + line.b):
             put(lines, kept, line)
             place[kept, 0], place[kept, 1], counts[kept], chi2[kept] = first, last, count, squares
             kept += 1
-    return Fitted(lines[:kept], place[:kept], counts[:kept], chi2[:kept])
+    return Fitted(lines[:kept], place[:kept], counts[:kept], chi2[:kept], spread[:kept])
 
 
 @compiled
-def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tuple[Line, int, int, int, float]:
-    """Return a piece's line, its first and last return, how many it used, and their chi-square; too few give 0."""
+def _fitted_piece(
+    k: int, joints: Joints, returns: Returns, rules: Rules
+) -> tuple[Line, int, int, int, float, Float[np.ndarray, "3"]]:
+    """Return a piece's line, its first and last return, how many it used, their chi-square, and the spread over faces.
+
+    Too few returns give 0.
+    """
     line = line_of(joints.lines, k)
     start, stop = joints.pieces[k, 0], joints.pieces[k, 1]
     if stop - start < rules.least_beams:
-        return line, start, stop, 0, 0.0
+        return line, start, stop, 0, 0.0, np.zeros(3)
     is_long = stop - start - 2 >= rules.least_beams
     if is_long and (joints.in_doubt[k, 0] or not joints.is_corner[k, 0]):
         start += 1
@@ -77,7 +85,10 @@ def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tup
         if keep[i] > 0.0:
             first, last, count = min(first, start + i), start + i, count + 1
             chi2 += (met_at(line, cos[i], sin[i]) - ranges[i]) ** 2 / sigma2[i]
-    return line, first, last, count, chi2
+    if count < rules.least_beams:
+        return line, first, last, count, chi2, np.zeros(3)
+    odds = np.array([odds_of_end(line, first, -1, returns, rules), odds_of_end(line, last, 1, returns, rules)])
+    return line, first, last, count, chi2, spread_over_faces(line, cos, sin, ranges, keep, odds, rules.outlier_sigmas)
 
 
 @compiled

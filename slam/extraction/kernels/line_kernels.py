@@ -105,21 +105,26 @@ def refit(
 
 
 @compiled
-def polar(line: Line) -> tuple[float, float, float, float, float]:
-    """Return (alpha rad, r m), r > 0, and their first-order variances and covariance: of alpha, of both, of r.
+def polar_cov(line: Line, caa: float, cab: float, cbb: float) -> tuple[float, float, float]:
+    """Return a covariance of (a, b) as one of (alpha, r), to first order: of alpha, of both, of r.
 
     alpha = atan2(b, a), r = 1/h, h^2 = a^2 + b^2; J_alpha = (-b, a)/h^2, J_r = -(a, b)/h^3, C = J C_ab J'.
     """
-    det = line.cc * line.ss - line.cs * line.cs
-    caa, cab, cbb = line.ss / det, -line.cs / det, line.cc / det
     a2, ab, b2 = line.a * line.a, line.a * line.b, line.b * line.b
     r2 = 1.0 / (a2 + b2)
-    r = np.sqrt(r2)
     r4 = r2 * r2
     c_alpha = (b2 * caa - 2.0 * ab * cab + a2 * cbb) * r4
-    c_both = (ab * (caa - cbb) + (b2 - a2) * cab) * (r4 * r)
+    c_both = (ab * (caa - cbb) + (b2 - a2) * cab) * (r4 * np.sqrt(r2))
     c_r = (a2 * caa + 2.0 * ab * cab + b2 * cbb) * (r4 * r2)
-    return np.arctan2(line.b, line.a), r, c_alpha, c_both, c_r
+    return c_alpha, c_both, c_r
+
+
+@compiled
+def polar(line: Line) -> tuple[float, float, float, float, float]:
+    """Return (alpha rad, r m), r > 0, and their first-order variances and covariance: of alpha, of both, of r."""
+    det = line.cc * line.ss - line.cs * line.cs
+    c_alpha, c_both, c_r = polar_cov(line, line.ss / det, -line.cs / det, line.cc / det)
+    return np.arctan2(line.b, line.a), np.sqrt(1.0 / (line.a * line.a + line.b * line.b)), c_alpha, c_both, c_r
 
 
 @compiled

@@ -9,7 +9,7 @@ from ...geometry.compiled import compiled
 from ..segments import EndKind
 from .fit_kernels import Fitted, fitted
 from .joint_kernels import sharpened
-from .line_kernels import crossing, line_of, met_at, polar, prefix_sums
+from .line_kernels import crossing, line_of, met_at, polar, polar_cov, prefix_sums
 from .returns_kernels import Returns, Rules, positions_of, returns_of, rolled, run_of, turn_of, turned
 from .split_kernels import candidates, cut_at, settled, split, split_gains, surest
 
@@ -27,6 +27,7 @@ class Found(NamedTuple):
     end_kinds: Int[np.ndarray, "n 2"]
     chi2: Float[np.ndarray, " n"]
     is_tentative: Bool[np.ndarray, " n"]
+    faces_cov: Float[np.ndarray, "n 2 2"]
 
 
 @compiled
@@ -63,12 +64,15 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, B
     A line is none whose last beams do not meet it, or that its beams leave open.
     """
     n, m = len(pieces.counts), len(returns.beam)
-    lines, cov, ends = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
+    lines, cov, ends, faces_cov = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
     beams, kinds, good = np.empty((n, 2), np.int64), np.empty((n, 2), np.int64), np.ones(n, np.bool_)
     for k in range(n):
         line = line_of(pieces.lines, k)
         lines[k, 0], lines[k, 1], cov[k, 0, 0], cov[k, 0, 1], cov[k, 1, 1] = polar(line)
         cov[k, 1, 0] = cov[k, 0, 1]
+        spread = pieces.spread[k]
+        faces_cov[k, 0, 0], faces_cov[k, 0, 1], faces_cov[k, 1, 1] = polar_cov(line, spread[0], spread[1], spread[2])
+        faces_cov[k, 1, 0] = faces_cov[k, 0, 1]
         for end in range(2):
             at = pieces.place[k, end] % m
             range_m = met_at(line, returns.cos[at], returns.sin[at])
@@ -84,11 +88,12 @@ def _described(pieces: Fitted, returns: Returns, rules: Rules) -> tuple[Found, B
             ends[after, 0, 0], ends[after, 0, 1] = x, y
             kinds[k, 1] = kinds[after, 0] = _CORNER
     for k in range(n):
-        told = cov[k, 0, 0] + cov[k, 0, 1] + cov[k, 1, 1]
+        told = cov[k, 0, 0] + cov[k, 0, 1] + cov[k, 1, 1] + faces_cov[k].sum()
         for end in range(2):
             told += ends[k, end, 0] + ends[k, end, 1]
         good[k] &= np.isfinite(told)
-    return Found(lines, cov, ends, beams, pieces.counts, kinds, pieces.chi2, pieces.counts < rules.sure_beams), good
+    few = pieces.counts < rules.sure_beams
+    return Found(lines, cov, ends, beams, pieces.counts, kinds, pieces.chi2, few, faces_cov), good
 
 
 @compiled

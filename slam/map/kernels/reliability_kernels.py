@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...extraction.straightness_kernels import edge_cov, edge_variance, of_a_beam
+from ...extraction.straightness_kernels import edge_cov, of_a_beam
 from ...geometry.compiled import compiled
 
 
@@ -45,6 +45,30 @@ def keep_longest(longest: Float[np.ndarray, "2"], length_m: float) -> None:
 
 
 @compiled
+def add_faces(
+    rows: Int[np.ndarray, " m"],
+    faces_cov: Float[np.ndarray, "m 2 2"],
+    middles_m: Float[np.ndarray, " m"],
+    faces: Float[np.ndarray, "n 2 2"],
+) -> None:
+    """Keep the two least variances of each wall that its segments have since they may be of two faces.
+
+    Rows of (turn rad^2, across m^2 at the middle of what was seen), the least first.
+    """
+    for k in range(len(rows)):
+        C, middle = faces_cov[k], middles_m[k]
+        keep_least(faces[rows[k]], C[0, 0], C[1, 1] - 2.0 * middle * C[0, 1] + middle**2 * C[0, 0])
+
+
+@compiled
+def keep_least(least: Float[np.ndarray, "2 2"], turn: float, across: float) -> None:
+    """Take one more pair of variances into the two least of either, in place."""
+    for column, value in enumerate((turn, across)):
+        least[1, column] = min(least[1, column], max(least[0, column], value))
+        least[0, column] = min(least[0, column], value)
+
+
+@compiled
 def misfits(residue: Float[np.ndarray, "n 3"], noise_sigmas: float) -> Float[np.ndarray, " n"]:
     """Return how far faces of walls are off their line, as variances across it, m^2.
 
@@ -63,8 +87,7 @@ def off_line_cov(
     extents: Float[np.ndarray, "n 2"],
     longest: Float[np.ndarray, "n 2"],
     across: Float[np.ndarray, " n"],
-    edge_m: float,
-    face_m: float,
+    faces: Float[np.ndarray, "n 2 2"],
 ) -> Float[np.ndarray, "n 2 2"]:
     """Return how far each wall may be from its line, as a covariance of (alpha rad, d m) about its anchor.
 
@@ -76,8 +99,17 @@ def off_line_cov(
         seen_m = longest[k, 0] if longest[k, 0] > 0.0 else longest[k, 1]
         lengths[k] = min(extents[k, 1] - extents[k, 0], seen_m)
         middles[k] = 0.5 * (extents[k, 0] + extents[k, 1])
-        variances[k] = across[k] + edge_variance(lengths[k], edge_m, face_m)
-    return edge_cov(variances, lengths, middles)
+        variances[k] = across[k]
+    cov = edge_cov(variances, lengths, middles)
+    for k in range(n):
+        seen = 1 if np.isfinite(faces[k, 1, 0]) else 0
+        if np.isfinite(faces[k, 0, 0]):
+            turn = faces[k, seen, 0]
+            cov[k, 0, 0] += turn
+            cov[k, 0, 1] += turn * middles[k]
+            cov[k, 1, 0] += turn * middles[k]
+            cov[k, 1, 1] += faces[k, seen, 1] + turn * middles[k] ** 2
+    return cov
 
 
 @compiled
