@@ -40,7 +40,3 @@ class ExtractionConfig:
     1.4 times with 4."""
     doubt_sigmas: float = 2.5
     """The last beam before a joint is left out where the other line predicts it within this: it may be either's."""
-    other_odds: float = 0.25
-    """Odds that the outer beam of a segment is another face's where the next beam past it meets nothing, or something
-    behind the line: a fifth are in half of the plans (`python -m studies.consistency.extraction`). Squared where the
-    next beam meets the line, too, or something nearer, and for the last two. 0 where each segment is of one face."""

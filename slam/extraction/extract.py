@@ -64,5 +64,5 @@ def rules_of(config: ExtractionConfig) -> Rules:
         sure_beams=config.sure_beams,
         outlier_sigmas=float(config.shared.outlier_sigmas),
         doubt_sigmas=float(config.doubt_sigmas),
-        other_odds=float(config.other_odds),
+        face_m=float(config.shared.face_m),
     )

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
-from .faces_kernels import odds_of_end, spread_over_faces
+from .faces_kernels import odds_of_other_faces, spread_over_faces
 from .joint_kernels import Joints
 from .line_kernels import Line, line_of, met_at, put, refit, variance_met
 from .returns_kernels import Returns, Rules
@@ -87,7 +87,7 @@ def _fitted_piece(
             chi2 += (met_at(line, cos[i], sin[i]) - ranges[i]) ** 2 / sigma2[i]
     if count < rules.least_beams:
         return line, first, last, count, chi2, np.zeros(3)
-    odds = np.array([odds_of_end(line, first, -1, returns, rules), odds_of_end(line, last, 1, returns, rules)])
+    odds = odds_of_other_faces(line, first, last, returns, rules)
     return line, first, last, count, chi2, spread_over_faces(line, cos, sin, ranges, keep, odds, rules.outlier_sigmas)
 
 

@@ -22,7 +22,7 @@ class Rules(NamedTuple):
     sure_beams: int
     outlier_sigmas: float
     doubt_sigmas: float
-    other_odds: float
+    face_m: float
 
 
 class Returns(NamedTuple):
