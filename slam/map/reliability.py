@@ -45,8 +45,7 @@ def as_told(
     corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
-    cov = cov + cov_of_faces(segments, config.straightness)
-    return reliability_kernels.as_told(cov, segments.is_tentative, float(config.heading_rad))
+    return cov + cov_of_faces(segments, config.straightness)
 
 
 class Reliability:
@@ -103,4 +102,5 @@ class Reliability:
         it. So a wall counts as long as two scans saw it.
         """
         rows, columns = self._records.rows(ids), self._records.columns
-        return reliability_kernels.off_line_cov(extents, columns["longest"][rows], misfits_m2, columns["faces"][rows])
+        longest, faces = columns["longest"][rows], columns["faces"][rows]
+        return reliability_kernels.off_line_cov(extents, longest, misfits_m2, faces, float(self._config.shared.face_m))

@@ -88,10 +88,13 @@ def off_line_cov(
     longest: Float[np.ndarray, "n 2"],
     across: Float[np.ndarray, " n"],
     faces: Float[np.ndarray, "n 2 2"],
+    face_m: float,
 ) -> Float[np.ndarray, "n 2 2"]:
     """Return how far each wall may be from its line, as a covariance of (alpha rad, d m) about its anchor.
 
-    A wall counts as long as two scans have seen it; one of which a single scan showed enough, as long as that did.
+    A wall counts as long as two scans have seen it; one of which a single scan showed enough, as long as that did. Of a
+    short wall every scan sees the same faces beside it, of a longer one those where its view ends: what scans lack
+    stays by the same odds by which they lack it.
     """
     n = len(extents)
     variances, lengths, middles = np.empty(n), np.empty(n), np.empty(n)
@@ -104,11 +107,12 @@ def off_line_cov(
     for k in range(n):
         seen = 1 if np.isfinite(faces[k, 1, 0]) else 0
         if np.isfinite(faces[k, 0, 0]):
-            turn = faces[k, seen, 0]
+            stays = face_m / (face_m + lengths[k])
+            turn = stays * faces[k, seen, 0]
             cov[k, 0, 0] += turn
             cov[k, 0, 1] += turn * middles[k]
             cov[k, 1, 0] += turn * middles[k]
-            cov[k, 1, 1] += faces[k, seen, 1] + turn * middles[k] ** 2
+            cov[k, 1, 1] += stays * faces[k, seen, 1] + turn * middles[k] ** 2
     return cov
 
 
