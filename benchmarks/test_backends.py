@@ -1,15 +1,17 @@
 """Cost of one predict and one update with ten lines seen, beside a bare rank-k update of the same size."""
 
-import importlib
-import sys
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.linalg.blas import dsyrk
+
+from slam.backends import BACKENDS
+from slam.estimation.backend import Observations
+from slam.geometry.lines import directions, normals
+from slam.robot import Odometry
 
 SEEN = 10
 TARGET_MS = {50: 0.3, 200: 13.0}
@@ -18,22 +20,7 @@ BARE_MS: dict[int, float] = {}
 """Median of the bare update, by the number of lines."""
 
 
-def unhooked() -> dict[str, Any]:
-    """Import the back ends without the shape checks that pytest weaves in: they cost more than a filter does."""
-    hooks, sys.meta_path = sys.meta_path, [hook for hook in sys.meta_path if "axtyping" not in type(hook).__name__]
-    woven = {name: sys.modules.pop(name) for name in list(sys.modules) if name.split(".")[0] == "slam"}
-    try:
-        parts = [importlib.import_module(f"slam.{part}") for part in ("backends", "backend", "robot", "geometry.lines")]
-    finally:
-        for name in [name for name in sys.modules if name.split(".")[0] == "slam"]:
-            del sys.modules[name]
-        sys.modules.update(woven)
-        sys.meta_path = hooks
-    return {name: value for part in parts for name, value in vars(part).items()}
-
-
-slam = SimpleNamespace(**unhooked())
-EKFS = [name for name in slam.BACKENDS if name.endswith("-ekf")]
+EKFS = [name for name in BACKENDS if name.endswith("-ekf")]
 
 
 def step_of(name: str, lines: int) -> tuple[Any, Callable[[], None]]:
@@ -45,11 +32,11 @@ def step_of(name: str, lines: int) -> tuple[Any, Callable[[], None]]:
     turn[:, 1, 0] = t0
     cov = turn @ np.diag([1e-4, 1e-5]) @ turn.swapaxes(1, 2)
     seen_lines = np.stack([alpha, r], axis=-1)
-    backend = slam.BACKENDS[name].make(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
-    ids = backend.grow(seen_lines, cov, r[:, None] * slam.normals(alpha) + t0[:, None] * slam.directions(alpha))
+    backend = BACKENDS[name].make(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
+    ids = backend.grow(seen_lines, cov, r[:, None] * normals(alpha) + t0[:, None] * directions(alpha))
     rows = np.sort(rng.choice(lines, SEEN, replace=False))
-    seen = slam.Observations(ids[rows], seen_lines[rows], cov[rows])
-    odometry = slam.Odometry(np.zeros(3), np.diag([1e-5, 1e-6, 1e-5]))
+    seen = Observations(ids[rows], seen_lines[rows], cov[rows])
+    odometry = Odometry(np.zeros(3), np.diag([1e-5, 1e-6, 1e-5]))
 
     def step() -> None:
         backend.predict(odometry)
@@ -84,7 +71,7 @@ def test_one_step(benchmark: BenchmarkFixture, name: str, lines: int) -> None:
 def test_asking_for_the_joint_of_ten_lines(benchmark: BenchmarkFixture, lines: int) -> None:
     """A fresh belief, and the joint covariance that gating asks for."""
     backend, _ = step_of("full-ekf", lines)
-    far = slam.Odometry(np.zeros(3), 1e-9 * np.eye(3))
+    far = Odometry(np.zeros(3), 1e-9 * np.eye(3))
 
     def ask() -> None:
         backend.predict(far)

@@ -1,10 +1,8 @@
 """Cost of extracting the segments of one scan of 180 beams."""
 
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
 
-import jaxtyping
 import numpy as np
 import pytest
 import shapely
@@ -16,14 +14,6 @@ from slam.extraction.extract import extract
 from slam.robot import Scan
 
 PLANS = Path(__file__).parents[1] / "tests" / "data" / "plans"
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds: they cost more than the scan itself."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def scans(world_name: str, count: int, config: LidarConfig) -> list[Scan]:

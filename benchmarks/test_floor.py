@@ -1,10 +1,6 @@
 """Cost of the grid of free floor: one scan taken in, and the clearances of a whole grid."""
 
-from collections.abc import Iterator
-
-import jaxtyping
 import numpy as np
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from explore.floor.free_space import FreeSpace
@@ -13,14 +9,6 @@ from sim.worlds import load
 from slam.robot import MotionCommand, Scan
 
 STEPS = 300
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds: they cost more than the work itself."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def drive() -> list[tuple[np.ndarray, Scan]]:

@@ -1,8 +1,5 @@
 """Cost of one prediction and one joint update with ten lines seen, by the size of the map."""
 
-from collections.abc import Iterator
-
-import jaxtyping
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -13,14 +10,6 @@ from slam.geometry.lines import normals
 from slam.robot import Odometry
 
 SEEN = 10
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds: they cost more than the update itself."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize("lines", [50, 200, 1000])

@@ -88,14 +88,6 @@ def look(
     return z, (turn * SIGMAS**2) @ turn.swapaxes(1, 2), centres
 
 
-@pytest.fixture(autouse=True)
-def _unchecked():
-    """Without the shape checks that pytest adds: they would be most of the time."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
-
-
 @pytest.mark.parametrize(("steps", "lines"), [(500, 75), (5000, 750)])
 def test_a_step_of_the_graph(benchmark, steps, lines):
     backend = BACKENDS["graph"].make(np.zeros(3), np.diag([0.01, 0.01, 0.002]) ** 2)

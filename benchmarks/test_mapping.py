@@ -1,9 +1,8 @@
 """Cost of the stages of the mapper's step, each on what it was given in a mission in paper-fig9."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import islice
 
-import jaxtyping
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -17,13 +16,6 @@ from slam.association.view import View
 from slam.backends import BACKENDS
 from slam.backends.frame import Frame
 from slam.mapper import Mapper
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(scope="module")

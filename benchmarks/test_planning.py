@@ -2,10 +2,8 @@
 
 import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-import jaxtyping
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -21,14 +19,6 @@ from slam.mapper import Mapper
 PLAN = Path(os.environ.get("PLAN", Path(__file__).parents[1] / "tests" / "data" / "plans" / "school.json"))
 """A school of 333 m2 with 77 faces, or the file that the environment names."""
 STEPS = 1500
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds: they cost more than the step itself."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize("strategy", list(STRATEGIES))

@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Iterator
 
-import jaxtyping
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -13,14 +12,6 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.geometry.poses import compose, inverse
 from slam.odometry.scan_matching import ScanMatcher
 from slam.robot import Odometry, Scan
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize("beams", [180, 1081])

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-import jaxtyping
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -23,14 +22,6 @@ PLAN = Path(os.environ.get("PLAN", Path(__file__).parents[1] / "tests" / "data" 
 """A school of 333 m2 with 77 faces, or the file that the environment names."""
 STEPS, WARM, BIN = 3000, 200, 100
 """Of a long mission: all, those at the beginning that load and compile, and those of which one median is taken."""
-
-
-@pytest.fixture(autouse=True)
-def _unchecked() -> Iterator[None]:
-    """Measure without the shape checks that pytest adds: they cost more than the step itself."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize("backend", list(BACKENDS))

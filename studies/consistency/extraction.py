@@ -32,7 +32,7 @@ from slam.geometry.poses import to_robot, wrap
 from slam.map.reliability import ReliabilityConfig
 from slam.robot import Scan
 
-PLANS = Path(__file__).parents[1] / ".." / "shared" / "data" / "plans"
+PLANS = Path(__file__).parents[2] / ".." / "shared" / "data" / "plans"
 FLAT_RAD, FLAT_M = 1e-3, 2e-3
 MIXED_SHARE = 0.8
 EXTRACTION = ExtractionConfig()
