@@ -153,6 +153,7 @@ DROPPED = {
     "mission.mapper.walls.reliability.crooked_m",
     "mission.mapper.walls.reliability.excess",
     "mission.mapper.walls.reliability.few_heading_rad",
+    "mission.mapper.walls.reliability.straightness.edge_m",
     "mission.mapper.walls.reliability.straightness.face_m",
     "mission.mapper.walls.trusted_observations",
 }

@@ -23,7 +23,7 @@ from slam.robot import Odometry
 
 from ..scenario import P0_SIGMAS, load_world
 from ..scoring.truth import truth_of
-from .oracles import PerfectExtraction, Witness, begins_a_line, of_true_lines
+from .oracles import PerfectExtraction, Witness, begins_a_line
 from .replay import RecordedRun
 
 
@@ -107,8 +107,7 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
     world = load_world(trial.world, trial.start, trial.scale)
     witness = Witness(truth_of(world, trial.robot), poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
-    mapper = of_true_lines(trial.mission.mapper) if perfect_extraction else trial.mission.mapper
-    rules, extraction = mapper.walls.reliability, mapper.extraction
+    rules, extraction = trial.mission.mapper.walls.reliability, trial.mission.mapper.extraction
     true_lines: dict[int, np.ndarray] = {}
     again, first = [], []
     for k in range(len(recording)):

@@ -9,12 +9,10 @@ from jaxtyping import Bool, Float, Int
 
 from sim.chance import Channel, standard_normals
 from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
-from slam.config import MapperConfig
 from slam.estimation.backend import Joint
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig
 from slam.geometry.poses import compose, inverse
 from slam.robot import Scan
 
@@ -99,7 +97,7 @@ def begins_a_line(
 
 
 class PerfectExtraction:
-    """Real segmentation, but each line is the true one with an error drawn as the measurement model states it."""
+    """Real segmentation, but each line is the true one of one face, with an error drawn as its covariance states it."""
 
     def __init__(self, witness: Witness, seed: int) -> None:
         self._witness, self._seed = witness, seed
@@ -119,12 +117,6 @@ class PerfectExtraction:
         draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
         lines = as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2))
         return replace(segments, lines=lines, faces_cov=None)
-
-
-def of_true_lines(config: MapperConfig) -> MapperConfig:
-    """Return a mapper for perfect extraction, whose short faces are known for what they are."""
-    reliability = replace(config.walls.reliability, straightness=StraightnessConfig(edge_m=0.0))
-    return replace(config, walls=replace(config.walls, reliability=reliability))
 
 
 def as_stated(

@@ -46,7 +46,7 @@ from ..scenario import (
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
 from ..usage import UsageError
-from .oracles import PerfectExtraction, TrueAssociation, Witness, of_true_lines, true_odometry
+from .oracles import PerfectExtraction, TrueAssociation, Witness, true_odometry
 
 Association = Literal["own", "true"]
 OPEN_TO_REPLAYS = ("mission", "backend_options")
@@ -204,7 +204,6 @@ def replay(
 
     def mission(scenario: Scenario) -> Iterator[Step]:
         rules = scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper)
-        rules = of_true_lines(rules) if options.perfect_extraction else rules
         mapper = Mapper(
             scenario.backend,
             rules,

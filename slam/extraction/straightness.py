@@ -1,30 +1,18 @@
-"""How far a wall may be from the line that stands for it: what no single beam's noise explains.
-
-A face of a decimetre cannot be told from a line across the corners beside it: four beams lie on either. In the mean
-over all segments so short, those across corners among them, all beams together tell no more than a single one would
-that is off by a centimetre and may lie anywhere along the face (`python -m studies.consistency.extraction`). Of a
-long segment nothing is lost: beams of another face would have cut it.
-"""
+"""How far a wall may be from the line that stands for it: what no single beam's noise explains."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
 from .segments import Segments
-from .straightness_kernels import faces_cov, misfit_variances
 
 
 @dataclass(frozen=True)
 class StraightnessConfig:
-    """How far short faces are off their lines, sigma."""
+    """How far walls are off their lines, sigma."""
 
-    shared: SharedConfig = of_shared()
-    edge_m: float = 0.01
-    """The shortest; one as long as `shared.face_m` is half as far off, a longer one falls with the fourth power. 0
-    where every segment is known to be of one face."""
     bow_rad: float = 0.0
     """How far the direction of a wall of any length is off, where one scan sees another part of it than the next ..."""
     bow_m: float = 0.0
@@ -32,14 +20,13 @@ class StraightnessConfig:
 
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
-    """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces."""
+    """Return what the covariances of (alpha, r) of the segments of a scan lack, since some are of several faces.
+
+    Of those around a corner that are four beams long a third are: their excess is nearly all of the error that noise
+    does not explain (`python -m studies.consistency.extraction`).
+    """
     faces = np.zeros((len(segments), 2, 2)) if segments.faces_cov is None else segments.faces_cov
     return faces + cov_of_bows(segments, config) if config.bow_rad or config.bow_m else faces
-
-
-def cov_of_misfits(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
-    """Return what they lack where the residuals of a segment show that it is of several faces."""
-    return faces_cov(segments.lines, segments.ends, _misfits_m2(segments, config), 0.0, 1.0)
 
 
 def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:
@@ -49,11 +36,6 @@ def cov_of_bows(segments: Segments, config: StraightnessConfig = StraightnessCon
     cov[:, 0, 0], cov[:, 1, 1] = config.bow_rad**2, config.bow_m**2 + (config.bow_rad * middles) ** 2
     cov[:, 0, 1] = cov[:, 1, 0] = config.bow_rad**2 * middles
     return cov
-
-
-def _misfits_m2(segments: Segments, config: StraightnessConfig) -> Float[np.ndarray, " s"]:
-    sigmas = float(config.shared.outlier_sigmas)
-    return misfit_variances(segments.cov, segments.chi2, segments.beam_counts, sigmas)
 
 
 def middles_of(segments: Segments) -> Float[np.ndarray, " s"]:

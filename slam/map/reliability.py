@@ -23,8 +23,8 @@ class ReliabilityConfig:
 
     shared: SharedConfig = of_shared()
     heading_rad: float = 0.15
-    """A segment of five beams or more is clear where its direction is known better than this, sigma, that of short
-    faces included (`straightness`). One of fewer beams may be turned by as much: it may lie over two faces, and has too
+    """A segment of five beams or more is clear where its direction is known better than this, sigma, with what it lacks
+    since it may be of two faces. One of fewer beams may be turned by as much: it may lie over two faces, and has too
     few beams to show it."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
     """How far a face may be from its line."""
@@ -45,7 +45,8 @@ def as_told(
     corner of two faces of one wall passes every gate. It may be turned about the point at which what is known of its
     place does not depend on its direction; there r changes by cov(alpha, r) / var(alpha) for every radian.
     """
-    return cov + cov_of_faces(segments, config.straightness)
+    cov = cov + cov_of_faces(segments, config.straightness)
+    return reliability_kernels.as_told(cov, segments.is_tentative, float(config.heading_rad))
 
 
 class Reliability:

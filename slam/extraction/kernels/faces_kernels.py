@@ -1,4 +1,4 @@
-"""What the covariance of a fit lacks since some of its returns may be another face's: a mean over which, by Bayes' rule.
+"""What the covariance of a fit lacks since returns may be another face's: a mean over which are, by Bayes' rule.
 
 Hypotheses are that none are, up to two at either end, or all from a bend on; those on either side of a bend lie on a
 line of their own. An end is over another face as likely as a face of `face_m` is seen beside one so long; two
@@ -119,9 +119,7 @@ def _rest(sums: Float[np.ndarray, "n1 6"], start: int, stop: int) -> float:
 
 
 @compiled
-def _add(
-    mean: Float[np.ndarray, "3"], weight: float, sums: Float[np.ndarray, "n1 6"], start: int, stop: int
-) -> float:
+def _add(mean: Float[np.ndarray, "3"], weight: float, sums: Float[np.ndarray, "n1 6"], start: int, stop: int) -> float:
     """Add a hypothesis, of which the returns [start, stop) are the line's, to what all returns lack; return its weight.
 
     That is its covariance less that of all, and the square of how far its estimate is off theirs.

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.stats
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
@@ -12,11 +11,11 @@ from slam.backends import BACKENDS
 from slam.config import MapperConfig
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
-from slam.extraction.straightness import StraightnessConfig, cov_of_bows, cov_of_faces, cov_of_misfits
-from slam.extraction.straightness_kernels import edge_cov, edge_variance, faces_cov, misfit_variances
+from slam.extraction.straightness import StraightnessConfig, cov_of_bows, cov_of_faces
+from slam.extraction.straightness_kernels import edge_cov
 from slam.geometry.lines import normals, through
 from slam.geometry.poses import wrap
-from slam.map.reliability import ReliabilityConfig, are_clear, as_told
+from slam.map.reliability import ReliabilityConfig
 from slam.map.stochastic_map import StochasticMap
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -30,15 +29,6 @@ def test_the_covariance_of_an_edge_is_that_of_one_point_spread_along_it(length, 
     expected = np.linalg.inv(rows.T @ rows / (len(x) * 0.01**2))
     (found,) = edge_cov(np.array([0.01**2]), np.array([length]), np.array([middle]))
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
-
-
-def test_long_faces_are_on_their_lines():
-    sigmas = np.sqrt([edge_variance(length, 0.01, 0.2) for length in (0.0, 0.1, 0.2, 0.4, 1.0, 4.0)])
-    assert sigmas[0] == 0.01
-    assert sigmas[2] == 0.005
-    assert (np.diff(sigmas) < 0.0).all()
-    assert sigmas[4] < 2e-5, "far below what a hundred beams tell"
-    assert edge_variance(0.05, 0.0, 0.2) == edge_variance(1.0, 0.0, 0.2) == 0.0
 
 
 def room_of_pilasters(rng):
@@ -83,18 +73,6 @@ def test_among_short_faces_what_is_told_holds_for_those_of_one_face_and_nearly_f
     assert 0.5 < told[~mixed].mean() < 1.5 < as_extracted[~mixed].mean()
     assert np.median(told) < 0.8 < 1.5 < np.median(as_extracted)
     assert np.quantile(told, 0.8) < 0.4 * np.quantile(as_extracted, 0.8)
-
-
-def test_a_short_face_is_not_clear_and_moves_the_estimate_by_no_more_than_it_is_told():
-    scan = Scan(np.linspace(-0.3, 0.3, 13), 1.0 / np.cos(np.linspace(-0.3, 0.3, 13)), 0.002, 4.0, 0.0)
-    (segments,) = [extract(scan)]
-    assert len(segments) == 1
-    long, short = segments, replace(segments, ends=0.2 * segments.ends + [0.8, 0.0])
-    config = ReliabilityConfig()
-    assert are_clear(long, config).all()
-    assert not are_clear(short, config).any()
-    np.testing.assert_allclose(as_told(short.cov, short, config), short.cov + cov_of_faces(short))
-    np.testing.assert_allclose(as_told(long.cov, long, config), long.cov, rtol=0.2)
 
 
 def test_a_wall_that_bows_lies_and_points_otherwise_where_another_part_of_it_is_in_sight():
@@ -149,72 +127,3 @@ def test_a_map_tells_how_far_walls_are_off_in_whatever_order_it_is_asked():
         np.testing.assert_allclose(walls.told.belief.joint(np.array(asked, dtype=np.int64)).cov, expected)
         np.testing.assert_array_equal(walls.belief.joint(np.array(asked, dtype=np.int64)).cov, whole.take(rows).cov)
     assert replace(walls, off_line_cov=None).told.belief is belief
-
-
-def over_a_jog(rng, jog_m, count=200):
-    """Return segments across a jog between two parallel faces, as fitted, and their errors of direction, rad.
-
-    Each has two beams on the end of a wall and four on a face 0.3 m behind it, which stands off by `jog_m`.
-    """
-    along, off = np.array([0.0, 0.06, 0.36, 0.4, 0.44, 0.48]), jog_m * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-    sigma, x = 0.01, np.column_stack([np.ones(6), along])
-    inverse = np.linalg.inv(x.T @ x)
-    cov = np.tile(sigma**2 * np.array([[inverse[1, 1], inverse[0, 1]], [inverse[0, 1], inverse[0, 0]]]), (count, 1, 1))
-    draws = off[:, None] + sigma * rng.standard_normal((6, count))
-    fits = (inverse @ x.T @ draws).T
-    chi2 = ((draws - x @ fits.T) ** 2).sum(axis=0) / sigma**2
-    return cov, chi2, fits[:, 1]
-
-
-def test_a_segment_over_two_faces_is_as_far_off_as_its_own_residuals_say():
-    """What the fit states of its direction is a fifth of the error; with its misfit three sigmas hold it."""
-    cov, chi2, turned = over_a_jog(np.random.default_rng(2), 0.13)
-    shown = misfit_variances(cov, chi2, np.full(len(cov), 6), 3.0)
-    seen = shown > 0.0
-    stated = cov[:, 0, 0] + 12.0 * shown / 0.48**2
-    assert seen.mean() > 0.5
-    assert np.abs(turned).min() > 4.0 * np.sqrt(cov[0, 0, 0])
-    assert (np.abs(turned[seen]) < 3.0 * np.sqrt(stated[seen])).all()
-
-
-def test_a_segment_of_one_face_shows_a_misfit_as_rarely_as_chance_has_it():
-    cov, chi2, _ = over_a_jog(np.random.default_rng(3), 0.0, 20_000)
-    shown = misfit_variances(cov, chi2, np.full(len(cov), 6), 3.0)
-    expected = scipy.stats.chi2.sf(4.0 + 3.0 * np.sqrt(8.0), 4)
-    assert np.mean(shown > 0.0) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / len(cov)))
-
-
-def test_a_misfit_is_twice_what_the_residuals_show_beyond_the_noise():
-    """Ten beams of 10 mm, all of the excess in one number: sum of squares 40 variances, 32 of them beyond noise."""
-    variance = 0.01**2
-    cov = np.array([[[0.01, 0.002], [0.002, 0.0004 + variance / 10]]])
-    (found,) = misfit_variances(cov, np.array([40.0]), np.array([10]), 3.0)
-    assert found == pytest.approx(4.0 * 32.0 * variance / 10)
-    assert misfit_variances(cov, np.array([19.9]), np.array([10]), 3.0) == 0.0
-    lines, ends = np.array([[0.0, 1.0]]), np.array([[[1.0, -0.5], [1.0, 0.5]]])
-    (told,) = faces_cov(lines, ends, np.array([found]), 0.0, 0.2)
-    np.testing.assert_allclose(told, [[12.0 * found, 0.0], [0.0, found]], atol=1e-12)
-
-
-def test_a_segment_with_a_misfit_of_its_own_moves_no_estimate():
-    scan = Scan(np.linspace(-0.3, 0.3, 13), 1.0 / np.cos(np.linspace(-0.3, 0.3, 13)), 0.002, 4.0, 0.0)
-    straight = extract(scan)
-    bent = replace(straight, chi2=np.array([3000.0]))
-    assert are_clear(straight).all()
-    assert not are_clear(bent).any()
-    np.testing.assert_allclose(cov_of_misfits(straight), 0.0)
-    np.testing.assert_allclose(cov_of_faces(bent), cov_of_faces(straight) + cov_of_misfits(bent), rtol=1e-9)
-
-
-def test_a_wall_that_begins_by_a_segment_with_a_misfit_is_as_uncertain_as_that():
-    """Sixty beams two sigmas before and behind a wall in turn: four times the chi-square of a straight one."""
-    bearings = np.linspace(-0.5, 0.5, 60)
-    ranges = (2.0 + 0.004 * np.tile([1.0, -1.0], 30)) / np.cos(bearings)
-    scan = Scan(bearings, ranges, 0.002, 6.0, 0.0)
-    segments = extract(scan)
-    assert len(segments) == 1
-    mapper = Mapper(BACKENDS["full-ekf"].make(np.zeros(3), 1e-12 * np.eye(3)), MapperConfig())
-    mapper.step(scan)
-    turn = mapper.belief.joint(mapper.belief.ids).cov[3, 3]
-    assert turn == pytest.approx(segments.cov[0, 0, 0] + cov_of_misfits(segments)[0, 0, 0], rel=1e-3)
-    assert turn > 10.0 * segments.cov[0, 0, 0]

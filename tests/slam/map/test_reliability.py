@@ -10,7 +10,6 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig
 from slam.extraction.straightness_kernels import edge_cov
 from slam.geometry.poses import compose, inverse
 from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
@@ -52,8 +51,6 @@ def observation(alpha, sigma_rad, beams=6, chi2=None, length_m=1.0):
     )
 
 
-FACES = ReliabilityConfig(straightness=StraightnessConfig(edge_m=0.0))
-"""Every segment is of one face."""
 OWNER = np.array([0])
 
 
@@ -95,12 +92,15 @@ def test_beside_a_clear_observation_few_beams_tell_their_distance_at_their_middl
     cov = to_robot @ np.diag([1e-6, 4e-6]) @ to_robot.T
     both = [replace(observation(0.0, 1e-3, beams, length_m=3.0), cov=cov[None]) for beams in (4, 9)]
     few = both[0]
-    together = Segments(*(np.concatenate([getattr(each, name) for each in both]) for name in vars(few)))
-    wide, clear = as_told(together.cov, together, FACES)
+    names = [name for name in vars(few) if name != "faces_cov"]
+    together = Segments(*(np.concatenate([getattr(each, name) for each in both]) for name in names))
+    wide, clear = as_told(together.cov, together)
     at_middle = np.linalg.inv(to_robot)
-    np.testing.assert_allclose(at_middle @ wide @ at_middle.T, np.diag([1e-6 + FACES.heading_rad**2, 4e-6]), atol=1e-12)
+    np.testing.assert_allclose(
+        at_middle @ wide @ at_middle.T, np.diag([1e-6 + ReliabilityConfig().heading_rad ** 2, 4e-6]), atol=1e-12
+    )
     np.testing.assert_array_equal(clear, cov)
-    np.testing.assert_array_equal(as_told(cov[None], few, FACES), cov[None], "alone it is all that there is")
+    np.testing.assert_array_equal(as_told(cov[None], few), cov[None], "alone it is all that there is")
 
 
 def observed_over(points, rng):
@@ -144,21 +144,52 @@ def test_a_straight_wall_is_on_its_line_however_often_it_was_seen():
     assert reliability.misfits(OWNER) == [0.0]
 
 
+def lacking(turn_rad, length_m=0.6):
+    """Return one segment that may be turned by so much, since it may be of two faces."""
+    return replace(observation(0.0, 0.01, length_m=length_m), faces_cov=np.diag([turn_rad**2, 1e-6])[None])
+
+
+def test_a_wall_may_be_of_two_faces_as_the_second_surest_scan_has_it():
+    """One scan may be sure by chance; what its scans lack stays with a short wall, less with a long one."""
+    extents = np.array([[0.0, 0.6]])
+
+    def turn_rad(reliability, extents=extents):
+        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.zeros(1))[0, 0, 0]))
+
+    reliability = Reliability()
+    reliability.see(lacking(0.01), OWNER)
+    alone = turn_rad(reliability)
+    assert alone == pytest.approx(0.01 * np.sqrt(0.2 / 0.8))
+    for _ in range(3):
+        reliability.see(lacking(0.2), OWNER)
+    assert turn_rad(reliability) == pytest.approx(20.0 * alone)
+    reliability.see(lacking(0.02), OWNER)
+    assert turn_rad(reliability) == pytest.approx(2.0 * alone)
+    assert turn_rad(reliability, np.array([[0.0, 0.1]])) == pytest.approx(0.02 * np.sqrt(0.2 / 0.3))
+
+
 def test_a_wall_counts_as_long_as_two_scans_saw_it():
     """Two beams on a wall's end and six on a face behind it make a line of 0.6 m, once; all others show the end."""
     reliability, extents = Reliability(), np.array([[0.0, 0.6]])
 
     def turn_rad():
-        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.zeros(1))[0, 0, 0]))
+        return float(np.sqrt(reliability.off_line_cov(OWNER, extents, np.full(1, 1e-4))[0, 0, 0]))
 
     reliability.see(observation(0.0, 0.01, length_m=0.6), OWNER)
     alone = turn_rad()
     for _ in range(9):
         reliability.see(observation(0.0, 0.2, length_m=0.08), OWNER)
-    assert alone < np.deg2rad(1.0)
-    assert turn_rad() > np.deg2rad(20.0)
+    assert turn_rad() == pytest.approx(alone * 0.6 / 0.08)
     reliability.see(observation(0.0, 0.01, length_m=0.7), OWNER)
     assert turn_rad() == pytest.approx(alone), "seen once more, it is as long as it seemed"
+
+
+def test_of_two_walls_that_are_one_the_surest_scans_count():
+    reliability = Reliability()
+    for turn, owner in ((0.1, 0), (0.3, 0), (0.2, 1), (0.05, 1)):
+        reliability.see(lacking(turn), np.array([owner]))
+    reliability._records.merge(0, 1, 0.0)
+    np.testing.assert_allclose(reliability._records.columns["faces"][0, :, 0], [0.05**2, 0.1**2])
 
 
 def test_the_longest_pieces_of_two_walls_that_are_one_are_the_longest_of_both():

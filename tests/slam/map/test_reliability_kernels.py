@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.map.kernels.record_kernels import rows_of
-from slam.map.kernels.reliability_kernels import add_fits, add_lengths, as_told, misfits, off_line_cov
+from slam.map.kernels.reliability_kernels import add_faces, add_fits, add_lengths, as_told, misfits, off_line_cov
 
 few = settings(max_examples=50, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
@@ -56,16 +56,32 @@ def test_a_wall_is_off_its_line_by_its_residuals_and_where_it_is_short(seed):
     rng = np.random.default_rng(seed)
     extents = np.sort(rng.uniform(-2.0, 2.0, (5, 2)), axis=1)
     longest = np.sort(rng.uniform(0.01, 2.0, (5, 2)) * (rng.random((5, 2)) < [0.7, 1.0]), axis=1)
-    off = off_line_cov(extents, longest, across, 0.01, 0.2)
+    faces = np.sort(rng.uniform(0.0, 0.1, (5, 2, 2)), axis=1)
+    faces[0], faces[1, 1] = np.inf, np.inf
+    off = off_line_cov(extents, longest, across, faces, 0.2)
     for row in range(5):
         excess, by_noise, beams = one.residue[row]
         expected = 4.0 * excess / beams * (excess / np.sqrt(by_noise) > 1.4)
         np.testing.assert_allclose(across[row], expected, atol=1e-12)
         length = min(np.ptp(extents[row]), min(seen for seen in longest[row] if seen > 0.0))
-        variance = expected + (0.01 / (1.0 + (length / 0.2) ** 4)) ** 2
-        turn = 12.0 * variance / max(length, 1e-3) ** 2
+        stays, second = 0.2 / (0.2 + length), faces[row, 1] if row > 1 else faces[row, 0] if row else np.zeros(2)
+        turn, place = [12.0 * expected / max(length, 1e-3) ** 2, expected] + stays * second
         lever = np.array([1.0, extents[row].mean()])
-        np.testing.assert_allclose(off[row], turn * np.outer(lever, lever) + np.diag([0.0, variance]), rtol=1e-9)
+        np.testing.assert_allclose(off[row], turn * np.outer(lever, lever) + np.diag([0.0, place]), rtol=1e-9)
+
+
+@few
+@given(seed=seeds)
+def test_of_each_wall_the_two_least_variances_that_segments_lack_are_kept(seed):
+    one, middles = scene(seed), np.random.default_rng(seed).normal(size=9)
+    faces = np.full((5, 2, 2), np.inf)
+    add_faces(one.rows, one.cov, middles[: len(one.rows)], faces)
+    for row in range(5):
+        lever = [np.array([-middles[k], 1.0]) for k in np.flatnonzero(one.rows == row)]
+        seen = one.cov[one.rows == row]
+        turns = [np.inf, np.inf, *seen[:, 0, 0]]
+        places = [np.inf, np.inf, *(at @ C @ at for at, C in zip(lever, seen, strict=True))]
+        np.testing.assert_allclose(faces[row], np.sort([turns, places], axis=1)[:, :2].T)
 
 
 @few
