@@ -13,7 +13,6 @@ from typing import Literal, TypeVar
 
 import numpy as np
 import shapely
-import tyro
 from jaxtyping import Bool, Float, Int
 from rich.console import Console
 from rich.table import Table
@@ -21,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from experiments.scoring.beam_votes import vote
 from experiments.terminal.console import plain_console
+from experiments.usage import UsageError
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.worlds import WORLDS, World, WorldError, load
 from slam.evaluation.consistency import nees
@@ -31,6 +31,8 @@ from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import to_robot, wrap
 from slam.map.reliability import ReliabilityConfig
 from slam.robot import Scan
+
+from ..runner.command import run_study
 
 PLANS = Path(__file__).parents[2] / ".." / "shared" / "data" / "plans"
 FLAT_RAD, FLAT_M = 1e-3, 2e-3
@@ -60,6 +62,11 @@ class ExtractionStudy:
     """Its radial noise; stated as it is."""
     errorless: bool = False
     """Exact ranges, the noise still stated: recall and mixed lines only."""
+
+    def run(self) -> int:
+        """Take the scans, print the tables and return 0; raises UsageError for a folder without plans."""
+        report(*sample(self), plain_console(width=120))
+        return 0
 
 
 Rows = TypeVar("Rows")
@@ -152,8 +159,10 @@ def poses(world: World, count: int, rng: np.random.Generator) -> Iterator[Float[
 
 
 def worlds(config: ExtractionStudy) -> Iterator[World]:
-    """Yield the bundled worlds and this half of the plans, in random order."""
+    """Yield the bundled worlds and this half of the plans, in random order; raises UsageError without a plan."""
     plans = sorted(config.plans.glob("*.json"))[{"tune": 0, "report": 1}[config.half] :: 2]
+    if not plans:
+        raise UsageError(f"expected a folder of plans, found no file *.json in {config.plans}: check it")
     names = [*WORLDS, *map(str, plans)]
     for name in np.random.default_rng(config.seed).permutation(names):
         try:
@@ -245,10 +254,5 @@ def report(lines: Lines, walls: Walls, console: Console) -> None:
         )
 
 
-def main(config: ExtractionStudy) -> None:
-    """Take the scans and print the tables."""
-    report(*sample(config), plain_console(width=120))
-
-
 if __name__ == "__main__":
-    main(tyro.cli(ExtractionStudy, description=__doc__))
+    run_study(ExtractionStudy)

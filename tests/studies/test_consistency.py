@@ -1,6 +1,7 @@
 """What the studies of back ends rest on: observations told wall by wall, noise as stated, rings of corridors."""
 
 import json
+from pathlib import Path
 
 import jaxtyping
 import numpy as np
@@ -24,6 +25,7 @@ from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations
 from slam.geometry.poses import to_world
 from studies.consistency.bias import BiasStudy
+from studies.consistency.extraction import PLANS, ExtractionStudy, worlds
 from studies.consistency.faults import Fault, faulty
 from studies.consistency.loops import LoopStudy
 from studies.runner.scores import bootstrap
@@ -220,3 +222,9 @@ def test_standing_still_only_a_consistent_filter_learns_nothing():
         assert bound.min() >= least
         assert (trace[-1] > 1 - 1e-9) == (name == "invariant-ekf")
     assert slope(stand("block-ekf", "large", 100, 1)[0]) == pytest.approx(-1.1, abs=0.25)
+
+
+def test_the_study_of_extraction_asks_for_plans_beside_the_checkout_and_refuses_a_folder_without(tmp_path):
+    assert PLANS.resolve() == Path(__file__).resolve().parents[3] / "shared" / "data" / "plans"
+    with pytest.raises(UsageError, match=r"found no file \*\.json in"):
+        next(worlds(ExtractionStudy(plans=tmp_path)))
