@@ -6,7 +6,6 @@ from .association.matching import MatchingConfig
 from .association.recovery import RecoveryConfig
 from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
-from .map.candidates import CandidatesConfig
 from .map.change_points import ChangePointsConfig
 from .map.extents import WallsConfig
 from .map.merging import MergingConfig
@@ -25,7 +24,6 @@ class MapperConfig:
     vertices: bool = True
     """Whether segments are cut at bends that the map knows, and walls for them."""
     walls: WallsConfig = field(default_factory=WallsConfig)
-    candidates: CandidatesConfig = field(default_factory=CandidatesConfig)
     change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
     """None where no wall is cut for bends that only all scans together show; they are never looked for either where
     `vertices` is False."""

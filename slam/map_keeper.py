@@ -10,9 +10,9 @@ from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
-from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
+from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
 from .map.stochastic_map import StochasticMap
@@ -27,9 +27,10 @@ class MapKeeper:
         self.backend = backend
         self.config = config
         change_points = config.change_points or ChangePointsConfig()
-        self.landmarks = Landmarks(config.walls, change_points)
+        sure_beams = config.extraction.sure_beams
+        self.landmarks = Landmarks(config.walls, change_points, sure_beams)
         same = config.matching.gate, config.matching.angle_rad
-        self._candidates = LandmarkCandidates(*same, config.extraction.sure_beams, config.candidates)
+        self._candidates = LandmarkCandidates(*same, sure_beams, config.walls.existence)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""
@@ -51,7 +52,8 @@ class MapKeeper:
         `sides` are the two segments beside a bend that was found now: many scans stand behind them. Returns the map,
         the wall of each segment (-1 for none), and the ids (kept, dropped) of landmarks that were one wall.
         """
-        owners = self._observed(scan, segments, *self._initialised(segments, matches, sides))
+        begun = self._initialised(scan, segments, matches, sides)
+        owners = self._observed(scan, segments, *begun, matches.ambiguous)
         walls, merged = self._merged(owners, self._ended(scan))
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
@@ -64,16 +66,20 @@ class MapKeeper:
         return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.shared)
 
     def _initialised(
-        self, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
-    ) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " b"]]:
-        """Grow the map by the segments that belong to no wall; return the wall of each segment, and those believed."""
+        self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]
+    ) -> tuple[Int[np.ndarray, " s"], dict[int, float]]:
+        """Grow the map by the segments that belong to no wall.
+
+        Returns the wall of each segment, and the log odds of those that begin more likely than others.
+        """
         owners = np.full(len(segments), -1, dtype=np.int64)
         owners[matches.pairs[:, 0]] = matches.pairs[:, 1]
         owners[segments.is_tentative] = -1
         doubtful = set(matches.doubtful.tolist())
         fresh = np.array([row for row in matches.unmatched.tolist() if row not in doubtful], dtype=np.int64)
         few, fresh = fresh[segments.is_tentative[fresh]], fresh[~segments.is_tentative[fresh]]
-        believed = few[self._candidates.see(self.backend.belief.pose_world, segments.take(few))]
+        rows, odds = self._candidates.see(self.backend.belief.pose_world, scan, segments.take(few))
+        believed = few[rows]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
             centres = seen_centres(segments, fresh)
@@ -84,13 +90,19 @@ class MapKeeper:
         known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:
             self.landmarks.change_points.keep_apart(*known)
-        return owners, np.array(sorted({*owners[believed].tolist(), *known}), dtype=np.int64)
+        surest = dict.fromkeys(known, self.config.walls.existence.most)
+        return owners, dict(zip(owners[believed].tolist(), odds.tolist(), strict=True)) | surest
 
     def _observed(
-        self, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"], believed: Int[np.ndarray, " b"]
+        self,
+        scan: Scan,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        begun: dict[int, float],
+        ambiguous: Int[np.ndarray, " a"],
     ) -> Int[np.ndarray, " s"]:
         """Note what was seen of each wall, and forget those that are none; return the wall of each segment."""
-        observed = self.landmarks.observe(self.backend.belief, scan, segments, owners, believed)
+        observed = self.landmarks.observe(self.backend.belief, scan, segments, owners, begun, ambiguous)
         if len(observed.forgotten):
             self.backend.remove(observed.forgotten.tolist())
         return observed.owners

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 13,
+    CONFIG: 14,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -33,7 +33,8 @@ format 5 the body and the step stood at several places (`MOVED`), until format 6
 (`mission.mapper.walls.reliability.straightness`), until format 8 nothing was round (`mission.explorer.round_things`).
 Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
 Until format 11 no scan told a drive's motion (`odometry`). Until format 12 a place in the whole map was sought by
-pairs of walls (`DROPPED`).
+pairs of walls (`DROPPED`), until format 13 walls and lines of few beams were believed and forgotten by rules of their
+own (`DROPPED`).
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -65,7 +66,7 @@ RENAMED: dict[str, str | None] = {
     "mission.mapper.chains": None,
     "mission.mapper.duplicates": "mission.mapper.merging",
     "mission.mapper.duplicates.gate": None,
-    "mission.mapper.faint": "mission.mapper.candidates",
+    "mission.mapper.faint": "mission.mapper.walls.existence",
     "mission.mapper.gaps": None,
     "mission.mapper.kinks": "mission.mapper.change_points",
     "mission.mapper.torn": None,
@@ -85,13 +86,16 @@ counts. None stands where a setting said nothing of its own."""
 
 
 DROPPED = {
+    "mission.mapper.candidates.apart_m",
+    "mission.mapper.candidates.gate",
+    "mission.mapper.candidates.longest_m",
+    "mission.mapper.candidates.looks",
+    "mission.mapper.candidates.patience_m",
+    "mission.mapper.candidates.patience_steps",
+    "mission.mapper.candidates.spare_beams",
     "mission.mapper.change_points.most_rad",
     "mission.mapper.ambiguity.turn_rad",
     "mission.mapper.ambiguity.across_m",
-    "mission.mapper.candidates.apart_m",
-    "mission.mapper.candidates.gate",
-    "mission.mapper.candidates.looks",
-    "mission.mapper.candidates.spare_beams",
     "mission.mapper.change_points.agrees_sigmas",
     "mission.mapper.change_points.ends",
     "mission.mapper.change_points.gate_sigmas",
@@ -145,9 +149,19 @@ DROPPED = {
     "mission.mapper.vertices.young_observations",
     "mission.mapper.walls.contradictions",
     "mission.mapper.walls.end_margin_m",
+    "mission.mapper.walls.claims",
     "mission.mapper.walls.established_observations",
+    "mission.mapper.walls.existence.apart_m",
+    "mission.mapper.walls.existence.gate",
+    "mission.mapper.walls.existence.longest_m",
+    "mission.mapper.walls.existence.looks",
+    "mission.mapper.walls.existence.patience_m",
+    "mission.mapper.walls.existence.patience_steps",
+    "mission.mapper.walls.existence.spare_beams",
     "mission.mapper.walls.least_m",
     "mission.mapper.walls.pass_margin_m",
+    "mission.mapper.walls.patience_m",
+    "mission.mapper.walls.patience_steps",
     "mission.mapper.walls.reliability.bend_rad",
     "mission.mapper.walls.reliability.chance",
     "mission.mapper.walls.reliability.crooked_m",
@@ -157,7 +171,7 @@ DROPPED = {
     "mission.mapper.walls.trusted_observations",
 }
 """Settings of older formats whose rules are no more, or that said what another says: the first until format 2, the
-others until format 9, 10 or 11."""
+others until format 9, 10, 11 or 13."""
 VERTICES = "mission.mapper.vertices"
 EXPLORER = "mission.explorer."
 FOLLOWING = f"{EXPLORER}following."
@@ -179,6 +193,10 @@ def _within(value: float, robot: RobotSpec) -> float:
 
 def _way(steps: float, robot: RobotSpec) -> float:
     return round(steps * robot.step_m, NANO)
+
+
+def _as_it_was(value: float, robot: RobotSpec) -> float:
+    return value
 
 
 MOVED: dict[str, tuple[str, Moved]] = {
@@ -206,10 +224,10 @@ MOVED: dict[str, tuple[str, Moved]] = {
     "mission.homing.home_m": (RADIUS, None),
     "mission.homing.aim_m": (RADIUS, None),
     "mission.retreat.touched_back_m": (RADIUS, None),
-    "mission.mapper.walls.patience_steps": ("mission.mapper.walls.patience_m", _way),
-    "mission.mapper.candidates.patience_steps": ("mission.mapper.candidates.patience_m", _way),
+    "mission.mapper.candidates.slack_m": ("mission.mapper.walls.existence.slack_m", _as_it_was),
 }
-"""Settings until format 5 that stood for the robot's body or step: today's key, and its value by the old one. None
+"""Settings until format 5 that stood for the robot's body or step, and until format 13 one of another group: today's
+key, and its value by the old one. None
 stands where what the robot states takes their place."""
 
 

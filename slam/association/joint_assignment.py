@@ -15,7 +15,7 @@ from .kernels.candidate_kernels import Candidates, Known, Limits, Seen, candidat
 from .kernels.joint_kernels import taken_together
 from .kernels.matching_kernels import near_a_wall, refused, still_overlapping
 from .kernels.rest_kernels import apart
-from .matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig, limits_of, why
+from .matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig, along, limits_of, why
 
 NEW = -1
 """In the place of a candidate: the segment is of no known wall."""
@@ -57,6 +57,7 @@ def assign(
         np.flatnonzero(~is_matched),
         np.flatnonzero(~is_matched & (waits | near_a_wall(found, seen, limits))),
         {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
+        along(found, ~is_matched & ~segments.is_tentative, ids, limits, config.shared.straight_rad),
     )
 
 

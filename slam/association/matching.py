@@ -4,8 +4,8 @@ A chi-square gate on the joint covariance of the pose and the lines, an overlap 
 beside a door stay two), and the side from which each was seen (so that two faces of a thin wall stay two).
 """
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
@@ -67,6 +67,8 @@ class Matches:
     """Those of the unmatched that lie too near a wall to be a new one."""
     refusals: dict[int, str]
     """For each unmatched segment with a wall near it, why that wall was refused."""
+    ambiguous: Int[np.ndarray, " a"] = field(default_factory=partial(np.zeros, 0, dtype=np.int64))
+    """Ids of walls along which an unmatched sure segment lies: it may show them."""
 
     def observations(self, segments: Segments) -> Observations:
         """Return the matched segments as observations of their walls."""
@@ -125,6 +127,7 @@ def match(
         np.flatnonzero(~is_matched),
         np.flatnonzero(~is_matched & doubtful),
         {int(found.segment[pair]): why(found, pair, ids, limits) for pair in refused(found, is_matched).tolist()},
+        along(found, ~is_matched & ~segments.is_tentative, ids, limits, config.shared.straight_rad),
     )
 
 
@@ -145,6 +148,18 @@ def limits_of(config: MatchingConfig) -> Limits:
         float(shared.short_m),
         float(shared.far_m),
     )
+
+
+def along(
+    found: Candidates,
+    among: Bool[np.ndarray, " s"],
+    ids: Int[np.ndarray, " n"],
+    limits: Limits,
+    straight_rad: float,
+) -> Int[np.ndarray, " f"]:
+    """Return the ids of walls along which some of these segments lie: they pass the gate, overlap, and hardly turn."""
+    lies = (found.d2 <= limits.level) & (found.gap <= -limits.overlap_m) & (np.abs(found.e[:, 0]) < straight_rad)
+    return np.unique(ids[found.line[lies & among[found.segment]]])
 
 
 def why(found: Candidates, pair: int, ids: Int[np.ndarray, " n"], limits: Limits) -> str:

@@ -58,6 +58,7 @@ class View:
             rest[again.unmatched],
             rest[again.doubtful],
             {int(rest[k]): why for k, why in again.refusals.items()},
+            again.ambiguous,
         )
 
 

@@ -1,5 +1,6 @@
 """How far along its line each wall has been seen, how often, and whether it deserves trust."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from sys import maxsize
 
@@ -9,49 +10,44 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
-from ..extraction.visible_extent import owners_of_beams
-from ..robot import RobotSpec, Scan, of_robot
+from ..robot import Scan
+from .existence import JUST_BEGUN, ExistenceConfig, looked_at
 from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
-from .stochastic_map import ESTABLISHED, StochasticMap
+from .stochastic_map import StochasticMap
 
 NOBODY = np.zeros(0, dtype=np.int64)
 """Ids of no walls."""
+NO_ODDS: Mapping[int, float] = {}
+"""No walls begin more likely than others."""
 
 
 @dataclass(frozen=True)
 class WallsConfig:
     """When a wall is trusted, and when it is forgotten.
 
-    A wall is tentative until two scans saw it with enough beams, and cut back once two in turn have shown beams passing
-    through it: beams that go on beyond it by a wall's thickness, and as far from its ends. A wall cut back to less than
-    ends are known to is forgotten.
+    It is cut back once two scans in turn have shown beams passing through it: beams that go on beyond it by a wall's
+    thickness, and as far from its ends. A wall cut back to less than ends are known to is forgotten.
     """
 
-    robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
-    patience_m: float = 2.25
-    """A tentative wall is forgotten once it was not observed for the steps that so long a way takes."""
+    existence: ExistenceConfig = field(default_factory=ExistenceConfig)
+    """It is tentative until it is likely enough to exist, and forgotten once it is likelier not to."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
     """How far walls may be off the lines that stand for them."""
-    claims: int = 6
-    """A wall is forgotten when so many scans in turn gave all its beams to other walls, unless it is established."""
     housekeeping: bool = True
     """Whether walls are cut back and forgotten; where it is known whose each segment is, nothing needs mending."""
-
-    @property
-    def patience_steps(self) -> int:
-        """A tentative wall is forgotten after this many scans without an observation."""
-        return self.robot.steps_of(self.patience_m)
 
 
 class Extents:
     """How far each wall has been seen, and for how long; walls stand in the order of the belief's ids."""
 
-    def __init__(self, config: WallsConfig = WallsConfig(), records: Records | None = None) -> None:
+    def __init__(self, config: WallsConfig, records: Records, sure_beams: int) -> None:
+        """Keep the extents in these records; `sure_beams` are those of a sure segment."""
         self._config = config
-        self._records = Records() if records is None else records
+        self._odds = config.existence.odds(sure_beams)
+        self._records = records
         self._scans = 0
         self._records.declare(
             self._merge,
@@ -61,8 +57,9 @@ class Extents:
             last_seen=0,
             overlaid=np.zeros(2, dtype=np.int64),
             against=0,
-            claimed=0,
             whole=0,
+            log_odds=config.existence.believed,
+            place=JUST_BEGUN,
         )
 
     def map(
@@ -73,7 +70,7 @@ class Extents:
     ) -> StochasticMap:
         """Return the belief together with the extents, and how far walls may be from their lines."""
         extents, observations = (self._records.columns[name] for name in ("extents", "observations"))
-        tentative = observations < self._config.shared.scans
+        tentative = self._records.columns["log_odds"] <= self._config.existence.believed
         whole = self._records.columns["whole"] >= self._config.shared.scans
         return StochasticMap(belief, extents.copy(), observations.copy(), tentative, crooked, whole, off_line_cov)
 
@@ -83,15 +80,17 @@ class Extents:
         scan: Scan,
         segments: Segments,
         owners: Int[np.ndarray, " s"],
-        believed: Int[np.ndarray, " b"],
+        begun: Mapping[int, float] = NO_ODDS,
+        ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Int[np.ndarray, " f"]:
         """Stretch the walls over the segments that they own, and return ids of walls not worth keeping.
 
-        `believed` are walls that were seen often before they became walls.
+        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
+        `ambiguous` ones, too.
         """
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
-        rows, seen_often = self._records.rows(owners[used]), self._records.rows(believed)
+        rows, likely = self._records.rows(owners[used]), self._records.rows(np.array(list(begun), dtype=np.int64))
         columns, shared = self._records.columns, self._config.shared
         scans = shared.scans if self._config.housekeeping else maxsize
         extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
@@ -100,26 +99,24 @@ class Extents:
         take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m), scans)
         observations, last_seen = columns["observations"], columns["last_seen"]
         observations[rows] += 1  # of a wall with two segments, too, by one: the sum is taken before it is stored
-        observations[seen_often] = np.maximum(observations[seen_often], shared.scans)
         last_seen[rows] = self._scans
+        seen = last_seen == self._scans
+        of_walls = belief.anchors, belief.means, extents
+        unsure = np.isin(self._records.ids, ambiguous) | (not self._config.housekeeping)
+        looked_at(belief.pose_world, scan, of_walls, seen, unsure, (columns["log_odds"], columns["place"]), self._odds)
+        columns["log_odds"][likely] = np.maximum(columns["log_odds"][likely], list(begun.values()))
         if not self._config.housekeeping:
             return NOBODY
-        self._weigh(belief, scan, segments, owners)
-        stale = self._scans - last_seen > self._config.patience_steps
-        shaky = stale & (observations < shared.scans)
-        shaky |= (columns["claimed"] >= self._config.claims) & (observations < ESTABLISHED)
-        return self._records.ids[shaky | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
+        self._weigh(belief, scan)
+        return self._records.ids[(columns["log_odds"] < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
 
-    def _weigh(self, belief: Belief, scan: Scan, segments: Segments, owners: Int[np.ndarray, " s"]) -> None:
-        """Hold the walls against the beams: those that pass through them, and those that other walls account for."""
+    def _weigh(self, belief: Belief, scan: Scan) -> None:
+        """Cut walls back where beams pass through them."""
         columns, shared = self._records.columns, self._config.shared
         beams = scan.bearings_rad, scan.ranges_m, scan.passed_m
-        owners = owners_of_beams(segments, owners, len(scan.bearings_rad))
-        lines = belief.pose_world, belief.anchors, belief.means, self._records.ids
-        kept = columns["extents"], columns["spacing"], columns["claimed"], columns["against"]
+        kept = columns["extents"], columns["spacing"], columns["against"]
         limits = float(shared.thickness_m), float(shared.far_m), shared.scans
-        seen = columns["last_seen"] == self._scans
-        weigh(float(scan.range_max_m), *beams, owners, *lines, seen, *kept, *limits)
+        weigh(float(scan.range_max_m), *beams, belief.pose_world, belief.anchors, belief.means, *kept, *limits)
 
     def _merge(self, merger: Merger) -> None:
         """Give the kept wall the extent of both."""
@@ -132,6 +129,7 @@ class Extents:
                 spacing[row, side] = spacing[other, side]
         columns["observations"][row] += columns["observations"][other]
         columns["whole"][row] = 0
+        columns["log_odds"][row] = max(columns["log_odds"][row], columns["log_odds"][other])
         columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])
 
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:

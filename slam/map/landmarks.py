@@ -1,5 +1,6 @@
 """All that is known of the walls of one map beside their lines: observed, merged and removed in one place."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
 from .change_points import ChangePoints, ChangePointsConfig
-from .extents import Extents, WallsConfig
+from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
 from .openings import Openings
 from .records import Records
 from .reliability import Reliability
@@ -30,9 +31,10 @@ class Observed:
 class Landmarks:
     """The records of the walls in a back end's map, a row each, in the order of the belief's ids."""
 
-    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig) -> None:
+    def __init__(self, walls: WallsConfig, change_points: ChangePointsConfig, sure_beams: int) -> None:
+        """`sure_beams` are those of a sure segment."""
         self.records = Records()
-        self.extents = Extents(walls, self.records)
+        self.extents = Extents(walls, self.records, sure_beams)
         self.reliability = Reliability(walls.reliability, self.records)
         self.change_points = ChangePoints(change_points, self.records)
         self.openings = Openings(walls.shared, self.records)
@@ -50,15 +52,17 @@ class Landmarks:
         scan: Scan,
         segments: Segments,
         owners: Int[np.ndarray, " s"],
-        believed: Int[np.ndarray, " b"],
+        begun: Mapping[int, float] = NO_ODDS,
+        ambiguous: Int[np.ndarray, " a"] = NOBODY,
     ) -> Observed:
         """Take in one scan, of which `owners` holds the wall of each segment, those of new walls among them.
 
-        `believed` are ids of walls that were seen often before they became walls.
+        `begun` holds ids of walls that begin more likely than others, and their log odds; the scan may show
+        `ambiguous` ones, too.
         """
         self.records.rows(belief.ids)
         self.reliability.see(segments, owners)
-        forgotten = self.extents.see(belief, scan, segments, owners, believed)
+        forgotten = self.extents.see(belief, scan, segments, owners, begun, ambiguous)
         if not len(forgotten):
             return Observed(owners, forgotten)
         self.records.remove(forgotten)

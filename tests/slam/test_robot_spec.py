@@ -35,8 +35,6 @@ OF_THE_PAPER = {
     "homing.home_m": 0.2,
     "homing.aim_m": 0.1,
     "retreat.touched_back_m": 0.1,
-    "mapper.walls.patience_steps": 15,
-    "mapper.candidates.patience_steps": 1000,
 }
 """Exactly what these were when each was a number of its own."""
 

@@ -13,10 +13,6 @@ from .ray_kernels import ray_evidence
 from .wall_kernels import distances, ends_world
 
 CORNER, OCCLUDED = int(EndKind.CORNER), int(EndKind.OCCLUDED)
-CLAIMED_BEAMS = 4
-"""Fewer beams on a wall say nothing about whose they are."""
-CLAIMED_SHARE = 0.8
-"""A wall is claimed by others in a scan that gives them this share of its beams: a beam or two may lie near both."""
 
 
 @compiled
@@ -136,30 +132,6 @@ def note_whole(
 
 
 @compiled
-def note_claims(
-    near: Int[np.ndarray, " n"],
-    along: Float[np.ndarray, "n k"],
-    hits: Bool[np.ndarray, "n k"],
-    owners_of_beams: Int[np.ndarray, " k"],
-    ids: Int[np.ndarray, " w"],
-    extents: Float[np.ndarray, "w 2"],
-    seen: Bool[np.ndarray, " w"],
-    claimed: Int[np.ndarray, " w"],
-) -> None:
-    """Count for how many scans in turn every beam on a wall has been some other wall's."""
-    for k in range(len(near)):
-        row, count, others = near[k], 0, 0
-        for beam in range(along.shape[1]):
-            if hits[k, beam] and extents[row, 0] < along[k, beam] < extents[row, 1]:
-                count += 1
-                others += owners_of_beams[beam] >= 0 and owners_of_beams[beam] != ids[row]
-        if seen[row]:
-            claimed[row] = 0
-        elif count >= CLAIMED_BEAMS and others >= CLAIMED_SHARE * count:
-            claimed[row] += 1
-
-
-@compiled
 def cut_back(
     near: Int[np.ndarray, " n"],
     along: Float[np.ndarray, "n k"],
@@ -252,24 +224,19 @@ def weigh(
     bearings_rad: Float[np.ndarray, " k"],
     ranges_m: Float[np.ndarray, " k"],
     passed_m: Float[np.ndarray, " k"],
-    owners_of_beams: Int[np.ndarray, " k"],
     pose_world: Float[np.ndarray, "3"],
     anchors: Float[np.ndarray, "w 2"],
     means: Float[np.ndarray, "w 2"],
-    ids: Int[np.ndarray, " w"],
-    seen: Bool[np.ndarray, " w"],
     extents: Float[np.ndarray, "w 2"],
     spacing: Float[np.ndarray, "w 2"],
-    claimed: Int[np.ndarray, " w"],
     against: Int[np.ndarray, " w"],
     margin_m: float,
     trim_m: float,
     twice: int,
 ) -> None:
-    """Hold the walls in range against the beams: those that pass through them, and those that other walls have."""
+    """Hold the walls in range against the beams that pass through them."""
     near = np.flatnonzero(distances(pose_world[:2], ends_world(anchors, means, extents)) < range_m)
     along, hits, passes = ray_evidence(
         bearings_rad, ranges_m, passed_m, pose_world, anchors[near], means[near], margin_m
     )
-    note_claims(near, along, hits, owners_of_beams, ids, extents, seen, claimed)
     cut_back(near, along, hits, passes, extents, spacing, against, margin_m, trim_m, twice)

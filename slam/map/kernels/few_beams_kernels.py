@@ -1,10 +1,10 @@
-"""Which faces of a few beams are seen again, and which are believed: the loops of `candidates`."""
+"""Which faces of a few beams are seen again: the loops of `candidates`."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import squared_distance, wrapped
@@ -14,17 +14,13 @@ Lines = Float[np.ndarray, "n 6"]
 distance at the middle, which is independent of it, and half the length of the piece."""
 
 
-class Rules(NamedTuple):
-    """The numbers of `CandidatesConfig` that the loops read, the gate as a level of chi-square."""
+class Same(NamedTuple):
+    """When two seen lines may be one, the gate as a level of chi-square."""
 
     level: float
     least_cosine: float
-    looks: int
-    apart_m: float
-    spare_beams: int
-    longest_m: float
-    patience_steps: int
     slack_m: float
+    """What the pose may have drifted between the two, sigma."""
 
 
 @compiled
@@ -49,13 +45,13 @@ def lines_of(
 
 
 @compiled
-def distances(seen: Float[np.ndarray, "s 6"], known: Lines, rules: Rules) -> Float[np.ndarray, "s n"]:
+def distances(seen: Float[np.ndarray, "s 6"], known: Lines, same: Same) -> Float[np.ndarray, "s n"]:
     """Return the squared Mahalanobis distance of each seen line from each known, infinite where they are none."""
     d2 = np.full((len(seen), len(known)), np.inf)
     for s in range(len(seen)):
         for n in range(len(known)):
             turn = wrapped(seen[s, 0] - known[n, 0])
-            if math.cos(turn) < rules.least_cosine:
+            if math.cos(turn) < same.least_cosine:
                 continue
             x, y = seen[s, 1] - known[n, 1], seen[s, 2] - known[n, 2]
             cosine, sine = math.cos(known[n, 0]), math.sin(known[n, 0])
@@ -63,9 +59,9 @@ def distances(seen: Float[np.ndarray, "s 6"], known: Lines, rules: Rules) -> Flo
             if abs(along) >= seen[s, 5] + known[n, 5]:
                 continue
             s00, s01 = seen[s, 3] + known[n, 3], along * known[n, 3]
-            s11 = seen[s, 4] + known[n, 4] + along * s01 + rules.slack_m**2
+            s11 = seen[s, 4] + known[n, 4] + along * s01 + same.slack_m**2
             squared = squared_distance(turn, cosine * x + sine * y, s00, s01, s11)
-            if squared <= rules.level:
+            if squared <= same.level:
                 d2[s, n] = squared
     return d2
 
@@ -84,50 +80,3 @@ def paired(d2: Float[np.ndarray, "s n"]) -> Int[np.ndarray, " s"]:
         left[row, :] = np.inf
         left[:, best] = np.inf
     return column
-
-
-@compiled
-def see(
-    pose_world: Float[np.ndarray, "3"],
-    lines: Float[np.ndarray, "s 2"],
-    cov: Float[np.ndarray, "s 2 2"],
-    ends: Float[np.ndarray, "s 2 2"],
-    beam_counts: Int[np.ndarray, " s"],
-    known: Lines,
-    places: Float[np.ndarray, "n 2"],
-    looks: Int[np.ndarray, " n"],
-    spare: Int[np.ndarray, " n"],
-    unseen: Int[np.ndarray, " n"],
-    rules: Rules,
-) -> tuple[Bool[np.ndarray, " s"], Int[np.ndarray, " a"], Bool[np.ndarray, " n"], Lines]:
-    """Take one scan into the lines that are known, in place.
-
-    Returns which segments are to be believed now, which begin a line, which known lines are kept, and the segments as
-    lines.
-    """
-    every = lines_of(pose_world, lines, cov, ends)
-    short = np.zeros(len(every), np.bool_)
-    for s in range(len(every)):
-        short[s] = 2.0 * every[s, 5] <= rules.longest_m
-    rows = np.flatnonzero(short)
-    line_of = paired(distances(every[rows], known, rules))
-    for n in range(len(known)):
-        unseen[n] += 1
-    for k in range(len(rows)):
-        n = line_of[k]
-        if n < 0:
-            continue
-        unseen[n] = 0
-        moved = math.hypot(pose_world[0] - places[n, 0], pose_world[1] - places[n, 1]) >= rules.apart_m
-        if moved:
-            looks[n] += 1
-            spare[n] += beam_counts[rows[k]] - 2
-            places[n, 0], places[n, 1] = pose_world[0], pose_world[1]
-    due, kept = np.zeros(len(known), np.bool_), np.zeros(len(known), np.bool_)
-    for n in range(len(known)):
-        due[n] = looks[n] >= rules.looks and spare[n] >= rules.spare_beams
-        kept[n] = not due[n] and unseen[n] <= rules.patience_steps
-    believed = np.zeros(len(every), np.bool_)
-    for k in range(len(rows)):
-        believed[rows[k]] = line_of[k] >= 0 and due[line_of[k]]
-    return believed, rows[line_of < 0], kept, every

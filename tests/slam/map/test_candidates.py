@@ -1,16 +1,20 @@
-"""Lines of few beams become walls when they stay where they are, seen from several places."""
+"""Lines of few beams become walls when looks from several places make them likely enough."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim.lidar import LidarConfig, RangeFinder
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import through
 from slam.geometry.poses import to_robot
-from slam.map.candidates import CandidatesConfig, LandmarkCandidates
+from slam.map.existence import ExistenceConfig, LandmarkCandidates
+from slam.robot import Scan
 
 SIGMA_M = 0.005
 GATE, ANGLE_RAD, SURE_BEAMS = 0.99, 1.05, 5
+CONFIG = ExistenceConfig()
 
 
 def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generator, beams: int = 3) -> Segments:
@@ -29,57 +33,53 @@ def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generato
     )
 
 
+def candidates(existence: ExistenceConfig = CONFIG) -> LandmarkCandidates:
+    return LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS, existence)
+
+
+def scan_of(faces: list[np.ndarray], pose: np.ndarray) -> Scan:
+    finder = RangeFinder(np.asarray(faces, dtype=float).reshape(-1, 2, 2), LidarConfig())
+    return Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+
+
+NONE = look(np.eye(2), np.zeros(3), np.random.default_rng(0)).take(np.zeros(0, int))
+"""No segments."""
+
+
 @settings(max_examples=30, deadline=None)
-@given(
-    st.integers(0, 10**6), st.sampled_from([([3, 3, 3], 2), ([4, 4], 1), ([4, 3], 1), ([3, 4], 1), ([3, 3, 4, 3], 2)])
-)
-def test_a_face_is_believed_once_several_places_showed_three_spare_beams(
-    seed: int, shown: tuple[list[int], int]
-) -> None:
-    """Two that any line goes through are none; from one place never."""
+@given(st.integers(0, 10**6), st.integers(3, 4))
+def test_a_face_is_believed_once_three_scans_showed_it_from_two_places(seed: int, beams: int) -> None:
+    """The prior and two looks pass the gate's odds; from one place all scans are one look."""
     rng = np.random.default_rng(seed)
-    beams, look_of_belief = shown
     turn = rng.uniform(-np.pi, np.pi)
     face = 0.06 * np.array([[-np.sin(turn), np.cos(turn)]]) * np.array([[-1.0], [1.0]])
     free_side = -np.array([np.cos(turn), np.sin(turn)])
-    poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(len(beams))]
-    moving, standing = (
-        LandmarkCandidates(0.99999, ANGLE_RAD, SURE_BEAMS),
-        LandmarkCandidates(0.99999, ANGLE_RAD, SURE_BEAMS),
+    poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(4)]
+    moving, standing = candidates(), candidates()
+    believed = [len(moving.see(pose, scan_of([face], pose), look(face, pose, rng, beams))[0]) for pose in poses[:3]]
+    assert believed == [0, 0, 1]
+    assert not any(
+        len(standing.see(poses[0], scan_of([face], poses[0]), look(face, poses[0], rng, 4))[0]) for _ in range(10)
     )
-    believed = [len(moving.see(pose, look(face, pose, rng, m))) for pose, m in zip(poses, beams, strict=True)]
-    assert believed == [k == look_of_belief for k in range(len(beams))]
-    assert not any(len(standing.see(poses[0], look(face, poses[0], rng, 4))) for _ in range(10))
 
 
 def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
     rng = np.random.default_rng(3)
-    faint = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS)
+    faint = candidates()
     for k in range(15):
         face = np.array([[1.0 + 0.08 * k, 0.05], [1.0 + 0.08 * k, -0.05]])[::-1]
         pose = np.array([0.0, 0.06 * k, 0.0])
-        assert not len(faint.see(pose, look(face, pose, rng)))
+        assert not len(faint.see(pose, scan_of([face], pose), look(face, pose, rng))[0])
 
 
-def test_a_line_unseen_for_long_is_forgotten() -> None:
-    rng = np.random.default_rng(4)
-    faint = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS, CandidatesConfig(patience_m=5 * 0.15))
-    face, nothing = (
-        np.array([[1.0, 0.05], [1.0, -0.05]])[::-1],
-        look(np.eye(2), np.zeros(3), rng).take(np.zeros(0, int)),
-    )
+@pytest.mark.parametrize("existence", [CONFIG, ExistenceConfig(shown=0.5, shown_over_faces=0.5)])
+def test_a_line_in_whose_place_a_look_shows_nothing_is_forgotten(existence: ExistenceConfig) -> None:
+    """It begins anew; where looks say nothing of what is, it goes on, and is never believed either."""
+    rng, faint = np.random.default_rng(4), candidates(existence)
+    face, wall = np.array([[0.5, -0.1], [0.5, 0.1]]), np.array([[3.0, -3.0], [3.0, 3.0]])
     poses = [np.array([0.0, 0.1 * k, 0.0]) for k in range(4)]
-    for pose in poses[:2]:
-        faint.see(pose, look(face, pose, rng))
-    for _ in range(7):
-        faint.see(poses[1], nothing)
-    assert not len(faint.see(poses[2], look(face, poses[2], rng)))
-
-
-def test_a_line_longer_than_a_door_end_is_never_believed() -> None:
-    """What shows three or four beams there is mostly a line from one wall's corner to the next wall."""
-    rng = np.random.default_rng(5)
-    for half_m, is_believed in ((0.08, True), (0.1, False)):
-        faint, face = LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS), np.array([[1.0, -half_m], [1.0, half_m]])
-        poses = [np.array([0.0, 0.1 * k, 0.0]) for k in range(4)]
-        assert any(len(faint.see(pose, look(face, pose, rng, 4))) for pose in poses) == is_believed
+    for k in range(2):
+        faint.see(poses[k], scan_of([face], poses[k]), look(face, poses[k], rng))
+    for k in range(2, 4):
+        faint.see(poses[k], scan_of([wall], poses[k]), NONE)
+    assert len(faint) == (0 if existence.shown > 0.5 else 1)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.geometry.poses import to_world
-from slam.map.kernels.extent_kernels import CORNER, OCCLUDED, kept_piece, note_claims, note_whole, seen_along, stretch
+from slam.map.kernels.extent_kernels import CORNER, OCCLUDED, kept_piece, note_whole, seen_along, stretch
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
@@ -63,23 +63,3 @@ def test_ends_move_out_to_what_is_seen_and_in_to_a_sharper_corner(seed):
         with np.errstate(invalid="ignore"):
             grown = np.any(np.abs(extents[row] - before[row]) > 0.1)
         assert whole[row] == (0 if grown else count[row]) + seen_whole
-
-
-@few
-@given(seed=seeds)
-def test_a_wall_is_claimed_where_most_beams_on_it_are_of_others(seed):
-    rng = np.random.default_rng(seed)
-    near, ids = np.array([0, 2]), np.array([4, 5, 9])
-    along, hits = rng.uniform(-2.0, 2.0, (2, 12)), rng.random((2, 12)) < 0.8
-    owners = rng.choice([-1, 4, 9, 7], 12)
-    extents, seen, claimed = np.tile([-1.5, 1.5], (3, 1)), rng.random(3) < 0.3, rng.integers(0, 4, 3)
-    expected = claimed.copy()
-    for k, row in enumerate(near):
-        on = [b for b in range(12) if hits[k, b] and abs(along[k, b]) < 1.5]
-        others = [b for b in on if owners[b] not in (-1, ids[row])]
-        if seen[row]:
-            expected[row] = 0
-        elif len(on) >= 4 and len(others) >= 0.8 * len(on):
-            expected[row] += 1
-    note_claims(near, along, hits, owners, ids, extents, seen, claimed)
-    assert claimed.tolist() == expected.tolist()

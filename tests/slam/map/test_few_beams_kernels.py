@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.geometry.poses import to_world
-from slam.map.kernels.few_beams_kernels import Rules, distances, lines_of, paired
+from slam.map.kernels.few_beams_kernels import Same, distances, lines_of, paired
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
-RULES = Rules(30.0, 0.5, 2, 0.1, 3, 0.2, 10, 0.01)
+SAME = Same(30.0, 0.5, 0.01)
 
 
 @few
@@ -45,16 +45,16 @@ def test_a_line_is_held_against_another_at_its_own_middle(seed):
         )
         for n in (3, 5)
     )
-    found = distances(seen, known, RULES)
+    found = distances(seen, known, SAME)
     for s, one in enumerate(seen):
         for k, other in enumerate(known):
             turn = np.angle(np.exp(1j * (one[0] - other[0])))
             n, t = np.array([np.cos(other[0]), np.sin(other[0])]), np.array([-np.sin(other[0]), np.cos(other[0])])
             lever, off = t @ (one[1:3] - other[1:3]), n @ (one[1:3] - other[1:3])
             D = np.array([[1.0, 0.0], [lever, 1.0]])
-            S = np.diag(one[3:5]) + D @ np.diag(other[3:5]) @ D.T + np.diag([0.0, RULES.slack_m**2])
+            S = np.diag(one[3:5]) + D @ np.diag(other[3:5]) @ D.T + np.diag([0.0, SAME.slack_m**2])
             squared = np.array([turn, off]) @ np.linalg.solve(S, [turn, off])
-            is_one = abs(lever) < one[5] + other[5] and squared <= RULES.level and np.cos(turn) >= RULES.least_cosine
+            is_one = abs(lever) < one[5] + other[5] and squared <= SAME.level and np.cos(turn) >= SAME.least_cosine
             np.testing.assert_allclose(found[s, k], squared if is_one else np.inf, rtol=1e-9)
 
 

@@ -13,7 +13,7 @@ from slam.map.landmarks import Landmarks
 from slam.map.records import Records
 from slam.map.reliability import Reliability
 
-SETTINGS = (WallsConfig(), ChangePointsConfig())
+SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)
 SUMS = ("observations", "residue")
 """Columns that add up over mergers, whatever walls were merged."""
 

@@ -1,0 +1,145 @@
+"""How likely it is that a wall exists: the odds that its first segment is of one face, and what each look says since.
+
+A line over two faces is seen again as well, but not from everywhere: from near by, where more beams reach it than a
+segment needs, the faces are seen in its place. So a look counts for a wall that shows it, and against one that does not
+where so many beams end on it or go on beyond it. From one place the same beams show the same again: that is one look.
+"""
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ..estimation.gates import gate_level
+from ..estimation.shared import SharedConfig, of_shared
+from ..extraction.segments import Segments
+from ..robot import RobotSpec, Scan, of_robot
+from .kernels.existence_kernels import Odds, crossing, look
+from .kernels.few_beams_kernels import Same, distances, lines_of, paired
+
+JUST_BEGUN = np.full(2, np.nan)
+"""The place of the last look at a wall that begins in this scan."""
+NOWHERE = np.full(2, np.inf)
+"""And of one that was not looked at since."""
+
+
+@dataclass(frozen=True)
+class ExistenceConfig:
+    """What the first segment and each look say: shares in apartments, by true faces (docs/association.md)."""
+
+    robot: RobotSpec = of_robot()
+    shared: SharedConfig = of_shared()
+    over_faces: float = 0.03
+    """Of segments with enough beams to be sure, so many lie over two faces ..."""
+    few_over_faces: float = 0.15
+    """... and of those with fewer."""
+    shown: float = 0.9
+    """A look shows a wall, where two beams more reach it than make a sure segment, one for each end that may lose its
+    last: so often where there is one ..."""
+    shown_over_faces: float = 0.2
+    """... and so often where the line lies over two faces."""
+    slack_m: float = 0.01
+    """What the pose may have drifted between two observations of a line of few beams, sigma."""
+
+    def odds(self, sure_beams: int) -> Odds:
+        """Return them as logarithms of odds, for segments that are sure with so many beams."""
+        return Odds(
+            log(self.shown / self.shown_over_faces),
+            log((1.0 - self.shown) / (1.0 - self.shown_over_faces)),
+            self.most,
+            sure_beams + 2,
+            0.5 * self.robot.step_m,
+            float(self.shared.beams_m),
+        )
+
+    @property
+    def believed(self) -> float:
+        """A wall is believed once more than one sure segment speaks for it: log odds above these."""
+        return log_odds(1.0 - self.over_faces)
+
+    @property
+    def most(self) -> float:
+        """No wall is surer: what is ruled out by chance lets none be. In log odds."""
+        return log_odds(1.0 - self.shared.chance)
+
+    def begins(self, is_tentative: Bool[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
+        """Return the log odds that segments are of one face, by whether they have few beams."""
+        return np.where(is_tentative, log_odds(1.0 - self.few_over_faces), self.believed)
+
+
+def log_odds(probability: float) -> float:
+    """Return the logarithm of p / (1 - p)."""
+    return log(probability / (1.0 - probability))
+
+
+def looked_at(
+    pose_world: Float[np.ndarray, "3"],
+    scan: Scan,
+    lines: tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]],
+    seen: Bool[np.ndarray, " n"],
+    unsure: Bool[np.ndarray, " n"],
+    columns: tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
+    odds: Odds,
+) -> None:
+    """Take one scan into the log odds and the places of the last looks, in place.
+
+    `lines` are anchors, means (alpha rad, d m) and extents, m, world frame; `seen` are those that the scan
+    shows; of the others it may show those that are `unsure`, and says nothing of them.
+    """
+    beams = crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, odds.margin_m)
+    beams[unsure] = 0
+    look(pose_world, beams, seen, *columns, odds)
+
+
+class LandmarkCandidates:
+    """The lines of few beams that may become walls: door ends, pilasters, and lines across corners.
+
+    Until then they are no part of the stochastic map, so that what comes and goes costs the back ends nothing.
+    """
+
+    def __init__(
+        self,
+        gate: float,
+        angle_rad: float,
+        sure_beams: int,
+        config: ExistenceConfig = ExistenceConfig(),
+    ) -> None:
+        """Lines of which two observations are farther apart than this gate, or turn by more, are never one."""
+        self._same = Same(gate_level(gate, 2), float(np.cos(angle_rad)), float(config.slack_m))
+        self._config, self._odds = config, config.odds(sure_beams)
+        self._lines, self._places, self._log_odds = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0)
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def see(
+        self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments
+    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Take in one scan, of which `segments` have few beams and lie on no wall; return those to be believed now.
+
+        And their log odds.
+
+        A line keeps its first observation, so that it does not wander off step by step.
+        """
+        lines, known = lines_of(pose_world, segments.lines, segments.cov, segments.ends), self._lines
+        line_of = paired(distances(lines, known, self._same))
+        seen = np.zeros(len(known), dtype=bool)
+        seen[line_of[line_of >= 0]] = True
+        of_known = (
+            known[:, 1:3].copy(),
+            np.column_stack([known[:, 0], np.zeros(len(known))]),
+            known[:, 5:] * [-1.0, 1.0],
+        )
+        looked_at(pose_world, scan, of_known, seen, np.zeros_like(seen), (self._log_odds, self._places), self._odds)
+        due = self._log_odds > self._config.believed
+        believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
+        surely = self._log_odds[line_of[believed]]
+        kept = ~due & (self._log_odds >= 0.0)
+        fresh = np.flatnonzero(line_of < 0)
+        if len(fresh) or not kept.all():
+            self._lines = np.concatenate([known[kept], lines[fresh]])
+            self._places = np.concatenate([self._places[kept], np.tile(NOWHERE, (len(fresh), 1))])
+            begun = self._config.begins(segments.is_tentative[fresh])
+            self._log_odds = np.concatenate([self._log_odds[kept], begun])
+        return believed, surely
