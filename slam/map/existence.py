@@ -9,14 +9,11 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from ..estimation.gates import gate_level
 from ..estimation.shared import SharedConfig, of_shared
-from ..extraction.segments import Segments
 from ..robot import RobotSpec, Scan, of_robot
 from .kernels.existence_kernels import Odds, crossing, look
-from .kernels.few_beams_kernels import Same, distances, lines_of, paired
 
 JUST_BEGUN = np.full(2, np.nan)
 """The place of the last look at a wall that begins in this scan."""
@@ -90,56 +87,3 @@ def looked_at(
     beams = crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, odds.margin_m)
     beams[unsure] = 0
     look(pose_world, beams, seen, *columns, odds)
-
-
-class LandmarkCandidates:
-    """The lines of few beams that may become walls: door ends, pilasters, and lines across corners.
-
-    Until then they are no part of the stochastic map, so that what comes and goes costs the back ends nothing.
-    """
-
-    def __init__(
-        self,
-        gate: float,
-        angle_rad: float,
-        sure_beams: int,
-        config: ExistenceConfig = ExistenceConfig(),
-    ) -> None:
-        """Lines of which two observations are farther apart than this gate, or turn by more, are never one."""
-        self._same = Same(gate_level(gate, 2), float(np.cos(angle_rad)), float(config.slack_m))
-        self._config, self._odds = config, config.odds(sure_beams)
-        self._lines, self._places, self._log_odds = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0)
-
-    def __len__(self) -> int:
-        return len(self._lines)
-
-    def see(
-        self, pose_world: Float[np.ndarray, "3"], scan: Scan, segments: Segments
-    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-        """Take in one scan, of which `segments` have few beams and lie on no wall; return those to be believed now.
-
-        And their log odds.
-
-        A line keeps its first observation, so that it does not wander off step by step.
-        """
-        lines, known = lines_of(pose_world, segments.lines, segments.cov, segments.ends), self._lines
-        line_of = paired(distances(lines, known, self._same))
-        seen = np.zeros(len(known), dtype=bool)
-        seen[line_of[line_of >= 0]] = True
-        of_known = (
-            known[:, 1:3].copy(),
-            np.column_stack([known[:, 0], np.zeros(len(known))]),
-            known[:, 5:] * [-1.0, 1.0],
-        )
-        looked_at(pose_world, scan, of_known, seen, np.zeros_like(seen), (self._log_odds, self._places), self._odds)
-        due = self._log_odds > self._config.believed
-        believed = np.flatnonzero((line_of >= 0) & due[line_of]) if len(known) else np.zeros(0, dtype=np.int64)
-        surely = self._log_odds[line_of[believed]]
-        kept = ~due & (self._log_odds >= 0.0)
-        fresh = np.flatnonzero(line_of < 0)
-        if len(fresh) or not kept.all():
-            self._lines = np.concatenate([known[kept], lines[fresh]])
-            self._places = np.concatenate([self._places[kept], np.tile(NOWHERE, (len(fresh), 1))])
-            begun = self._config.begins(segments.is_tentative[fresh])
-            self._log_odds = np.concatenate([self._log_odds[kept], begun])
-        return believed, surely

@@ -90,25 +90,31 @@ class Extents:
         """
         self._scans += 1
         used = np.flatnonzero(owners >= 0)
-        rows, likely = self._records.rows(owners[used]), self._records.rows(np.array(list(begun), dtype=np.int64))
+        rows = self._records.rows(owners[used])
         columns, shared = self._records.columns, self._config.shared
         scans = shared.scans if self._config.housekeeping else maxsize
         extents, lines = columns["extents"], (belief.pose_world, belief.anchors, belief.means)
         seen = segments.ends, segments.lines, segments.end_kinds, owners, used, rows
         kept = extents, columns["spacing"], columns["whole"], columns["overlaid"]
         take_in(*seen, *lines, scan.step_rad, *kept, float(shared.thickness_m), scans)
-        observations, last_seen = columns["observations"], columns["last_seen"]
-        observations[rows] += 1  # of a wall with two segments, too, by one: the sum is taken before it is stored
-        last_seen[rows] = self._scans
-        seen = last_seen == self._scans
-        of_walls = belief.anchors, belief.means, extents
-        unsure = np.isin(self._records.ids, ambiguous) | (not self._config.housekeeping)
-        looked_at(belief.pose_world, scan, of_walls, seen, unsure, (columns["log_odds"], columns["place"]), self._odds)
-        columns["log_odds"][likely] = np.maximum(columns["log_odds"][likely], list(begun.values()))
+        columns["observations"][rows] += 1  # of a wall with two segments, too, by one: summed before it is stored
+        columns["last_seen"][rows] = self._scans
+        self._look(belief, scan, begun, ambiguous)
         if not self._config.housekeeping:
             return NOBODY
         self._weigh(belief, scan)
         return self._records.ids[(columns["log_odds"] < 0.0) | (extents[:, 1] - extents[:, 0] < shared.resolution_m)]
+
+    def _look(self, belief: Belief, scan: Scan, begun: Mapping[int, float], ambiguous: Int[np.ndarray, " a"]) -> None:
+        """Take in what the scan says of whether walls exist."""
+        likely = self._records.rows(np.array(list(begun), dtype=np.int64))
+        columns, ids = self._records.columns, self._records.ids
+        lines = belief.anchors, belief.means, columns["extents"]
+        seen = columns["last_seen"] == self._scans
+        unsure = np.isin(ids, ambiguous) | (not self._config.housekeeping)
+        log_odds = columns["log_odds"]
+        looked_at(belief.pose_world, scan, lines, seen, unsure, (log_odds, columns["place"]), self._odds)
+        log_odds[likely] = np.maximum(log_odds[likely], list(begun.values()))
 
     def _weigh(self, belief: Belief, scan: Scan) -> None:
         """Cut walls back where beams pass through them."""

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from sim.lidar import LidarConfig, RangeFinder
-from slam.association.matching import NO_MATCHES, match
+from slam.association.matching import NO_MATCHES, KnownWalls, match
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
 from slam.extraction.extract import extract
@@ -201,22 +201,38 @@ def test_extents_and_ends_follow_the_line_they_are_measured_along():
 
 @pytest.mark.parametrize("backend", list(BACKENDS))
 def test_walls_that_were_entered_twice_are_merged(backend):
-    """Matching is blind for two scans, so that all walls are entered again."""
+    """Matching sees none of the walls of before for two scans, so that all are entered again, and seen again."""
     scans = {"at": 0}
 
     def blind(segments, walls, joint, config, *, clear_only=False):
         scans["at"] += clear_only
-        if scans["at"] in (3, 4):
-            return nothing(segments, walls, joint, config)
+        if scans["at"] in (6, 7):
+            late = np.flatnonzero(walls.ids >= 4)
+            walls, joint = KnownWalls(walls.ids[late], walls.extents[late]), joint.take(late)
         return match(segments, walls, joint, config, clear_only=clear_only)
 
-    walls = replace(AT_ITS_WORD.walls, housekeeping=False)  # else those that the blind scans did not show are forgotten
-    updates = list(walk(SQUARE, PLACES * 2, backend, matcher=blind, config=replace(AT_ITS_WORD, walls=walls)))
+    updates = list(walk(SQUARE, PLACES * 2, backend, matcher=blind, config=AT_ITS_WORD))
     last = updates[-1]
-    assert sum(len(update.merged) for update in updates) >= 4
-    assert len(last.map) == 4
+    assert len(updates[5].map) == 8
+    assert updates[6].merged == ((0, 4), (1, 5), (2, 6), (3, 7))
+    assert last.map.ids.tolist() == [0, 1, 2, 3]
     assert [chain.is_closed for chain in last.chains] == [True]
     assert set(last.walls_of_segments.tolist()) <= {-1, *last.map.ids.tolist()}
+
+
+def test_an_end_of_few_beams_becomes_a_wall_once_places_enough_showed_it():
+    """The end of a wall of 0.1 m, 1.4 m away: three beams."""
+    room = faces_of(shapely.box(0, 0, 3.4, 3.4).difference(shapely.box(0, 1.65, 1.4, 1.75)))
+    updates = list(walk(room, [[2.8, 1.6 + 0.1 * (k % 2), 0.0] for k in range(6)]))
+
+    def is_end(update):
+        alpha, middle = update.map.belief.means[:, 0], update.map.ends_world.mean(axis=1)
+        return (np.cos(alpha) < -0.9) & (np.hypot(*(middle - [1.4, 1.7]).T) < 0.05)
+
+    count = [int(np.count_nonzero(is_end(update))) for update in updates]
+    assert (count[0], count[-1]) == (0, 1)
+    became = updates[count.index(1)]
+    assert not became.map.tentative[is_end(became)].any(), "more than one sure segment speaks for it"
 
 
 def test_a_bend_that_the_map_knows_is_cut_where_the_scan_shows_one_line():

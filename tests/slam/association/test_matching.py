@@ -7,6 +7,7 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.association.joint_compatibility import relocate
 from slam.association.matching import KnownWalls, MatchingConfig, match
+from slam.association.methods import METHODS
 from slam.backends import BACKENDS
 from slam.estimation.backend import Joint
 from slam.estimation.models import lines_robot
@@ -241,6 +242,37 @@ def test_a_slip_of_the_wheels_excuses_no_wall_that_the_others_contradict(slip_ra
     assert clear.pairs.tolist() == [[1, 1], [2, 2]]
     rest = match(segments.take(clear.unmatched), walls, relocate(joint, walls.ids, clear.observations(segments)))
     assert rest.doubtful.tolist() == [0]
+
+
+TWO = KnownWalls(np.array([4, 7]), np.array([[-1.0, 1.0], [-1.0, 1.0]]))
+"""Two walls 6 cm apart, seen from one side."""
+
+
+@pytest.mark.parametrize(
+    ("piece", "few_beams", "may_be"),
+    [
+        pytest.param([[2.0, -0.5], [2.0, 0.5]], False, [4, 7], id="between them"),
+        pytest.param([[2.0, -0.5], [2.0, 0.5]], True, [], id="of few beams"),
+        pytest.param([[2.2, -0.5], [2.2, 0.5]], False, [], id="beyond the gate"),
+        pytest.param([[2.0, 0.99], [2.0, 1.8]], False, [], id="hardly overlapping"),
+        pytest.param([[2.0, 0.97], [2.0, 1.8]], False, [4, 7], id="just overlapping"),
+        pytest.param([[2.04, -0.5], [1.96, 0.5]], False, [4, 7], id="turned by 4.6 degrees"),
+        pytest.param([[2.05, -0.5], [1.95, 0.5]], False, [], id="turned by 5.7 degrees"),
+    ],
+)
+@pytest.mark.parametrize("method", ["joint", "assignment"])
+def test_a_wall_along_which_an_unmatched_segment_lies_may_be_what_it_shows(piece, few_beams, may_be, method):
+    """The segment is known to 3 cm and 2.3 degrees: it fits both walls, and is matched with neither."""
+    mean = np.array([0.0, 0.0, 0.0, 0.0, -0.03, 0.0, 0.03])
+    joint = Joint(mean, np.diag([1e-3] * 7) ** 2, np.array([[2.0, 0.0], [2.0, 0.0]]))
+    segments = straight_pieces([piece])
+    segments.cov[:] *= 100.0
+    segments.is_tentative[:] = few_beams
+    found = METHODS[method].matcher(segments, TWO, joint, MatchingConfig())
+    assert found.unmatched.tolist() == [0]
+    assert found.ambiguous.tolist() == may_be
+    sure = match(straight_pieces([[[2.03, -0.5], [2.03, 0.5]]]), TWO, joint)
+    assert (sure.pairs.tolist(), sure.ambiguous.tolist()) == ([[0, 7]], [])
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -9,7 +9,8 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import through
 from slam.geometry.poses import to_robot
-from slam.map.existence import ExistenceConfig, LandmarkCandidates
+from slam.map.candidates import LandmarkCandidates
+from slam.map.existence import ExistenceConfig
 from slam.robot import Scan
 
 SIGMA_M = 0.005

@@ -237,6 +237,14 @@ def test_a_bend_that_only_many_scans_together_show_makes_two_walls_of_one(away_m
     assert sum(found) >= 2
 
 
+def test_the_sides_of_a_bend_that_many_scans_show_begin_as_sure_as_can_be():
+    """A wall seen once is tentative otherwise."""
+    updates = drive(ChangePointsConfig(), np.deg2rad(0.5), steps=80, sigma=0.01, away_m=3.0)
+    two = next(update.map for update in updates if len(update.map) == 2)
+    assert two.observations.tolist() == [1, 1]
+    assert not two.tentative.any()
+
+
 def test_a_straight_wall_stays_one_and_no_number_is_changed():
     off, on = (
         drive(change_points, 0.0)[-1].map for change_points in (ChangePointsConfig(sigmas=np.inf), ChangePointsConfig())
