@@ -10,9 +10,9 @@ from .config import MapperConfig
 from .estimation.backend import Backend
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
-from .map.candidates import LandmarkCandidates
 from .map.chains import Chain, connect
 from .map.change_points import ChangePointsConfig
+from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
 from .map.stochastic_map import StochasticMap

@@ -86,6 +86,9 @@ counts. None stands where a setting said nothing of its own."""
 
 
 DROPPED = {
+    "mission.mapper.change_points.most_rad",
+    "mission.mapper.ambiguity.turn_rad",
+    "mission.mapper.ambiguity.across_m",
     "mission.mapper.candidates.apart_m",
     "mission.mapper.candidates.gate",
     "mission.mapper.candidates.longest_m",
@@ -93,9 +96,6 @@ DROPPED = {
     "mission.mapper.candidates.patience_m",
     "mission.mapper.candidates.patience_steps",
     "mission.mapper.candidates.spare_beams",
-    "mission.mapper.change_points.most_rad",
-    "mission.mapper.ambiguity.turn_rad",
-    "mission.mapper.ambiguity.across_m",
     "mission.mapper.change_points.agrees_sigmas",
     "mission.mapper.change_points.ends",
     "mission.mapper.change_points.gate_sigmas",
@@ -147,9 +147,9 @@ DROPPED = {
     "mission.mapper.vertices.shown",
     "mission.mapper.vertices.slight_rad",
     "mission.mapper.vertices.young_observations",
+    "mission.mapper.walls.claims",
     "mission.mapper.walls.contradictions",
     "mission.mapper.walls.end_margin_m",
-    "mission.mapper.walls.claims",
     "mission.mapper.walls.established_observations",
     "mission.mapper.walls.existence.apart_m",
     "mission.mapper.walls.existence.gate",
@@ -227,8 +227,7 @@ MOVED: dict[str, tuple[str, Moved]] = {
     "mission.mapper.candidates.slack_m": ("mission.mapper.walls.existence.slack_m", _as_it_was),
 }
 """Settings until format 5 that stood for the robot's body or step, and until format 13 one of another group: today's
-key, and its value by the old one. None
-stands where what the robot states takes their place."""
+key, and its value by the old one. None stands where what the robot states takes their place."""
 
 
 def told_of(key: str) -> str:
@@ -237,6 +236,11 @@ def told_of(key: str) -> str:
         return MOVED[key][0]
     now = renamed(key)
     return now if now is not None and now != key else ""
+
+
+def is_past(key: str) -> bool:
+    """Return whether older versions had this setting, and nothing stands for it now."""
+    return key not in MOVED and renamed(key) is None
 
 
 def today(key: str, value: Any, robot: RobotSpec) -> tuple[str, Any] | None:

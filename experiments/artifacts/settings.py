@@ -15,7 +15,7 @@ from slam.robot import STATED, RobotError
 from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import json_bytes
-from .formats import CONFIG, stated_then, today, told_of
+from .formats import CONFIG, is_past, stated_then, today, told_of
 from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
@@ -181,6 +181,8 @@ def _place(key: str, value: Any) -> None:
         if part not in hints or part not in kind.__dataclass_fields__ or _is_stated(kind, part):
             if now := told_of(key):
                 raise UnfitError(f"the key {key!r} of older versions (name {now})")
+            if is_past(key):
+                raise UnfitError(f"the key {key!r} of older versions (nothing stands for it now)")
             beside = [
                 ".".join([*parts[:depth], name, *parts[depth + 1 :]]) for name in get_close_matches(part, hints, 1)
             ]

@@ -4,7 +4,6 @@ import pytest
 
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
-from explore.step import Step
 from studies.exploration.random_buildings import faults
 
 SMALL = (22, 60, 65, 123, 214, 277)
@@ -21,14 +20,8 @@ def test_a_random_building_is_explored_whole_without_a_touch(seed):
 
 @pytest.mark.usefixtures("_unchecked")
 def test_pillars_that_show_three_beams_from_afar_are_walls_in_the_end():
-    """All the floor of `random:138` is seen from along its walls, and of its pillars never more than a few beams."""
-    goals: set[str] = set()
-
-    def watch(step: Step) -> None:
-        goals.update({step.decision.goal.kind} if step.decision.goal is not None else ())
-
-    summary = run_trial(TrialConfig("random:138", errorless=True, max_steps=5000), watch=watch).summary
-    assert "unexplained" in goals
+    """All the floor of `random:138` is seen from along its walls, and of its pillars only a few beams at a time."""
+    summary = run_trial(TrialConfig("random:138", errorless=True, max_steps=5000)).summary
     assert summary["contours_closed"] == summary["contours_reachable"] == 7
     assert summary["coverage"] > 0.99
 

@@ -1,4 +1,4 @@
-"""Which faces of a few beams are seen again: the loops of `candidates`."""
+"""Which faces of a few beams are seen again: the loops of `LandmarkCandidates`."""
 
 import math
 from typing import NamedTuple

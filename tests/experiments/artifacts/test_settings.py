@@ -95,6 +95,8 @@ BAD = {
     "no equals sign": ("mission", "write it so"),
     "no key": ("=3", "write it so"),
     "an unknown key": ("mission.mapper.matching.gat=1", "is it mission.mapper.matching.gate"),
+    "a key that moved": ("mission.mapper.candidates.slack_m=1", "(name mission.mapper.walls.existence.slack_m)"),
+    "a key of a rule that is no more": ("mission.mapper.walls.claims=6", "older versions (nothing stands for it now)"),
     "a group": ("mission.mapper=3", "name one of them"),
     "an empty group": ("mission.mapper={}", "name one of them"),
     "below a value": ("seed.x=3", "which is one value"),

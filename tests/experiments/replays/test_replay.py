@@ -127,9 +127,9 @@ def test_the_interval_of_a_mean_holds_it_and_shrinks_with_the_runs():
 
 @pytest.mark.parametrize("perfect_extraction", [False, True])
 def test_a_replay_goes_by_its_runs_options_of_the_back_end_and_settings_of_the_extraction(made, perfect_extraction):
-    """Where every segment has too few beams nothing is mapped, whoever extracts."""
+    """Where no segment has beams enough nothing is mapped, whoever extracts."""
     run = recorded(made[0])
-    mapper = replace(run.trial.mission.mapper, extraction=ExtractionConfig(sure_beams=1000))
+    mapper = replace(run.trial.mission.mapper, extraction=ExtractionConfig(least_beams=1000))
     options = BackendOptions(EkfConfig(at_wall=False))
     trial = replace(run.trial, mission=replace(run.trial.mission, mapper=mapper), backend_options=options)
     again = replay(replace(run, trial=trial), "full-ekf", ReplayOptions("own", perfect_extraction))

@@ -9,8 +9,7 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import through
 from slam.geometry.poses import to_robot
-from slam.map.candidates import LandmarkCandidates
-from slam.map.existence import ExistenceConfig
+from slam.map.existence import ExistenceConfig, LandmarkCandidates
 from slam.robot import Scan
 
 SIGMA_M = 0.005
