@@ -135,7 +135,7 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check study intervals real-plans interval-causes counts settings
+.PHONY: navigation paper paper-check study intervals real-plans existence interval-causes counts settings
 
 # The same in every eighth apartment, errorless.
 navigation-apartments: setup
@@ -156,6 +156,10 @@ intervals: setup
 # The paper's question in real plans: every fourth apartment, explored once and replayed through six back ends.
 real-plans: setup
 	$(BIN)/python -m studies.consistency.real_plans --plans $(PLANS) --out $(ROWS)/real-plans.jsonl
+
+# How many segments lie over two faces, and which lines do looks show? What `mission.mapper.walls.existence` rests on.
+existence: setup
+	$(BIN)/python -m studies.consistency.existence --plans $(PLANS)
 
 # Is it the matches, or the lines, that make them fail more often in one run than in another?
 interval-causes: setup

@@ -45,7 +45,7 @@ class ExplorerConfig:
     patience_m: float = 60.0
     """A goal that takes more steps than so long a way is set aside."""
     second_looks: int = 4
-    """Before it ends, the robot turns on the spot this often while there are walls that it saw only once."""
+    """Before it ends, the robot turns on the spot this often while there are tentative walls."""
     sweep: bool = True
     """After the last chain, visit what is reachable and unseen."""
     sweeping: SweepConfig = field(default_factory=SweepConfig)
@@ -151,7 +151,7 @@ class Explorer:
             self._task.errand.interrupt(around)
 
     def _look_again(self, around: Surroundings, gave_up: bool) -> MotionCommand | None:
-        """Turn on the spot while there are walls that were seen only once; None when there is nothing left to do.
+        """Turn on the spot while there are tentative walls; None when there is nothing left to do.
 
         Ends that were given up just now may join others that were: the chains are connected with the next scan.
         """

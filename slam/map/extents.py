@@ -25,7 +25,7 @@ NO_ODDS: Mapping[int, float] = {}
 
 @dataclass(frozen=True)
 class WallsConfig:
-    """When a wall is trusted, and when it is forgotten.
+    """When a wall is tentative, cut back and forgotten.
 
     It is cut back once two scans in turn have shown beams passing through it: beams that go on beyond it by a wall's
     thickness, and as far from its ends. A wall cut back to less than ends are known to is forgotten.

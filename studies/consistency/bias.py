@@ -30,8 +30,8 @@ from slam.geometry.lines import normals
 from slam.geometry.poses import to_world
 
 from ..runner.command import run_study
+from ..runner.faults import Fault, faulty
 from ..runner.scores import Key, Scores, bootstrap, fill
-from .faults import Fault, faulty
 
 KEY = ("world", "strategy", "fault", "size", "association", "backend", "seed")
 SCORES = ("pose_anees", "map_anees", "ate_cm", "walls_cm", "shape_cm", "duplicate_lines", "false_matches")

@@ -92,7 +92,7 @@ EXPLORER = (
            "True", "a goal that takes 400 steps is set aside"),
     Switch("explorer.second_looks", "explore.goals.explorer",
            "again = «self._looked_again <= self._config.second_looks and bool(around.walls.tentative.any())»",
-           "False", "it turns while there are walls seen once only"),
+           "False", "it turns while there are tentative walls"),
     Switch("explorer.one_more_scan", "explore.goals.explorer", "if not again and «not gave_up»:",
            "True", "ends given up just now may join in the next scan"),
     Switch("explorer.walk", "explore.goals.explorer",

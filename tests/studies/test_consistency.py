@@ -25,9 +25,10 @@ from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations
 from slam.geometry.poses import to_world
 from studies.consistency.bias import BiasStudy
+from studies.consistency.existence import ExistenceStudy, counted, table
 from studies.consistency.extraction import PLANS, ExtractionStudy, worlds
-from studies.consistency.faults import Fault, faulty
 from studies.consistency.loops import LoopStudy
+from studies.runner.faults import Fault, faulty
 from studies.runner.scores import bootstrap
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
@@ -228,3 +229,15 @@ def test_the_study_of_extraction_asks_for_plans_beside_the_checkout_and_refuses_
     assert PLANS.resolve() == Path(__file__).resolve().parents[3] / "shared" / "data" / "plans"
     with pytest.raises(UsageError, match=r"found no file \*\.json in"):
         next(worlds(ExtractionStudy(plans=tmp_path)))
+
+
+def test_the_study_of_existence_counts_looks_at_walls_and_asks_for_plans(tmp_path):
+    """Exact scans of a few rooms: each wall is one face, and each look shows it."""
+    counts = counted(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40, errorless=True))
+    looks, one_face = counts["looks", False, False], (False, False)
+    assert 4 <= counts["first looks", *one_face] <= counts["fresh", *one_face] < 10
+    assert 50 < looks == counts["looks that show", *one_face] < counts["segments", *one_face]
+    assert counts["segments", False, True] == 0
+    assert table(counts).row_count == 8
+    with pytest.raises(UsageError, match=r"found no lifull_\*\.json"):
+        ExistenceStudy(plans=tmp_path).run()

@@ -85,7 +85,7 @@ _MARK_WORDS = (
 def _map_words(campaign: Campaign) -> tuple[str, ...]:
     return (
         f"One seed, {ARMS_SHORT[map_arm(campaign)]}, by every back end. Blue: walls in closed chains; orange: in open"
-        " ones; grey: seen once or twice, or the true walls behind; dark line: the path as the robot believes it.",
+        " ones; grey: tentative, or the true walls behind; dark line: the path as the robot believes it.",
     )
 
 

@@ -11,6 +11,7 @@ from experiments.artifacts.saved import read_config
 from experiments.artifacts.settings import defaults, leaves
 from experiments.commands.cli import main
 from experiments.commands.view import recordings_at
+from slam.map.existence import ExistenceConfig
 
 STORED = Path(__file__).parents[2] / "data" / "format1"
 CAMPAIGN = (
@@ -42,6 +43,19 @@ def test_settings_that_still_hold_are_kept(name):
     assert config.trial.mission.explorer.sweep is (name == "run")
     assert config.trial.backend == ("graph" if name == "other" else "full-ekf")
     assert config.trial.max_steps == 3
+
+
+def test_of_the_rules_before_existence_what_still_holds_is_kept(tmp_path):
+    """Format 13: walls and lines of few beams were believed and forgotten by rules of their own."""
+    trial = defaults() | {"world": "hall"}
+    trial["mission"]["mapper"]["walls"] |= {"patience_m": 2.25, "claims": 6}
+    del trial["mission"]["mapper"]["walls"]["existence"]
+    trial["mission"]["mapper"]["candidates"] = {"longest_m": 0.18, "patience_m": 150.0, "slack_m": 0.02}
+    path = tmp_path / CONFIG
+    path.write_text(json.dumps({"format": 13, "trial": trial}))
+    config = read_config(path)
+    assert config.unknown == ()
+    assert config.trial.mission.mapper.walls.existence == ExistenceConfig(slack_m=0.02)
 
 
 @pytest.mark.parametrize("name", ["run", "other"])

@@ -1,4 +1,4 @@
-"""What becomes of a wall's extent, and of the wall, scan by scan: corners before its end, beams that others take."""
+"""What becomes of a wall's extent, and of the wall, scan by scan: corners before its end, beams through it, looks."""
 
 from dataclasses import replace
 

@@ -1,0 +1,148 @@
+"""What `ExistenceConfig` holds, by true faces: how many segments lie over two faces, and which lines looks show.
+
+Bundled worlds and real plans are explored with noise. A segment is of one face where 80 % of its beams came from one
+wall; otherwise it lies over two faces. A wall of the map is what its first segment was. A look at it is a scan of which
+beams enough reach it, from a place of its own, as the mapper counts them.
+
+.venv/bin/python -m studies.consistency.existence --plans ../shared/data/plans --every 8
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int
+from rich.table import Table
+
+from experiments.scenario import TrialConfig, build
+from experiments.scoring.beam_votes import vote
+from experiments.scoring.truth import truth_of
+from experiments.terminal.console import plain_console
+from experiments.trial import default_mission, run_scenario
+from experiments.usage import UsageError
+from explore.step import Step
+from sim.worlds import WORLDS
+from slam.extraction.config import ExtractionConfig
+from slam.map.existence import JUST_BEGUN, ExistenceConfig
+from slam.map.kernels.existence_kernels import crossing
+
+from ..runner.command import run_study
+from .extraction import PLANS
+
+SURE_BEAMS = ExtractionConfig().sure_beams
+ODDS = ExistenceConfig().odds(SURE_BEAMS)
+Kind = tuple[bool, bool]
+"""Whether a segment has few beams, and whether it lies over two faces."""
+
+
+@dataclass(frozen=True)
+class ExistenceStudy:
+    """What is explored."""
+
+    plans: Path = PLANS
+    """Folder of plan files."""
+    pattern: str = "lifull_*.json"
+    """Which files of the folder."""
+    every: int = 8
+    """Every so many plans by name; the bundled worlds are explored as well."""
+    backend: str = "invariant-ekf"
+    """The estimator."""
+    seed: int = 1
+    """Of the noise."""
+    max_steps: int = 3000
+    """A run stops here."""
+
+    def run(self) -> None:
+        """Explore, and print the table; raises UsageError for a folder without plans."""
+        counts: Counter[tuple[str, *Kind]] = Counter()
+        for world in self._worlds():
+            counts.update(counted(TrialConfig(world, self.backend, seed=self.seed, max_steps=self.max_steps)))
+        plain_console(width=120).print(table(counts))
+
+    def _worlds(self) -> Iterator[str]:
+        plans = sorted(self.plans.glob(self.pattern))[:: self.every]
+        if not plans:
+            raise UsageError(f"expected plan files in {self.plans}, found no {self.pattern}")
+        yield from (*WORLDS, *map(str, plans))
+
+
+def counted(config: TrialConfig) -> "Counter[tuple[str, *Kind]]":
+    """Return the counts of one run."""
+    scenario = build(config)
+    walls = truth_of(scenario.world, config.robot).walls
+    looks = Looks(walls, lambda index: scenario.robot.record.faces_of_beams[index])
+    run_scenario(scenario, looks, default_mission)
+    return looks.counts
+
+
+@dataclass
+class Looks:
+    """Counts segments and looks while a run goes on, by what it is of which there are so many, and the kind."""
+
+    walls_of_faces: Int[np.ndarray, " f"]
+    """The true wall of each true face."""
+    faces_of_beams: Callable[[int], Int[np.ndarray, " k"]]
+    """Returns the true face of each beam of a scan."""
+    counts: "Counter[tuple[str, *Kind]]" = field(default_factory=Counter)
+    _kinds: dict[int, Kind] = field(default_factory=dict)
+    """By the ids of walls, what their first segments were."""
+    _places: dict[int, np.ndarray] = field(default_factory=dict)
+    """From where they were looked at last."""
+
+    def __call__(self, step: Step) -> None:
+        """Take note of one step."""
+        self._look(step)
+        faces, fresh = self.faces_of_beams(step.index), set(step.matches.unmatched) - set(step.matches.doubtful)
+        for row, (span, owner) in enumerate(zip(step.segments.beams.tolist(), step.walls_of_segments, strict=True)):
+            kind = bool(step.segments.is_tentative[row]), not vote(span, faces, self.walls_of_faces).is_clear
+            self.counts["segments", *kind] += 1
+            self.counts["fresh", *kind] += row in fresh
+            if row in fresh and owner >= 0 and owner not in self._kinds:
+                self._kinds[int(owner)], self._places[int(owner)] = kind, JUST_BEGUN
+
+    def _look(self, step: Step) -> None:
+        beams, ids = reaching(step), step.map.ids.tolist()
+        at, seen, ambiguous = step.map.belief.pose_world[:2], set(step.walls_of_segments), set(step.matches.ambiguous)
+        for wall, count in zip(ids, beams.tolist(), strict=True):
+            counts = wall in seen or (count >= ODDS.beams and wall not in ambiguous)
+            if wall not in self._kinds or not counts or np.hypot(*(at - self._places[wall])) < ODDS.apart_m:
+                continue
+            first, self._places[wall] = np.isnan(self._places[wall]).any(), at.copy()
+            if count >= ODDS.beams:
+                for name in ("looks", "first looks") if first else ("looks",):
+                    self.counts[name, *self._kinds[wall]] += 1
+                    self.counts[f"{name} that show", *self._kinds[wall]] += wall in seen
+
+
+def reaching(step: Step) -> Int[np.ndarray, " n"]:
+    """Return how many beams of a step's scan reach each wall of the map."""
+    scan, walls = step.scan, step.map
+    lines = walls.belief.anchors, walls.belief.means, walls.extents
+    return crossing(
+        scan.bearings_rad, scan.passed_m, float(scan.range_max_m), walls.belief.pose_world, *lines, ODDS.margin_m
+    )
+
+
+def table(counts: "Counter[tuple[str, *Kind]]") -> Table:
+    """Return how many segments lie over two faces, and how many looks show each kind of wall."""
+    shown = Table("what", "of one face", "over two faces", "share", title="By true faces", title_justify="left")
+    for few, beams in ((False, f"{SURE_BEAMS} beams or more"), (True, f"fewer than {SURE_BEAMS} beams")):
+        for name, title in (("segments", "segments of"), ("fresh", "segments that no wall explains, of")):
+            one, two = (counts[name, few, over] for over in (False, True))
+            shown.add_row(f"{title} {beams}", str(one), str(two), _share(two, one + two))
+    for few, beams in ((False, f"{SURE_BEAMS} beams or more"), (True, f"fewer than {SURE_BEAMS} beams")):
+        for name in ("first looks", "looks"):
+            told = [f"{_share(counts[f'{name} that show', few, over], counts[name, few, over])} of "
+                    f"{counts[name, few, over]}" for over in (False, True)]  # fmt: skip
+            shown.add_row(f"{name} that show a wall begun by {beams}", *told, "")
+    return shown
+
+
+def _share(some: int, of: int) -> str:
+    return f"{some / of:.3f}" if of else "none"
+
+
+if __name__ == "__main__":
+    run_study(ExistenceStudy)
