@@ -94,6 +94,17 @@ def test_a_wall_in_whose_place_another_is_seen_from_several_places_is_forgotten(
     assert forgotten == [[], [] if is_kept else [1]]
 
 
+def test_of_two_walls_that_are_one_the_surer_tells_how_likely_it_is():
+    walls, known = Landmarks(*SETTINGS), [WALL, BEHIND]
+    for k in range(4):
+        see(walls, [WALL], [WALL], [0], [0.0, 0.1 * k, 0.0])
+    see(walls, known, [BEHIND], [1], [0.0, 0.4, 0.0])
+    belief = belief_of(known, ORIGIN)
+    assert walls.map(belief).tentative.tolist() == [False, True]
+    walls.merge(belief, 1, 0)
+    assert walls.map(belief_of([BEHIND], ORIGIN)).tentative.tolist() == [False]
+
+
 def test_a_wall_is_kept_where_none_are_forgotten():
     walls = Landmarks(replace(CONFIG, housekeeping=False), *SETTINGS[1:])
     see(walls, [WALL], [WALL], [0], ORIGIN)
