@@ -122,7 +122,7 @@ class PerfectExtraction:
 
 def of_true_lines(config: MapperConfig) -> MapperConfig:
     """Return a mapper for perfect extraction, whose short faces are known for what they are."""
-    reliability = replace(config.walls.reliability, straightness=StraightnessConfig(edge_m=0.0))
+    reliability = replace(config.walls.reliability, straightness=StraightnessConfig(edge_m=0.0), edge_m=0.0)
     return replace(config, walls=replace(config.walls, reliability=reliability))
 
 

@@ -28,6 +28,10 @@ class ReliabilityConfig:
     few beams to show it."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
     """How far a face may be from its line."""
+    edge_m: float = 0.003
+    """How far the shortest wall may be from its line, sigma: less than a single segment (`straightness.edge_m`), since
+    few lines over two faces stay in the map. By this the short walls alone have a map ANEES of 1
+    (`python -m studies.exploration.map_causes`)."""
 
 
 def are_clear(segments: Segments, config: ReliabilityConfig = ReliabilityConfig()) -> Bool[np.ndarray, " s"]:
@@ -95,6 +99,6 @@ class Reliability:
         What one scan alone shows of a wall, longer than any other, may be of two faces: a short one and another behind
         it. So a wall counts as long as two scans saw it.
         """
-        straightness, longest = self._config.straightness, self._records.columns["longest"][self._records.rows(ids)]
-        edges = float(straightness.edge_m), float(straightness.shared.face_m)
+        longest = self._records.columns["longest"][self._records.rows(ids)]
+        edges = float(self._config.edge_m), float(self._config.shared.face_m)
         return reliability_kernels.off_line_cov(extents, longest, misfits_m2, *edges)
