@@ -27,10 +27,9 @@ class MapKeeper:
         self.backend = backend
         self.config = config
         change_points = config.change_points or ChangePointsConfig()
-        sure_beams = config.extraction.sure_beams
-        self.landmarks = Landmarks(config.walls, change_points, sure_beams)
+        self.landmarks = Landmarks(config.walls, change_points, config.extraction.sure_beams)
         same = config.matching.gate, config.matching.angle_rad
-        self._candidates = LandmarkCandidates(*same, sure_beams, config.walls.existence)
+        self._candidates = LandmarkCandidates(*same, config.extraction.least_beams, config.walls.existence)
 
     def map(self) -> StochasticMap:
         """Return the map as it is now."""

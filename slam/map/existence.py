@@ -30,25 +30,34 @@ class ExistenceConfig:
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
-    over_faces: float = 0.03
-    """Of segments with enough beams to be sure, so many lie over two faces ..."""
-    few_over_faces: float = 0.15
+    over_faces: float = 0.09
+    """Of segments that no wall explains, with enough beams to be sure, so many lie over two faces ..."""
+    few_over_faces: float = 0.25
     """... and of those with fewer."""
     shown: float = 0.9
-    """A look shows a wall, where two beams more reach it than make a sure segment, one for each end that may lose its
-    last: so often where there is one ..."""
+    """A look shows a line where enough beams reach it: so often where it is of one face ..."""
     shown_over_faces: float = 0.2
-    """... and so often where the line lies over two faces."""
+    """... so often where it lies over two, and two beams more reach it than make a sure segment, one for each end that
+    may lose its last ..."""
+    few_shown_over_faces: float = 0.5
+    """... and so often where it has few beams, and as many reach it as make a segment."""
     slack_m: float = 0.01
     """What the pose may have drifted between two observations of a line of few beams, sigma."""
 
     def odds(self, sure_beams: int) -> Odds:
-        """Return them as logarithms of odds, for segments that are sure with so many beams."""
+        """Return what a look says of a wall, as logarithms of odds; a segment is sure with so many beams."""
+        return self._odds(self.shown_over_faces, sure_beams + 2)
+
+    def few_odds(self, least_beams: int) -> Odds:
+        """Return what a look says of a line of few beams; so many make a segment."""
+        return self._odds(self.few_shown_over_faces, least_beams)
+
+    def _odds(self, shown_over_faces: float, beams: int) -> Odds:
         return Odds(
-            log(self.shown / self.shown_over_faces),
-            log((1.0 - self.shown) / (1.0 - self.shown_over_faces)),
+            log(self.shown / shown_over_faces),
+            log((1.0 - self.shown) / (1.0 - shown_over_faces)),
             self.most,
-            sure_beams + 2,
+            beams,
             0.5 * self.robot.step_m,
             float(self.shared.beams_m),
         )
@@ -100,13 +109,13 @@ class LandmarkCandidates:
     the back ends nothing.
     """
 
-    def __init__(self, gate: float, angle_rad: float, sure_beams: int, config: ExistenceConfig) -> None:
+    def __init__(self, gate: float, angle_rad: float, least_beams: int, config: ExistenceConfig) -> None:
         """Lines of which two observations are farther apart than this gate, or turn by more, are never one.
 
-        `sure_beams` are those of a sure segment.
+        So many beams make a segment.
         """
         self._same = Same(gate_level(gate, 2), float(np.cos(angle_rad)), float(config.slack_m))
-        self._config, self._odds = config, config.odds(sure_beams)
+        self._config, self._odds = config, config.few_odds(least_beams)
         self._lines, self._places, self._log_odds = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0)
 
     def __len__(self) -> int:

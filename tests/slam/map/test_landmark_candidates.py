@@ -13,7 +13,7 @@ from slam.map.existence import ExistenceConfig, LandmarkCandidates
 from slam.robot import Scan
 
 SIGMA_M = 0.005
-GATE, ANGLE_RAD, SURE_BEAMS = 0.99, 1.05, 5
+GATE, ANGLE_RAD, LEAST_BEAMS = 0.99, 1.05, 3
 CONFIG = ExistenceConfig()
 
 
@@ -34,7 +34,7 @@ def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generato
 
 
 def candidates(existence: ExistenceConfig = CONFIG) -> LandmarkCandidates:
-    return LandmarkCandidates(GATE, ANGLE_RAD, SURE_BEAMS, existence)
+    return LandmarkCandidates(GATE, ANGLE_RAD, LEAST_BEAMS, existence)
 
 
 def scan_of(faces: list[np.ndarray], pose: np.ndarray) -> Scan:
