@@ -28,7 +28,7 @@ class ReliabilityConfig:
     few beams to show it."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
     """How far a face may be from its line."""
-    edge_m: float = 0.003
+    edge_m: float = 0.0015
     """How far the shortest wall may be from its line, sigma: less than a single segment (`straightness.edge_m`), since
     few lines over two faces stay in the map. By this the short walls alone have a map ANEES of 1
     (`python -m studies.exploration.map_causes`)."""

@@ -75,8 +75,9 @@ def test_a_look_counts_by_what_it_shows_once_from_each_place(seed):
 
 def test_the_odds_are_those_of_the_shares():
     assert log_odds(0.97) == pytest.approx(log(0.97 / 0.03))
-    assert ODDS[:3] == pytest.approx((log(0.9 / 0.2), log(0.1 / 0.8), log((1 - 1e-6) / 1e-6)))
-    np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.85 / 0.15), log(0.97 / 0.03)])
+    assert ODDS[:4] == pytest.approx((log(0.9 / 0.2), log(0.1 / 0.8), log((1 - 1e-6) / 1e-6), 7))
+    assert CONFIG.few_odds(3)[:4] == pytest.approx((log(0.9 / 0.5), log(0.1 / 0.5), ODDS.most, 3))
+    np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.75 / 0.25), log(0.91 / 0.09)])
 
 
 def looks(shown, places, config=CONFIG, unsure=SURE):

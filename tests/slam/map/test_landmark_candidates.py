@@ -48,16 +48,16 @@ NONE = look(np.eye(2), np.zeros(3), np.random.default_rng(0)).take(np.zeros(0, i
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.integers(3, 4))
-def test_a_face_is_believed_once_three_scans_showed_it_from_two_places(seed: int, beams: int) -> None:
-    """The prior and two looks pass the gate's odds; from one place all scans are one look."""
+def test_a_face_is_believed_once_four_scans_showed_it_from_three_places(seed: int, beams: int) -> None:
+    """The prior and three looks pass the odds of a sure segment; from one place all scans are one look."""
     rng = np.random.default_rng(seed)
     turn = rng.uniform(-np.pi, np.pi)
     face = 0.06 * np.array([[-np.sin(turn), np.cos(turn)]]) * np.array([[-1.0], [1.0]])
     free_side = -np.array([np.cos(turn), np.sin(turn)])
     poses = [np.array([*(0.8 * free_side + 0.1 * k * face[1] / 0.06), 0.3 * k]) for k in range(4)]
     moving, standing = candidates(), candidates()
-    believed = [len(moving.see(pose, scan_of([face], pose), look(face, pose, rng, beams))[0]) for pose in poses[:3]]
-    assert believed == [0, 0, 1]
+    believed = [len(moving.see(pose, scan_of([face], pose), look(face, pose, rng, beams))[0]) for pose in poses]
+    assert believed == [0, 0, 0, 1]
     assert not any(
         len(standing.see(poses[0], scan_of([face], poses[0]), look(face, poses[0], rng, 4))[0]) for _ in range(10)
     )
@@ -72,7 +72,7 @@ def test_lines_that_are_elsewhere_each_time_are_never_believed() -> None:
         assert not len(faint.see(pose, scan_of([face], pose), look(face, pose, rng))[0])
 
 
-@pytest.mark.parametrize("existence", [CONFIG, ExistenceConfig(shown=0.5, shown_over_faces=0.5)])
+@pytest.mark.parametrize("existence", [CONFIG, ExistenceConfig(shown=0.5, few_shown_over_faces=0.5)])
 def test_a_line_in_whose_place_a_look_shows_nothing_is_forgotten(existence: ExistenceConfig) -> None:
     """It begins anew; where looks say nothing of what is, it goes on, and is never believed either."""
     rng, faint = np.random.default_rng(4), candidates(existence)
