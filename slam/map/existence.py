@@ -30,9 +30,9 @@ class ExistenceConfig:
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
-    over_faces: float = 0.09
+    over_faces: float = 0.07
     """Of segments that no wall explains, with enough beams to be sure, so many lie over two faces ..."""
-    few_over_faces: float = 0.25
+    few_over_faces: float = 0.27
     """... and of those with fewer."""
     shown: float = 0.9
     """A look shows a line where enough beams reach it: so often where it is of one face ..."""

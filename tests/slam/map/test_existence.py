@@ -77,12 +77,12 @@ def test_the_odds_are_those_of_the_shares():
     assert log_odds(0.97) == pytest.approx(log(0.97 / 0.03))
     assert ODDS[:4] == pytest.approx((log(0.9 / 0.2), log(0.1 / 0.8), log((1 - 1e-6) / 1e-6), 7))
     assert CONFIG.few_odds(3)[:4] == pytest.approx((log(0.9 / 0.5), log(0.1 / 0.5), ODDS.most, 3))
-    np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.75 / 0.25), log(0.91 / 0.09)])
+    np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.73 / 0.27), log(0.93 / 0.07)])
 
 
 def looks(shown, places, config=CONFIG, unsure=SURE):
     """Return the log odds of `WALL` after looks at faces from places; it is seen where it is one of the faces."""
-    odds = np.array([log_odds(0.97)])
+    odds = np.array([CONFIG.believed])
     columns = odds, np.tile(NOWHERE, (1, 1))
     for faces, place in zip(shown, places, strict=True):
         pose = np.array([*place, 0.0])
@@ -97,7 +97,7 @@ def test_two_faces_in_its_place_undo_a_wall_and_from_one_place_they_are_one_look
     faces = [[[1.0, -0.5], [1.3, 0.0]], [[1.3, 0.0], [1.0, 0.5]]]
     moving = [(0.0, 0.1 * k) for k in range(2)]
     assert looks([faces] * 2, moving) < 0.0 < looks([faces] * 2, [(0.0, 0.0)] * 2)
-    assert looks([faces] * 2, moving, unsure=UNSURE) == log_odds(0.97)
+    assert looks([faces] * 2, moving, unsure=UNSURE) == CONFIG.believed
 
 
 def test_a_wall_that_was_seen_for_long_is_no_surer_than_chance_lets_it_be_and_can_be_undone():
@@ -109,4 +109,4 @@ def test_a_wall_that_was_seen_for_long_is_no_surer_than_chance_lets_it_be_and_ca
 
 def test_looks_that_show_both_alike_say_nothing():
     nothing = replace(CONFIG, shown=0.5, shown_over_faces=0.5)
-    assert looks([[WALL], [[[3.0, -2.0], [3.0, 2.0]]]], [(0.0, 0.0), (0.0, 0.1)], nothing) == log_odds(0.97)
+    assert looks([[WALL], [[[3.0, -2.0], [3.0, 2.0]]]], [(0.0, 0.0), (0.0, 0.1)], nothing) == CONFIG.believed

@@ -18,10 +18,10 @@ CONFIG = ExistenceConfig()
 
 
 def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generator, beams: int = 3) -> Segments:
-    """Return one face as a segment of so many beams, its two ends off by noise, with the covariance of that."""
+    """Return one face as a segment of so many beams, its two ends off by no more than noise, with the covariance of that."""
     ends = to_robot(face_world, pose_world)
     n = np.array([np.cos(through(ends[None])[0, 0]), np.sin(through(ends[None])[0, 0])])
-    noisy = ends + SIGMA_M * rng.standard_normal((2, 1)) * n
+    noisy = ends + SIGMA_M * np.clip(rng.standard_normal((2, 1)), -1.0, 1.0) * n
     line, length = through(noisy[None]), float(np.hypot(*(ends[1] - ends[0])))
     along = float(noisy.mean(axis=0) @ np.array([-np.sin(line[0, 0]), np.cos(line[0, 0])]))
     var_alpha, var_across = 2 * SIGMA_M**2 / length**2, SIGMA_M**2 / 2
