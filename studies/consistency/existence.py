@@ -2,7 +2,8 @@
 
 Bundled worlds and real plans are explored with noise. A segment is of one face where 80 % of its beams came from one
 wall; otherwise it lies over two faces. A wall of the map is what its first segment was. A look at it is a scan of which
-beams enough reach it, from a place of its own, as the mapper counts them.
+beams enough reach it, from a place of its own, as the mapper counts them. Lines of few beams that no wall explains are
+looked at, too, and shown where a segment may be the same line.
 
 .venv/bin/python -m studies.consistency.existence --plans ../shared/data/plans --every 8
 """
@@ -13,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from rich.table import Table
 
 from experiments.scenario import TrialConfig, build
@@ -24,15 +25,22 @@ from experiments.trial import default_mission, run_scenario
 from experiments.usage import UsageError
 from explore.step import Step
 from sim.worlds import WORLDS
+from slam.association.matching import MatchingConfig
+from slam.estimation.gates import gate_level
 from slam.extraction.config import ExtractionConfig
 from slam.map.existence import JUST_BEGUN, ExistenceConfig
 from slam.map.kernels.existence_kernels import crossing
+from slam.map.kernels.few_beams_kernels import Same, distances, lines_of
 
 from ..runner.command import run_study
 from .extraction import PLANS
 
 SURE_BEAMS = ExtractionConfig().sure_beams
 ODDS = ExistenceConfig().odds(SURE_BEAMS)
+FEW_ODDS = ExistenceConfig().few_odds(ExtractionConfig().least_beams)
+SAME = Same(
+    gate_level(MatchingConfig().gate, 2), float(np.cos(MatchingConfig().angle_rad)), float(ExistenceConfig().slack_m)
+)
 Kind = tuple[bool, bool]
 """Whether a segment has few beams, and whether it lies over two faces."""
 
@@ -90,10 +98,13 @@ class Looks:
     """By the ids of walls, what their first segments were."""
     _places: dict[int, np.ndarray] = field(default_factory=dict)
     """From where they were looked at last."""
+    _lines: list[tuple[np.ndarray, np.ndarray, bool]] = field(default_factory=list)
+    """Lines of few beams not looked at yet, from where they were seen, and whether they lie over two faces."""
 
     def __call__(self, step: Step) -> None:
         """Take note of one step."""
         self._look(step)
+        self._look_at_lines(step)
         faces, fresh = self.faces_of_beams(step.index), set(step.matches.unmatched) - set(step.matches.doubtful)
         for row, (span, owner) in enumerate(zip(step.segments.beams.tolist(), step.walls_of_segments, strict=True)):
             kind = bool(step.segments.is_tentative[row]), not vote(span, faces, self.walls_of_faces).is_clear
@@ -101,6 +112,8 @@ class Looks:
             self.counts["fresh", *kind] += row in fresh
             if row in fresh and owner >= 0 and owner not in self._kinds:
                 self._kinds[int(owner)], self._places[int(owner)] = kind, JUST_BEGUN
+            elif row in fresh and kind[0]:
+                self._lines.append((seen_lines(step)[row], step.map.belief.pose_world[:2].copy(), kind[1]))
 
     def _look(self, step: Step) -> None:
         beams, ids = reaching(step), step.map.ids.tolist()
@@ -115,14 +128,37 @@ class Looks:
                     self.counts[name, *self._kinds[wall]] += 1
                     self.counts[f"{name} that show", *self._kinds[wall]] += wall in seen
 
+    def _look_at_lines(self, step: Step) -> None:
+        """Count the first look at each line of few beams."""
+        if not self._lines:
+            return
+        lines, at = np.array([line for line, _, _ in self._lines]), step.map.belief.pose_world[:2]
+        ends = lines[:, 5:] * [-1.0, 1.0]
+        beams = crossed(step, lines[:, 1:3].copy(), np.column_stack([lines[:, 0], np.zeros(len(lines))]), ends)
+        shown = np.isfinite(distances(seen_lines(step), lines, SAME)).any(axis=0)
+        apart = np.array([np.hypot(*(at - place)) >= FEW_ODDS.apart_m for _, place, _ in self._lines])
+        looked = (beams >= FEW_ODDS.beams) & apart
+        for row in np.flatnonzero(looked).tolist():
+            kind = True, self._lines[row][2]
+            self.counts["line looks", *kind] += 1
+            self.counts["line looks that show", *kind] += int(shown[row])
+        self._lines = [line for line, done in zip(self._lines, looked.tolist(), strict=True) if not done]
+
+
+def seen_lines(step: Step) -> Float[np.ndarray, "s 6"]:
+    """Return the segments of a step as lines of the world."""
+    return lines_of(step.map.belief.pose_world, step.segments.lines, step.segments.cov, step.segments.ends)
+
 
 def reaching(step: Step) -> Int[np.ndarray, " n"]:
     """Return how many beams of a step's scan reach each wall of the map."""
-    scan, walls = step.scan, step.map
-    lines = walls.belief.anchors, walls.belief.means, walls.extents
-    return crossing(
-        scan.bearings_rad, scan.passed_m, float(scan.range_max_m), walls.belief.pose_world, *lines, ODDS.margin_m
-    )
+    return crossed(step, step.map.belief.anchors, step.map.belief.means, step.map.extents)
+
+
+def crossed(step: Step, *lines: np.ndarray) -> Int[np.ndarray, " n"]:
+    """Return how many beams of a step's scan reach lines: anchors, means and extents."""
+    scan, pose_world = step.scan, step.map.belief.pose_world
+    return crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, ODDS.margin_m)
 
 
 def table(counts: "Counter[tuple[str, *Kind]]") -> Table:
@@ -137,6 +173,9 @@ def table(counts: "Counter[tuple[str, *Kind]]") -> Table:
             told = [f"{_share(counts[f'{name} that show', few, over], counts[name, few, over])} of "
                     f"{counts[name, few, over]}" for over in (False, True)]  # fmt: skip
             shown.add_row(f"{name} that show a wall begun by {beams}", *told, "")
+    told = [f"{_share(counts['line looks that show', True, over], counts['line looks', True, over])} of "
+            f"{counts['line looks', True, over]}" for over in (False, True)]  # fmt: skip
+    shown.add_row("first looks that show a line of few beams", *told, "")
     return shown
 
 

@@ -238,6 +238,10 @@ def test_the_study_of_existence_counts_looks_at_walls_and_asks_for_plans(tmp_pat
     assert 4 <= counts["first looks", *one_face] <= counts["fresh", *one_face] < 10
     assert 50 < looks == counts["looks that show", *one_face] < counts["segments", *one_face]
     assert counts["segments", False, True] == 0
-    assert table(counts).row_count == 8
+    assert table(counts).row_count == 9
+    few = counted(TrialConfig("paper-fig9", "invariant-ekf", seed=1, max_steps=60))
+    looks, fresh = few["line looks", True, False], few["fresh", True, False]
+    assert 0.8 * looks < few["line looks that show", True, False] <= looks
+    assert 10 < looks <= fresh, "a line is looked at for the first time once"
     with pytest.raises(UsageError, match=r"found no lifull_\*\.json"):
         ExistenceStudy(plans=tmp_path).run()
