@@ -6,7 +6,7 @@ where so many beams end on it or go on beyond it. From one place the same beams 
 """
 
 from dataclasses import dataclass
-from math import log
+from math import inf, log
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -54,8 +54,8 @@ class ExistenceConfig:
 
     def _odds(self, shown_over_faces: float, beams: int) -> Odds:
         return Odds(
-            log(self.shown / shown_over_faces),
-            log((1.0 - self.shown) / (1.0 - shown_over_faces)),
+            _log(self.shown) - _log(shown_over_faces),
+            _log(1.0 - self.shown) - _log(1.0 - shown_over_faces),
             self.most,
             beams,
             0.5 * self.robot.step_m,
@@ -78,8 +78,12 @@ class ExistenceConfig:
 
 
 def log_odds(probability: float) -> float:
-    """Return the logarithm of p / (1 - p)."""
-    return log(probability / (1.0 - probability))
+    """Return the logarithm of p / (1 - p); infinite for what is certain."""
+    return _log(probability) - _log(1.0 - probability)
+
+
+def _log(probability: float) -> float:
+    return log(probability) if probability > 0.0 else -inf
 
 
 def looked_at(

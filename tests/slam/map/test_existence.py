@@ -80,6 +80,13 @@ def test_the_odds_are_those_of_the_shares():
     np.testing.assert_allclose(CONFIG.begins(np.array([True, False])), [log(0.73 / 0.27), log(0.93 / 0.07)])
 
 
+def test_shares_that_are_certain_decide_by_one_look():
+    """What is never missed is gone once it is missed, and what only walls show is one once it is shown."""
+    assert replace(CONFIG, shown=1.0).odds(5).missed == -np.inf
+    assert replace(CONFIG, shown_over_faces=0.0).odds(5).seen == np.inf
+    assert replace(CONFIG, over_faces=0.0).believed == np.inf == log_odds(1.0) == -log_odds(0.0)
+
+
 def looks(shown, places, config=CONFIG, unsure=SURE):
     """Return the log odds of `WALL` after looks at faces from places; it is seen where it is one of the faces."""
     odds = np.array([CONFIG.believed])
