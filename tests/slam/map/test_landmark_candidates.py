@@ -18,7 +18,7 @@ CONFIG = ExistenceConfig()
 
 
 def look(face_world: np.ndarray, pose_world: np.ndarray, rng: np.random.Generator, beams: int = 3) -> Segments:
-    """Return one face as a segment of so many beams, its ends off by no more than noise, with the covariance of that."""
+    """Return one face as a segment of so many beams, with the covariance of ends that are off by noise."""
     ends = to_robot(face_world, pose_world)
     n = np.array([np.cos(through(ends[None])[0, 0]), np.sin(through(ends[None])[0, 0])])
     noisy = ends + SIGMA_M * np.clip(rng.standard_normal((2, 1)), -1.0, 1.0) * n
