@@ -119,13 +119,14 @@ class Errand(ABC):
             if self._pilot is None and not self._plan(around):
                 return None
             assert self._pilot is not None
-            if not self._pilot.is_obstructed(around.pose_world, around.scan):
-                command = self._pilot.command(
-                    around.pose_world, around.scan, around.free_space, around.recent_robot, around.touched_robot
-                )
-                if command is not None and not self._is_stalled(self._pilot.remaining_m):
-                    return command
+            obstructed = self._pilot.is_obstructed(around.pose_world, around.scan)
+            seen = around.scan, around.free_space, around.recent_robot, around.touched_robot
+            command = None if obstructed else self._pilot.command(around.pose_world, *seen)
+            if command is not None and not self._is_stalled(self._pilot.remaining_m):
+                return command
             self._blocked(around)
+            if command is None and not obstructed and self._failures:
+                return MotionCommand(0.0, 0.0)  # in a tight gap the noise of one scan may leave no safe step
         return None
 
     def interrupt(self, around: Surroundings) -> None:

@@ -1,0 +1,53 @@
+"""What an errand does where no step along its path is safe."""
+
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from explore.following.driving import Pilot
+from explore.following.wall_following import FollowingConfig, PlaceErrand
+from slam.robot import MotionCommand
+
+CONFIG = FollowingConfig()
+REST, STEP = MotionCommand(0.0, 0.0), MotionCommand(0.1, 0.0)
+
+
+@pytest.fixture
+def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
+    """An errand to one place, to which there is always a path."""
+
+    def plan(self: PlaceErrand, around: Mock) -> bool:
+        self._pilot = Pilot.__new__(Pilot)
+        return self._stage == 0
+
+    monkeypatch.setattr(PlaceErrand, "_plan", plan)
+    for name, told in (("arrived", False), ("is_obstructed", False), ("command", None)):
+        monkeypatch.setattr(Pilot, name, lambda *_, told=told: told)
+    monkeypatch.setattr(Pilot, "remaining_m", 1.0)
+    monkeypatch.setattr(Pilot, "squeeze_world", None)
+    return PlaceErrand(np.zeros((1, 2)), "there", CONFIG)
+
+
+@pytest.fixture
+def around() -> Mock:
+    """The errand's pilot is told of it, and looks at nothing."""
+    return Mock()
+
+
+def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, monkeypatch) -> None:
+    """In a door 25 mm wider than the body on either side one scan of noise made a robot give up all that was left."""
+    assert errand.command(around) == REST
+    monkeypatch.setattr(Pilot, "command", lambda *_: STEP)
+    assert errand.command(around) == STEP
+    assert not errand.trouble
+
+
+def test_after_as_many_scans_as_tries_the_place_is_given_up(errand, around) -> None:
+    assert [errand.command(around) for _ in range(CONFIG.tries)] == [REST] * (CONFIG.tries - 1) + [None]
+    assert errand.trouble == "the way was blocked"
+
+
+def test_where_something_stands_on_the_path_the_errand_does_not_wait(errand, around, monkeypatch) -> None:
+    monkeypatch.setattr(Pilot, "is_obstructed", lambda *_: True)
+    assert errand.command(around) is None
