@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from explore.following.driving import Pilot
-from explore.following.wall_following import FollowingConfig, PlaceErrand
+from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from slam.robot import MotionCommand
 
 CONFIG = FollowingConfig()
@@ -17,7 +17,7 @@ REST, STEP = MotionCommand(0.0, 0.0), MotionCommand(0.1, 0.0)
 def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
     """An errand to one place, to which there is always a path."""
 
-    def plan(self: PlaceErrand, around: Mock) -> bool:
+    def plan(self: PlaceErrand, around: Surroundings) -> bool:
         self._pilot = Pilot.__new__(Pilot)
         return self._stage == 0
 
@@ -32,7 +32,7 @@ def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
 @pytest.fixture
 def around() -> Mock:
     """The errand's pilot is told of it, and looks at nothing."""
-    return Mock()
+    return Mock(spec=Surroundings, walls=None, free_space=None, scan=None)
 
 
 def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, monkeypatch) -> None:
