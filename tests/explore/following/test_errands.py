@@ -32,7 +32,9 @@ def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
 @pytest.fixture
 def around() -> Mock:
     """The errand's pilot is told of it, and looks at nothing."""
-    return Mock(spec=Surroundings, walls=None, free_space=None, scan=None)
+    around = Mock(spec=Surroundings)
+    around.scan = around.free_space = around.recent_robot = around.touched_robot = None
+    return around
 
 
 def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, monkeypatch) -> None:
