@@ -68,7 +68,7 @@ NEAR = {
     "replay_driver": "lost",
     "driving": "driving narrow_doors",
     "safe_steps": "driving narrow_doors",
-    "wall_following": "wall_sequence navigation clearance_while_growing ping_pong endings",
+    "wall_following": "errands wall_sequence navigation clearance_while_growing ping_pong endings",
     "explorer": "round_things patience ends_of_missions endings mission",
     "sweep": "sweep coastal_viewpoints unmapped_obstacles ends_of_missions",
     "floor_memory": "floor_memory",
