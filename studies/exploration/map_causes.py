@@ -1,6 +1,6 @@
 """Which walls carry a map's error in real plans: lines over several faces, short faces, or the long straight ones.
 
-Each plan is explored once, and its map is scored in its own gauge: all of it, and without each kind of wall.
+Each plan is explored once, and its map is scored in its own gauge: all of it, with tentative walls, and without each kind.
 
 .venv/bin/python -m studies.exploration.map_causes --plans ../shared/data/plans   # goes on where it was interrupted
 """
@@ -72,7 +72,8 @@ def causes(result: TrialResult) -> Row:
     """Return the map ANEES of one run, all of it and without some walls; None for what cannot be told."""
     assert result.last is not None
     walls, votes = result.last.map, result.votes
-    told = ~walls.tentative & (votes.walls_of(walls.ids) >= 0)
+    known = votes.walls_of(walls.ids) >= 0
+    told = ~walls.tentative & known
     several = shares_of_one_wall(votes, walls.ids) < ONE_FACE_SHARE
     ends = votes.truth.faces[np.maximum(votes.faces_of(walls.ids), 0)]
     short = np.hypot(*(ends[:, 1] - ends[:, 0]).T) < SHORT_M
@@ -87,6 +88,7 @@ def causes(result: TrialResult) -> Row:
         "short": int(np.count_nonzero(told & short)),
         "heading_sigma_deg": float(np.rad2deg(np.sqrt(walls.belief.pose_cov[2, 2]))),
         "map_anees": anees(told),
+        "with_tentative": anees(known),
         "without_several_faces": anees(told & ~several),
         "short_alone": anees(told & short),
         "long_of_one_face": anees(told & ~short & ~several),
@@ -106,8 +108,8 @@ def shares_of_one_wall(votes: Votes, ids: Int[np.ndarray, " n"]) -> Float[np.nda
 def table(rows: Sequence[Row]) -> Table:
     """Return a row for each plan."""
     shown = Table(title="Map ANEES: all walls, and without some of them", title_justify="left")
-    columns = ("lines", "of_several_faces", "short", "heading_sigma_deg", "map_anees", "without_several_faces",
-               "short_alone", "long_of_one_face")  # fmt: skip
+    columns = ("lines", "of_several_faces", "short", "heading_sigma_deg", "map_anees", "with_tentative",
+               "without_several_faces", "short_alone", "long_of_one_face")  # fmt: skip
     for column in ("plan", *columns):
         shown.add_column(column.replace("_", " "), justify="left" if column == "plan" else "right")
     for row in rows:

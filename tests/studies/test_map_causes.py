@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.scenario import TrialConfig
+from experiments.scoring.summary import map_error
 from experiments.trial import run_trial
 from studies.exploration.map_causes import causes, shares_of_one_wall, table
 
@@ -24,3 +25,12 @@ def test_of_one_run_all_walls_are_scored_as_in_its_summary():
     told = table([{"world": "paper-fig4"} | found])
     assert next(told.columns[0].cells) == "paper-fig4"
     assert next(told.columns[1].cells) == str(found["lines"])
+
+
+def test_tentative_walls_are_scored_by_themselves_only():
+    """After two scans of figure 9 one wall was seen once."""
+    result = run_trial(TrialConfig("paper-fig9", "invariant-ekf", seed=1, max_steps=2))
+    found, walls = causes(result), result.last.map
+    assert np.count_nonzero(walls.tentative) == 1 == len(walls) - found["lines"]
+    every = map_error(result.votes, walls.ids, result.joint, np.ones(len(walls), dtype=bool))
+    assert found["with_tentative"] == pytest.approx(every.anees) != pytest.approx(found["map_anees"])
