@@ -1,6 +1,7 @@
 """Which walls carry a map's error in real plans: lines over several faces, short faces, or the long straight ones.
 
-Each plan is explored once, and its map is scored in its own gauge: all of it, with tentative walls, and without each kind.
+Each plan is explored once, and its map is scored in its own gauge: all of it, with tentative walls, and without each
+kind of wall.
 
 .venv/bin/python -m studies.exploration.map_causes --plans ../shared/data/plans   # goes on where it was interrupted
 """
