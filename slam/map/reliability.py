@@ -30,7 +30,7 @@ class ReliabilityConfig:
     """How far a face may be from its line."""
     edge_m: float = 0.002
     """How far the shortest wall may be from its line, sigma: less than a single segment (`straightness.edge_m`), since
-    few lines over two faces stay in the map. By this the short walls alone have a map ANEES just below 1
+    few lines over two faces stay in the map. By this the short walls alone have a map ANEES near 1
     (`python -m studies.exploration.map_causes`)."""
 
 

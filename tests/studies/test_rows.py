@@ -47,6 +47,16 @@ def test_other_settings_and_other_code_are_other_trials(instant, tmp_path, monke
     assert len(instant) == 7
 
 
+def test_comments_and_docstrings_decide_no_trial():
+    bare = "class A:\n    b: int = 1\n\n    def c(self):\n        return 'd'\n"
+    told = bare.replace("class A:", '"""A."""\n# Why.\nclass A:\n    """B."""')
+    told = told.replace("= 1\n", '= 1\n    """C."""\n').replace("(self):", '(self):\n        """D."""')
+    assert rows.code_alone(told) == rows.code_alone(bare)
+    assert rows.code_alone("class A:\n    'Words alone.'\n") == rows.code_alone("class A:\n    'Others.'\n")
+    for changed in (bare.replace("1", "2"), bare.replace("'d'", "'e'"), bare.replace("int", "float")):
+        assert rows.code_alone(changed) != rows.code_alone(bare)
+
+
 def test_a_row_cut_short_by_a_crash_is_run_again(instant, tmp_path):
     out = tmp_path / "rows.jsonl"
     list(rows_of(trials(2), out, 1))
