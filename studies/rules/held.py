@@ -69,7 +69,7 @@ NEAR = {
     "driving": "driving narrow_doors",
     "safe_steps": "driving narrow_doors",
     "wall_following": "errands wall_sequence navigation clearance_while_growing ping_pong endings",
-    "explorer": "round_things patience ends_of_missions endings mission",
+    "explorer": "round_things setting_aside patience ends_of_missions endings mission",
     "sweep": "sweep coastal_viewpoints unmapped_obstacles ends_of_missions",
     "floor_memory": "floor_memory",
     "free_space": "free_space kernels paths",

@@ -11,7 +11,9 @@ from rerun.chunk import RrdReader
 from experiments.commands.cli import main
 from experiments.replays.real_log import RealOptions, read_real_run
 from experiments.scenario import TrialConfig
+from slam.geometry.lines import directions, normals
 from viz.timeline.blueprints import comparison, one_run
+from viz.timeline.layers.sights import UNITS_PER_M
 from viz.timeline.words import legend
 
 ROOM = (6.0, 4.0)
@@ -114,6 +116,42 @@ def test_the_timeline_has_the_wheels_path_beside_the_result_and_no_truth(replaye
     )
     steps = json.loads((replayed / "out" / "full-ekf" / "summary.json").read_text())["steps"]
     assert rows == steps + 1, "one row for each step, sent once for both back ends, and one for the style"
+
+
+def bounds_of(rrd):
+    """What each view of a recording shows by its name, along x and along y upwards."""
+    reader, names, bounds = RrdReader(rrd), {}, {}
+    (layout,) = reader.blueprints()
+    for chunk in reader.stream(store=layout):
+        path, batch = str(chunk.entity_path).split("/"), chunk.to_record_batch()
+        if "ViewBlueprint:display_name" in batch.schema.names:
+            ((names[path[2]],),) = batch.column("ViewBlueprint:display_name").to_pylist()
+        if "VisualBounds2D:range" in batch.schema.names:
+            ((shown,),) = batch.column("VisualBounds2D:range").to_pylist()
+            bounds[path[2]] = np.array([shown["x_range"], np.negative(shown["y_range"][::-1])])
+    return {names[view]: shown for view, shown in bounds.items()}
+
+
+def test_the_views_of_the_timeline_hold_the_walls_of_all_maps_where_no_plan_says_how_far_they_reach(replayed):
+    ends, lines = [], []
+    for backend in ("full-ekf", "block-ekf"):
+        with np.load(replayed / "out" / backend / "map.npz") as arrays:
+            (alpha, d), anchors, extents = arrays["lines"].T, arrays["anchors"], arrays["extents"]
+        middles = anchors + d[:, None] * normals(alpha)
+        ends.append((middles[:, None] + extents[..., None] * directions(alpha)[:, None]).reshape(-1, 2))
+        lines.append(np.vecdot(middles, normals(alpha)))
+    walls, r = np.concatenate(ends), np.append(np.concatenate(lines), 0.0)
+    reach = np.stack([walls.min(axis=0), walls.max(axis=0)], axis=1)
+    views, margin = bounds_of(replayed / "a.rrd"), np.array([-1.0, 1.0])
+    assert len(views) == 6
+    for name, shown in views.items():
+        if "model space" in name:
+            assert shown[1, 0] < r.min() < r.max() < shown[1, 1], "every line's r"
+            assert np.ptp(shown[1]) < 1.5 * (np.ptp(r) + 1.0)
+        elif "visibility graph" in name:
+            np.testing.assert_allclose(shown / UNITS_PER_M, reach + margin, atol=1e-6)
+        else:
+            np.testing.assert_allclose(shown, reach + 0.6 * margin, atol=1e-6)
 
 
 def test_the_ros_map_of_it_is_the_floor_that_its_scans_show(replayed):

@@ -2,14 +2,20 @@
 
 import numpy as np
 import pytest
+import shapely
 
+from sim.lidar import LidarConfig, RangeFinder
 from slam.association.matching import KnownWalls, MatchingConfig
 from slam.association.methods import METHODS
 from slam.association.view import near_segments
+from slam.backends import BACKENDS
 from slam.estimation.backend import Joint
 from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, normals
 from slam.geometry.poses import compose, rotation, to_robot, wrap
+from slam.mapper import Mapper
+from slam.robot import Odometry, Scan
+from tests.slam.test_mapper import AT_ITS_WORD, P0, faces_of
 
 CONFIG = MatchingConfig()
 WALLS, RANGE_M = 300, 8.0
@@ -91,3 +97,23 @@ def test_without_segments_or_walls_nothing_is_near():
     none = segments.take(np.zeros(0, dtype=np.int64))
     assert not near_segments(none, ends_world, joint.mean[:3], joint.cov[:3, :3], CONFIG).any()
     assert not len(near_segments(segments, ends_world[:0], joint.mean[:3], joint.cov[:3, :3], CONFIG))
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_a_robot_that_may_be_far_off_knows_a_wall_that_it_believes_out_of_sight(backend):
+    """A corridor tells nothing of where along it the robot is, until its end does: wheels that slip slid by a metre."""
+    finder, pose = RangeFinder(faces_of(shapely.box(0, 0, 12, 1.6)), LidarConfig()), np.array([9.0, 0.8, 0.0])
+    mapper = Mapper(BACKENDS[backend].make(pose.copy(), P0.copy()), AT_ITS_WORD)
+
+    def moved(told, true, sigma_m):
+        mapper.predict(Odometry(np.array([told, 0.0, 0.0]), np.diag([sigma_m, 0.01, 0.005]) ** 2))
+        pose[0] += true
+        return mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0))
+
+    known = [moved(0.05, 0.05, 0.01) for _ in range(6)][-1].map
+    away = moved(-2.0, -2.0, 0.01).map
+    assert len(known) == len(away) == 3
+    assert away.distances_m.max() > 4.0 + mapper.config.matching.shared.far_m, "no scan of 4 m shows the end from here"
+    there = moved(0.0, 1.0, 1.0).map
+    assert there.ids.tolist() == known.ids.tolist()
+    np.testing.assert_allclose(there.belief.pose_world, pose, atol=1e-3)

@@ -61,3 +61,20 @@ def drive(graph, seed):
 def test_a_line_that_is_no_longer_seen_comes_to_rest(seed):
     found = drive(Graph(START, P0), seed)
     assert np.abs(wrap(np.diff(found)))[1:].max() < 0.02
+
+
+def test_a_line_that_is_no_longer_seen_rests_near_the_optimum():
+    """A line that turns in a solution takes its old observations with it.
+
+    In sets of 40 drives nine of ten lines end within 0.09 to 0.24 sigma; 0.28 to 0.67 where observations are linearised
+    anew after a solution only. The tenth may end farther off either way.
+    """
+    off = []
+    for seed in range(40):
+        graph = Graph(START, P0)
+        found = drive(graph, seed)[-1]
+        for _ in range(2):
+            graph.relinearise()
+        optimum = graph.belief.joint(graph.belief.ids[-1:])
+        off.append(abs(wrap(optimum.mean[3] - found)) / np.sqrt(optimum.cov[3, 3]))
+    assert np.quantile(off, 0.9) < 0.25
