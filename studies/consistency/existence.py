@@ -155,9 +155,15 @@ def reaching(step: Step) -> Int[np.ndarray, " n"]:
     return crossed(step, step.map.belief.anchors, step.map.belief.means, step.map.extents)
 
 
-def crossed(step: Step, *lines: np.ndarray) -> Int[np.ndarray, " n"]:
-    """Return how many beams of a step's scan reach lines: anchors, means and extents."""
+def crossed(
+    step: Step,
+    anchors: Float[np.ndarray, "n 2"],
+    means: Float[np.ndarray, "n 2"],
+    extents: Float[np.ndarray, "n 2"],
+) -> Int[np.ndarray, " n"]:
+    """Return how many beams of a step's scan reach lines, world frame."""
     scan, pose_world = step.scan, step.map.belief.pose_world
+    lines = anchors, means, extents
     return crossing(scan.bearings_rad, scan.passed_m, float(scan.range_max_m), pose_world, *lines, ODDS.margin_m)
 
 
