@@ -39,4 +39,3 @@ def test_one_extraction(benchmark: BenchmarkFixture, world: str, beams: int) -> 
         world = str(PLANS / world)
     taken = itertools.cycle(scans(world, 40, LidarConfig(beams=beams)))
     benchmark(lambda: extract(next(taken)))
-    assert benchmark.stats.stats.median < 1e-4 * beams / 180  # a shared machine drifts by up to 2
