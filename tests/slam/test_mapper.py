@@ -262,3 +262,18 @@ def test_a_line_laid_across_a_bend_from_afar_turns_nobody(backend):
         assert k or len(update.map) == 1, "one line, at first"
     assert len(update.map) == 2
     assert abs(update.map.belief.pose_world[2] - 0.5 * np.pi) < np.deg2rad(0.05)
+
+
+def test_few_beams_that_show_nothing_in_its_place_undo_a_line_of_few_beams():
+    """The end of a wall of 0.1 m, seen once from 1.4 m; then the wall is gone, and some four beams pass from 0.7 m."""
+    room = shapely.box(0, 0, 3.4, 3.4)
+    faces = faces_of(room.difference(shapely.box(0, 1.65, 1.4, 1.75))), faces_of(room)
+    mapper, left = Mapper(BACKENDS["full-ekf"].make(np.array([2.8, 1.6, 0.0]), P0.copy())), []
+    for k, there in enumerate((faces[0], faces[1])):
+        pose = np.array([2.8 - 0.7 * k, 1.6, 0.0])
+        if k:
+            mapper.predict(Odometry(np.array([-0.7, 0.0, 0.0]), ODOMETRY_COV))
+        finder = RangeFinder(there, LidarConfig())
+        mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.1 * k))
+        left.append(len(mapper._keeper._candidates))
+    assert left[0] > 0 == left[1]
