@@ -226,7 +226,8 @@ def test_standing_still_only_a_consistent_filter_learns_nothing():
 
 
 def test_the_study_of_extraction_asks_for_plans_beside_the_checkout_and_refuses_a_folder_without(tmp_path):
-    assert PLANS.resolve() == Path(__file__).resolve().parents[3] / "shared" / "data" / "plans"
+    beside = Path(__file__).resolve().parents[3] / "shared" / "data" / "plans"
+    assert PLANS.resolve() == beside.resolve()
     with pytest.raises(UsageError, match=r"found no file \*\.json in"):
         next(worlds(ExtractionStudy(plans=tmp_path)))
 
