@@ -85,6 +85,10 @@ class MapKeeper:
             begun = segments.take(fresh)
             straightness = self.config.walls.reliability.straightness
             cov = begun.cov + cov_of_bows(begun, straightness) + cov_of_misfits(begun, straightness)
+            turn = np.where(begun.is_tentative, self.config.walls.reliability.heading_rad, 0.0)
+            lever = np.where(begun.is_tentative, cov[:, 1, 0] / np.maximum(cov[:, 0, 0], 1e-12), 0.0)
+            way = turn[:, None] * np.stack([np.ones(len(turn)), lever], axis=1)
+            cov = cov + way[:, :, None] * way[:, None, :]
             owners[fresh] = self.backend.grow(begun.lines, cov, centres)
         known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:
