@@ -25,7 +25,7 @@ from slam.backends.full_ekf import FullEkf
 from slam.estimation.models import innovations
 from slam.geometry.poses import to_world
 from studies.consistency.bias import BiasStudy
-from studies.consistency.existence import ExistenceStudy, counted, table
+from studies.consistency.existence import ExistenceStudy, Looks, counted, seen_lines, table
 from studies.consistency.extraction import PLANS, ExtractionStudy, worlds
 from studies.consistency.loops import LoopStudy
 from studies.runner.faults import Fault, faulty
@@ -246,3 +246,14 @@ def test_the_study_of_existence_counts_looks_at_walls_and_asks_for_plans(tmp_pat
     assert 10 < looks <= fresh, "a line is looked at for the first time once"
     with pytest.raises(UsageError, match=r"found no lifull_\*\.json"):
         ExistenceStudy(plans=tmp_path).run()
+
+
+def test_a_line_is_looked_at_from_another_place_and_by_beams_that_reach_it():
+    step = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=3)).last
+    line, here = seen_lines(step)[0], step.map.belief.pose_world[:2]
+    elsewhere, far_off = here + 1.0, line + np.array([0.0, 100.0, 100.0, 0.0, 0.0, 0.0])
+    looks = Looks(np.zeros(0, dtype=np.int64), lambda _: np.zeros(0, dtype=np.int64))
+    looks._lines = [(line, here, False), (line, elsewhere, False), (far_off, elsewhere, False)]
+    looks._look_at_lines(step)
+    assert dict(looks.counts) == {("line looks", True, False): 1, ("line looks that show", True, False): 1}
+    assert [place is here for _, place, _ in looks._lines] == [True, False]
