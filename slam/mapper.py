@@ -14,7 +14,7 @@ from .association.motion_noise import MotionInnovation, MotionNoise
 from .association.recovery import Localisation, unstated_cov, unstated_motion
 from .association.view import View, may_be_off_m, near_segments
 from .config import MapperConfig
-from .estimation.backend import Backend, Belief, Observations
+from .estimation.backend import Backend, Belief, ContradictionError, Observations
 from .estimation.mounting import belief_of_body, odometry_of_body, odometry_of_scanner
 from .extraction.config import ExtractionConfig
 from .extraction.extract import NO_VERTICES, extract
@@ -130,7 +130,12 @@ class Mapper:
             found = self._localised(scan, segments, walls)
         matches = found.matches
         # 5. Update map features with their matched re-observation, and store unmatched features as new ones.
-        self.backend.update(found.first, self._observed(matches, segments))
+        try:
+            self.backend.update(found.first, self._observed(matches, segments))
+            _ = self.backend.belief  # A graph solves for the observations when it is asked.
+        except ContradictionError:
+            self._is_lost = self.config.recovery is not None  # Else nobody would look for its place.
+            return self._nothing_taken_in(segments, self._keeper.map())
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.

@@ -53,7 +53,7 @@ class Lost:
         if self._since < 0:
             self._since = self._step
         if self._step - self._since >= self._config.steps:
-            words = f"lost at step {self._since}: its beams go through known walls, and no place in the map fits"
+            words = f"lost at step {self._since}: its scans contradict the map, and no place in it fits"
             return Decision(None, words, given_up=self._given_up, outcome=Outcome.FAILED)
         words = f"lost since step {self._since}: turns to find its place"
         return Decision(MotionCommand(0.0, self._config.robot.turn_rad), words, given_up=self._given_up)

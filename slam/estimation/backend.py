@@ -20,6 +20,10 @@ class StaleBeliefError(RuntimeError):
     """A belief was asked for its joint covariance after its back end had moved on."""
 
 
+class ContradictionError(RuntimeError):
+    """Observations with which no estimate agrees: they are left out again, and the rest holds."""
+
+
 POSE = 3
 """Size of a pose (x m, y m, heading rad), which stands before the lines in every joint state."""
 
@@ -118,7 +122,8 @@ class Backend(Protocol):
         """Take in one scan: the matches made before the robot was relocated, and those made after.
 
         Both describe the same scan. A relocation-fusion back end moves the robot by `first` and the map by
-        `second`; a joint back end uses `second` alone, so that each observation counts once.
+        `second`; a joint back end uses `second` alone, so that each observation counts once. One that keeps all
+        observations may raise ContradictionError when its belief is asked for next: no estimate agrees with these.
         """
         ...
 

@@ -9,6 +9,7 @@ from sim.lidar import LidarConfig, RangeFinder, noisy
 from slam.association.recovery import RecoveryConfig
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
+from slam.estimation.backend import ContradictionError
 from slam.geometry.poses import compose, wrap
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -63,6 +64,27 @@ def test_a_turn_that_nobody_reported_is_found_at_the_next_scan(backend, turn_deg
     assert drive.off[1] < 0.5
     later = [drive.move(STEP).localisation for _ in range(5)]
     assert all(one.unstated_motion is None and not one.is_lost for one in later)
+
+
+@pytest.mark.parametrize("recovery", [RecoveryConfig(), None])
+def test_a_scan_with_which_no_estimate_agrees_is_left_out_and_the_next_is_taken_in(recovery, monkeypatch):
+    drive = Drive("graph", MapperConfig(recovery=recovery))
+    before = drive.updates[-1]
+
+    def contradicts(*_):
+        raise ContradictionError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(drive.mapper.backend, "update", contradicts)
+        left_out = drive.move(STEP)
+    assert left_out.localisation.is_lost
+    assert (left_out.walls_of_segments == -1).all()
+    np.testing.assert_array_equal(left_out.map.ids, before.map.ids)
+    np.testing.assert_array_equal(left_out.map.observations, before.map.observations)
+    after = drive.move(STEP)
+    assert not after.localisation.is_lost
+    assert (after.walls_of_segments >= 0).any()
+    assert drive.off[0] < 0.05
 
 
 def test_a_robot_taken_at_its_word_keeps_the_turn():

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from ...estimation.backend import Belief, Observations
+from ...estimation.backend import Belief, ContradictionError, Observations
 from ...estimation.models import initialise
 from ...geometry.poses import to_robot, to_world
 from ...robot import Odometry
@@ -30,7 +30,7 @@ FAULTS = (RuntimeError, ValueError, IndexError)
 
 
 class UnsolvableError(RuntimeError):
-    """No least-squares solution was found; what was last entered is taken out again, the rest holds."""
+    """There is no least-squares solution, not even without what was entered last: nothing can be entered any more."""
 
 
 class Graph:
@@ -61,7 +61,10 @@ class Graph:
 
     @property
     def belief(self) -> Belief:
-        """The estimate now; where no solution is left, the last one that held, without its joint covariance."""
+        """The estimate now; where no solution is left, the last one that held, without its joint covariance.
+
+        Raises ContradictionError where no least-squares solution agrees with what was entered since the last one.
+        """
         if self._is_lost and self._held is not None:
             return self._held
         if self._belief is None:
@@ -185,8 +188,8 @@ class Graph:
     def _settle(self) -> None:
         """Solve for all that was entered; where iSAM2 fails or goes astray, solve all of the record anew.
 
-        Raises UnsolvableError where that fails too: the observations since the last solution are then taken out, and
-        the graph is as it was before them.
+        Raises ContradictionError where that fails too: the observations since the last solution are then taken out,
+        and the graph is as it was before them.
         """
         if self._is_lost:
             raise UnsolvableError("expected a graph with a solution, found one that lost its last: begin a new one")
@@ -206,7 +209,7 @@ class Graph:
         except FAULTS:
             self._take_back(*start)
             words = " ".join(str(error).split()).partition(" Thrown when")[0]
-            raise UnsolvableError(
+            raise ContradictionError(
                 f"expected a least-squares solution of {len(start[0])} poses and {len(start[1])} lines, found"
                 f" {words}: the last scan is taken out again"
             ) from error
