@@ -24,6 +24,7 @@ from .map.chains import Chain
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
 from .map.vertices import mistaken, vertices_within
+from .map.wall_beams import beams_on_walls
 from .map_keeper import MapKeeper
 from .robot import Odometry, RobotError, Scan
 
@@ -246,15 +247,19 @@ class Mapper:
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
-        """Forget a wall that all scans together show to bend: its sides take its place.
+        """Forget a wall that all scans together show to bend, or to be two faces: these take its place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
-        beside the bend; all as it was, and none, while the scan shows a side too poorly.
+        beside a bend; all as it was, and none, while the scan shows a side of it too poorly.
         """
         change_points = self._keeper.landmarks.change_points
         if not self.config.vertices or self.config.change_points is None:
             return segments, matches, NONE
-        change_point = change_points.see(self.backend.belief, scan, segments, matches.pairs)
+        seen = beams_on_walls(self.backend.belief, scan, segments, matches.pairs, self.config.shared)
+        change_point, split = change_points.see(seen), self._keeper.split(seen)
+        if split is not None:
+            segments = self._segments(scan, split)
+            return segments, self._view(scan, segments, split).match_all(), NONE
         if change_point is None:
             return segments, matches, NONE
         walls = self._keeper.map()

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.visible_extent import beam_step
 from ..robot import Scan
-from .kernels.change_point_kernels import beams_on_lines, feet_along, places_between, surest, turns_of_beams
+from .kernels.change_point_kernels import places_between, surest, turns_of_beams
 from .records import Merger, Records
 from .vertices import LEAST_RAD
+from .wall_beams import WallBeams
 
 Sums = Float[np.ndarray, "2 p"]
 """At each place, information about by how much more the wall leads away beyond it, and that times so much."""
@@ -80,25 +80,22 @@ class ChangePoints:
         """Pairs of ids, the lower first, made of one bent wall: they are two, whatever their lines look like."""
         return {(min(pair), max(pair)) for pair in self._records.pairs["cut"]}
 
-    def see(self, belief: Belief, scan: Scan, segments: Segments, pairs: Int[np.ndarray, "m 2"]) -> ChangePoint | None:
-        """Add one scan, whose `pairs` are (segment, wall id); return the surest bend that it lies across, if any."""
-        config, walls = self._config, pairs[:, 1]
-        rows, lines = belief.rows(walls), segments.lines[pairs[:, 0]]
-        feet = feet_along(lines, belief.pose_world, belief.anchors[rows], belief.means[rows, 0])
-        beams = scan.bearings_rad, scan.ranges_m, np.ascontiguousarray(scan.sigmas_m)
-        met = beams_on_lines(segments.beams[pairs[:, 0]], lines, feet, *beams, float(config.shared.noise_sigmas))
-        place, place_of = places_between(met[0], met[3], float(config.pitch_m))
+    def see(self, seen: WallBeams) -> ChangePoint | None:
+        """Add one scan; return the surest bend that it lies across, if any."""
+        config = self._config
+        place, place_of = places_between(seen.along, seen.of, float(config.pitch_m))
         if not len(place):
             return None
         at = config.pitch_m * place
-        turns = turns_of_beams(*met, at, place_of, config.least_beams)
-        information, sums = self._add(walls, place, place_of, turns)
+        turns = turns_of_beams(seen.along, seen.across, seen.sigma, seen.of, at, place_of, config.least_beams)
+        information, sums = self._add(seen.walls, place, place_of, turns)
         best, turn, square = surest(information, sums, turns[0], LEAST_RAD)
         if square <= config.sigmas**2:
             return None
         row = place_of[best]
-        bearing = float(lines[row, 0] + np.arctan((at[best] - feet[row]) / lines[row, 1]))
-        segment, wall = pairs[row].tolist()
+        alpha, r = seen.lines[row].tolist()
+        bearing = float(alpha + np.arctan((at[best] - seen.feet[row]) / r))
+        wall, segment = int(seen.walls[row]), int(seen.segments[row])
         return ChangePoint(wall, segment, bearing, float(at[best]), turn, float(information[best] ** -0.5))
 
     def sides_of(

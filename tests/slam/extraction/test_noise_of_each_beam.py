@@ -12,7 +12,7 @@ from slam.extraction.segments import EndKind
 from slam.map.change_points import ChangePoints, ChangePointsConfig
 from slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
-from tests.slam.map.test_change_points import belief_of, random_poses
+from tests.slam.map.test_change_points import look, random_poses
 
 FAR = LidarConfig(beams=541, range_max_m=12.0, sigma_m=0.005, sigma_share=0.02)
 WALL = np.array([[[-2.0, 0.0], [9.0, 0.0]]])
@@ -84,8 +84,7 @@ def test_noise_that_grows_with_the_range_bends_no_wall():
         scan = Scan(finder.bearings_rad, measured, config.sigma_m, config.range_max_m, 0.1 * k, config.sigma_share)
         segments = extract(scan)
         rows = np.flatnonzero(~segments.is_tentative)
-        pairs = np.stack([rows, np.full(len(rows), 7)], axis=-1)
-        assert points.see(belief_of(pose), scan, segments, pairs) is None
+        assert look(points, pose, scan, segments, rows) is None
 
 
 @pytest.mark.parametrize("seed", range(12))

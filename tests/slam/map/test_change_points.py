@@ -7,11 +7,13 @@ from sim.lidar import LidarConfig, RangeFinder
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
 from slam.estimation.backend import Belief
+from slam.estimation.shared import SharedConfig
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
 from slam.map.change_points import ChangePoint, ChangePoints, ChangePointsConfig
 from slam.map.kernels.change_point_kernels import beams_on_lines, feet_along, places_between, surest, turns_of_beams
 from slam.map.records import Records
+from slam.map.wall_beams import beams_on_walls
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 
@@ -44,9 +46,13 @@ def seen(change_points, pose, scan):
     """Show a scan to the sums, every segment of five beams or more as one of the wall; return its segments, too."""
     segments = extract(scan)
     rows = np.flatnonzero(~segments.is_tentative)
-    return segments, change_points.see(
-        belief_of(pose), scan, segments, np.stack([rows, np.full(len(rows), WALL)], axis=-1)
-    )
+    return segments, look(change_points, pose, scan, segments, rows)
+
+
+def look(change_points, pose, scan, segments, rows):
+    """Show some of a scan's segments to the sums, as parts of the wall."""
+    pairs = np.stack([rows, np.full(len(rows), WALL)], axis=-1)
+    return change_points.see(beams_on_walls(belief_of(pose), scan, segments, pairs, SharedConfig()))
 
 
 def random_poses(rng, count):
@@ -136,7 +142,7 @@ def test_a_beam_of_the_next_face_at_a_straight_walls_end_is_no_bend():
         ranges = scan.ranges_m.copy()
         ranges[last] += 0.03
         taken = Scan(scan.bearings_rad, ranges, SIGMA_M, 4.0, 0.0)
-        found |= change_points.see(belief_of(pose), taken, segments, np.array([[0, WALL]])) is not None
+        found |= look(change_points, pose, taken, segments, np.array([0])) is not None
     assert not found
 
 
@@ -147,7 +153,7 @@ def test_a_bend_turns_by_more_than_every_real_wall_does_over_many_scans(turn_deg
     straight, bending = (next(scans(bent(np.deg2rad(turn)), [pose], None, 0.0)) for turn in (0.0, turn_deg))
     segments = extract(straight)
     for _ in range(1500):
-        found |= change_points.see(belief_of(pose), bending, segments, np.array([[0, WALL]])) is not None
+        found |= look(change_points, pose, bending, segments, np.array([0])) is not None
         if found:
             break
     assert found == is_bend
