@@ -6,9 +6,9 @@ from .association.matching import MatchingConfig
 from .association.recovery import RecoveryConfig
 from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
-from .map.change_points import ChangePointsConfig
 from .map.extents import WallsConfig
 from .map.merging import MergingConfig
+from .map.polylines.change_points import ChangePointsConfig
 from .robot import RobotSpec, fitted, of_robot
 
 

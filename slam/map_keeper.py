@@ -11,13 +11,13 @@ from .estimation.backend import Backend
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
 from .map.chains import Chain, connect
-from .map.change_points import ChangePointsConfig
 from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
+from .map.polylines.change_points import ChangePointsConfig
+from .map.polylines.vertices import meetings
+from .map.polylines.wall_beams import WallBeams
 from .map.stochastic_map import StochasticMap
-from .map.vertices import meetings
-from .map.wall_beams import WallBeams
 from .robot import Scan
 
 

@@ -21,10 +21,10 @@ from .extraction.extract import NO_VERTICES, extract
 from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
 from .map.chains import Chain
+from .map.polylines.vertices import mistaken, vertices_within
+from .map.polylines.wall_beams import beams_on_walls
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map.vertices import mistaken, vertices_within
-from .map.wall_beams import beams_on_walls
 from .map_keeper import MapKeeper
 from .robot import Odometry, RobotError, Scan
 
@@ -98,6 +98,7 @@ class Mapper:
         self._odometry = AT_REST
         self._chains: tuple[Chain, ...] = ()
         self._is_lost = False
+        self._left_out = 0
 
     @property
     def belief(self) -> Belief:
@@ -116,7 +117,10 @@ class Mapper:
         self.backend.predict(self._odometry)
 
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
-        """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up."""
+        """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up.
+
+        Raises ContradictionError where no estimate agrees with it, nor with the two that were to be taken in before.
+        """
         # 1. Extract features from the sensory input.
         segments, walls = self._features(scan)
         # 2 to 4. Match them, localise the robot, and match again.
@@ -135,8 +139,12 @@ class Mapper:
             self.backend.update(found.first, self._observed(matches, segments))
             _ = self.backend.belief  # A graph solves for the observations when it is asked.
         except ContradictionError:
+            self._left_out += 1
+            if self._left_out > self.config.shared.scans:
+                raise
             self._is_lost = self.config.recovery is not None  # Else nobody would look for its place.
             return self._nothing_taken_in(segments, self._keeper.map())
+        self._left_out = 0
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.

@@ -10,14 +10,14 @@ from ..estimation.backend import Belief
 from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
-from .change_points import ChangePoints, ChangePointsConfig
 from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
 from .openings import Openings
+from .polylines.change_points import ChangePoints, ChangePointsConfig
+from .polylines.splits import Split, Splits
+from .polylines.wall_beams import WallBeams
 from .records import Records
 from .reliability import Reliability
-from .splits import Split, Splits
 from .stochastic_map import StochasticMap
-from .wall_beams import WallBeams
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,25 @@ def test_a_scan_with_which_no_estimate_agrees_is_left_out_and_the_next_is_taken_
     assert drive.off[0] < 0.05
 
 
+def test_the_third_scan_in_turn_with_which_no_estimate_agrees_is_one_too_many(monkeypatch):
+    drive = Drive("graph")
+
+    def contradicts(*_):
+        raise ContradictionError
+
+    for _ in range(2):
+        with monkeypatch.context() as patch:
+            patch.setattr(drive.mapper.backend, "update", contradicts)
+            drive.move(STEP)
+            drive.move(STEP)
+        assert not drive.move(STEP).localisation.is_lost
+    monkeypatch.setattr(drive.mapper.backend, "update", contradicts)
+    drive.move(STEP)
+    drive.move(STEP)
+    with pytest.raises(ContradictionError):
+        drive.move(STEP)
+
+
 def test_a_robot_taken_at_its_word_keeps_the_turn():
     drive = Drive(config=MapperConfig(recovery=None))
     update = drive.move(STEP, [0.0, 0.0, np.deg2rad(20.0)])

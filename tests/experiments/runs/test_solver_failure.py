@@ -1,4 +1,4 @@
-"""A run whose estimator finds no solution any more ends as lost, with all that it has computed."""
+"""A run whose estimator finds no solution any more ends as failed, with all that it has computed."""
 
 import numpy as np
 import pytest
@@ -24,10 +24,10 @@ def test_a_run_that_no_solver_can_go_on_with_keeps_all_its_results(backend, monk
     monkeypatch.setattr(Isam, "push", fails)
     result = run_trial(TrialConfig("rooms", backend, seed=1, max_steps=200))
     assert result.summary["status"] == "failed"
-    assert result.summary["reason"].endswith("its scans contradict the map, and no place in it fits")
+    assert result.summary["reason"].startswith("ContradictionError: expected a least-squares solution of")
     assert result.log is not None
     assert result.summary["steps"] == len(result.log) >= 10
-    assert result.summary["lost_steps"] > 10
+    assert result.summary["lost_steps"] >= 2
     assert result.summary["pose_anees"] > 0.0
     assert result.summary["lines"] > 0
     assert len(result.scenario.backend.belief.ids) > 0

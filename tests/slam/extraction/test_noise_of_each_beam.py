@@ -9,10 +9,10 @@ from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import beams_of_scan, extract, rules_of
 from slam.extraction.kernels.returns_kernels import returns_of, rolled
 from slam.extraction.segments import EndKind
-from slam.map.change_points import ChangePoints, ChangePointsConfig
+from slam.map.polylines.change_points import ChangePoints, ChangePointsConfig
 from slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
-from tests.slam.map.test_change_points import look, random_poses
+from tests.slam.map.polylines.test_change_points import look, random_poses
 
 FAR = LidarConfig(beams=541, range_max_m=12.0, sigma_m=0.005, sigma_share=0.02)
 WALL = np.array([[[-2.0, 0.0], [9.0, 0.0]]])

@@ -10,9 +10,9 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.extract import extract
 from slam.extraction.segments import EndKind
 from slam.geometry.lines import normals, through
-from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
+from slam.map.polylines.change_points import ChangePointsConfig
 from slam.robot import Scan
 
 SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from slam.estimation.backend import Belief, Joint
 from slam.extraction.segments import EndKind, Segments
 from slam.geometry.lines import directions, normals
-from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
+from slam.map.polylines.change_points import ChangePointsConfig
 from slam.map.records import Records
 from slam.map.reliability import Reliability
 

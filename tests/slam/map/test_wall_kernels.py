@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from slam.geometry.poses import to_world, wrap
 from slam.map.kernels.merging_kernels import lying_along
-from slam.map.kernels.vertex_kernels import Bounds, bends, laid_across, on_segments
 from slam.map.kernels.wall_kernels import distances, ends_world
+from slam.map.polylines.kernels.vertex_kernels import Bounds, bends, laid_across, on_segments
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

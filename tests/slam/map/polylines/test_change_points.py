@@ -10,10 +10,16 @@ from slam.estimation.backend import Belief
 from slam.estimation.shared import SharedConfig
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
-from slam.map.change_points import ChangePoint, ChangePoints, ChangePointsConfig
-from slam.map.kernels.change_point_kernels import beams_on_lines, feet_along, places_between, surest, turns_of_beams
+from slam.map.polylines.change_points import ChangePoint, ChangePoints, ChangePointsConfig
+from slam.map.polylines.kernels.change_point_kernels import (
+    beams_on_lines,
+    feet_along,
+    places_between,
+    surest,
+    turns_of_beams,
+)
+from slam.map.polylines.wall_beams import beams_on_walls
 from slam.map.records import Records
-from slam.map.wall_beams import beams_on_walls
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ..estimation.backend import POSE, Belief, Joint
-from ..estimation.gates import gate_level
-from ..estimation.models import lines_robot
-from ..geometry.lines import directions, normals
-from ..geometry.matrix_kernels import wrapped
-from ..geometry.poses import to_robot
-from .extents import WallsConfig
+from ...estimation.backend import POSE, Belief, Joint
+from ...estimation.gates import gate_level
+from ...estimation.models import lines_robot
+from ...geometry.lines import directions, normals
+from ...geometry.matrix_kernels import wrapped
+from ...geometry.poses import to_robot
+from ..extents import WallsConfig
+from ..records import Records
 from .kernels.split_kernels import Bins, Fit, best_split, binned, fitted, placed
-from .records import Records
 from .wall_beams import WallBeams
 
 

@@ -11,14 +11,14 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..estimation.gates import gate_level
-from ..estimation.shared import SharedConfig
-from ..extraction.segments import Segments
-from ..geometry.lines import directions
+from ...estimation.gates import gate_level
+from ...estimation.shared import SharedConfig
+from ...extraction.segments import Segments
+from ...geometry.lines import directions
+from ..merging import same_line
+from ..stochastic_map import StochasticMap
 from .kernels import vertex_kernels
 from .kernels.vertex_kernels import Bends, Bounds
-from .merging import same_line
-from .stochastic_map import StochasticMap
 
 LEAST_RAD = float(np.deg2rad(0.2))
 """Smaller turns are no bends: over thousands of beams every real wall shows one, and walls that overlap may be one that

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..estimation.shared import SharedConfig, of_shared
-from ..extraction.segments import Segments
-from ..extraction.visible_extent import beam_step
-from ..robot import Scan
+from ...estimation.shared import SharedConfig, of_shared
+from ...extraction.segments import Segments
+from ...extraction.visible_extent import beam_step
+from ...robot import Scan
+from ..records import Merger, Records
 from .kernels.change_point_kernels import places_between, surest, turns_of_beams
-from .records import Merger, Records
 from .vertices import LEAST_RAD
 from .wall_beams import WallBeams
 

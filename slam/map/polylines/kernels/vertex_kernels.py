@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...geometry.compiled import compiled
-from ...geometry.matrix_kernels import wrapped
+from ....geometry.compiled import compiled
+from ....geometry.matrix_kernels import wrapped
 
 
 class Bends(NamedTuple):

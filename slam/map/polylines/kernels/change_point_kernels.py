@@ -5,8 +5,8 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
-from ...geometry.compiled import compiled
-from ...geometry.numerics import TINY
+from ....geometry.compiled import compiled
+from ....geometry.numerics import TINY
 
 
 @compiled

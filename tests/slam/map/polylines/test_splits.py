@@ -13,13 +13,13 @@ from slam.estimation.backend import Belief, Joint
 from slam.estimation.shared import SharedConfig
 from slam.extraction.extract import extract
 from slam.geometry.poses import compose, inverse
-from slam.map.change_points import ChangePointsConfig
 from slam.map.extents import WallsConfig
-from slam.map.kernels.split_kernels import best_split, binned, fitted, placed
 from slam.map.landmarks import Landmarks
+from slam.map.polylines.change_points import ChangePointsConfig
+from slam.map.polylines.kernels.split_kernels import best_split, binned, fitted, placed
+from slam.map.polylines.splits import Splits
+from slam.map.polylines.wall_beams import beams_on_walls
 from slam.map.records import Records
-from slam.map.splits import Splits
-from slam.map.wall_beams import beams_on_walls
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from ...geometry.compiled import compiled
+from ....geometry.compiled import compiled
 
 Bins = Float[np.ndarray, "5 p"]
 """Sums over the beams in each piece of a wall: weights, these by along, by across, by across squared; and the count."""

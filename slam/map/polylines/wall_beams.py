@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..estimation.backend import Belief
-from ..estimation.shared import SharedConfig
-from ..extraction.segments import Segments
-from ..robot import Scan
+from ...estimation.backend import Belief
+from ...estimation.shared import SharedConfig
+from ...extraction.segments import Segments
+from ...robot import Scan
 from .kernels.change_point_kernels import beams_on_lines, feet_along
 
 

@@ -1,0 +1,1 @@
+"""What scans say of bends and steps, in compiled loops."""
