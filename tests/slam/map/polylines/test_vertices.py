@@ -9,7 +9,7 @@ from slam.estimation.backend import Belief, Joint
 from slam.extraction.segments import Segments
 from slam.geometry.lines import directions, through
 from slam.geometry.poses import to_robot, to_world
-from slam.map import vertices
+from slam.map.polylines import vertices
 from slam.map.stochastic_map import StochasticMap
 
 POSE = np.array([1.0, 2.0, 0.7])
