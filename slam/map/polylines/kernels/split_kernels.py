@@ -102,10 +102,13 @@ def fitted(bins: Bins, first: int, last: int, off_m: float) -> Fit:
 def best_split(bins: Bins, first: int, last: int, reach: int, least: int) -> tuple[int, float]:
     """Return before which piece from `first` to before `last` two lines fit better than one, and by how much.
 
-    In chi-square, over at most `reach` pieces on either side of it, of which `least` hold beams.
+    In chi-square, over at most `reach` pieces on either side of it, of which `least` hold beams; one of the sides ends
+    within `reach`.
     """
     best, most = first, 0.0
     for at in range(first + least, last - least + 1):
+        if min(at - first, last - at) > reach:
+            continue
         start, stop = max(at - reach, first), min(at + reach, last)
         if min(_held(bins, start, at), _held(bins, at, stop)) >= least:
             two = fitted(bins, start, at, 0.0).chi_square + fitted(bins, at, stop, 0.0).chi_square

@@ -16,8 +16,8 @@ from slam.geometry.poses import compose, inverse
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
 from slam.map.polylines.change_points import ChangePointsConfig
-from slam.map.polylines.kernels.split_kernels import best_split, binned, fitted, placed
-from slam.map.polylines.splits import Splits
+from slam.map.polylines.kernels.split_kernels import Fit, best_split, binned, fitted, placed
+from slam.map.polylines.splits import Split, Splits
 from slam.map.polylines.wall_beams import beams_on_walls
 from slam.map.records import Records
 from slam.mapper import Mapper
@@ -122,10 +122,20 @@ def test_the_best_split_is_that_of_all_that_may_be(seed):
     gains = {}
     for at in range(3, 12):
         start, stop = max(at - 4, 1), min(at + 4, 13)
-        if min(np.count_nonzero(weight[start:at]), np.count_nonzero(weight[at:stop])) >= 2:
+        if (
+            min(at - 1, 13 - at) <= 4
+            and min(np.count_nonzero(weight[start:at]), np.count_nonzero(weight[at:stop])) >= 2
+        ):
             gains[at] = chi_square(start, stop) - chi_square(start, at) - chi_square(at, stop)
     best = max(gains, key=gains.get)
     assert best_split(bins, 1, 13, 4, 2) == pytest.approx((best, gains[best]))
+
+
+def test_between_two_long_faces_no_step_is_sought():
+    s = np.arange(20) + 0.5
+    bins = np.stack([np.ones(20), s, 9.0 * (s > 10.0), 81.0 * (s > 10.0), np.ones(20)])
+    assert best_split(bins, 0, 20, 10, 2)[0] == 10
+    assert best_split(bins, 0, 20, 6, 2)[0] != 10
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -281,3 +291,57 @@ def level(walls):
     """Return which walls are those of the faces."""
     near = np.abs(walls.ends_world.mean(axis=1)).max(axis=1) < 0.5
     return near & (np.abs(np.sin(walls.belief.means[:, 0])) > 0.9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_how_far_a_face_is_from_the_wall_is_what_plain_geometry_says(seed):
+    """By finite differences of the wall's state; seen from a reference line turned against both."""
+    rng, records = np.random.default_rng(seed), Records()
+    splits, anchor = Splits(WallsConfig(), records), rng.uniform(-2, 2, 2)
+    row = int(records.rows(np.array([WALL]))[0])
+    reference, wall = np.array([0.7, 0.01]), np.array([0.7 + rng.normal(0.0, 0.01), rng.normal(0.0, 0.01)])
+    records.columns["reference"][row] = reference
+    root = rng.normal(0.0, 1.0, (5, 5)) * np.array([0.01, 0.01, 0.002, 0.002, 0.001])[:, None]
+    joint, off_line = root @ root.T, np.diag([1e-6, 1e-6])
+    belief = Belief(
+        np.zeros(3), joint[:3, :3], np.array([WALL]), anchor[None], wall[None],
+        lambda ids: Joint(np.zeros(5), joint, anchor[None]),
+    )  # fmt: skip
+    fit = Fit(rng.uniform(-0.4, 0.4), rng.normal(0.0, 0.01), rng.normal(0.0, 0.02), 1e-6, 1e-4, 1.0, 9.0)
+    t, n = np.array([-np.sin(0.7), np.cos(0.7)]), np.array([np.cos(0.7), np.sin(0.7)])
+    middle = fit.along * t + (fit.across + reference[1]) * n
+    ahead = t + fit.slope * n
+
+    def off(state):
+        normal = np.array([np.cos(state[0]), np.sin(state[0])])
+        return np.array([np.arctan2(-ahead[0], ahead[1]) - state[0], normal @ middle - state[1]])
+
+    J = np.stack([(off(wall + step) - off(wall - step)) / 2e-6 for step in 1e-6 * np.eye(2)], axis=-1)
+    given = joint[3:, 3:] - joint[3:, :3] @ np.linalg.inv(joint[:3, :3]) @ joint[:3, 3:]
+    cov = J @ (given + off_line) @ J.T + np.diag([fit.slope_var, fit.across_var])
+    expected = off(wall) @ np.linalg.inv(cov) @ off(wall)
+    assert splits._squares(belief, row, [fit], lambda _: off_line) == pytest.approx([expected], rel=0.02)
+
+
+def test_faces_are_as_long_and_exist_as_surely_as_the_wall_and_may_be_off_as_any():
+    landmarks = Landmarks(WallsConfig(), ChangePointsConfig(), SURE)
+    row = landmarks.records.rows(np.array([WALL]))
+    landmarks.records.columns["log_odds"][row] = 7.0
+    extents, ids = np.array([[-0.1, 0.2], [-0.3, 0.1]]), np.array([8, 9])
+    landmarks.split(Split(WALL, np.zeros((2, 2)), np.zeros((2, 2, 2)), np.zeros((2, 2)), extents), ids)
+    rows = landmarks.records.rows(ids)
+    np.testing.assert_array_equal(landmarks.records.columns["log_odds"][rows], [7.0, 7.0])
+    np.testing.assert_allclose(landmarks.records.columns["longest"][rows], [[0.3, 0.3], [0.4, 0.4]])
+    np.testing.assert_array_equal(landmarks.records.columns["extents"][rows], extents)
+
+
+def test_no_number_of_scans_makes_a_piece_of_a_face_known_to_better_than_any_wall_is():
+    """Also where ranges are exact; a face has six pieces at most that count."""
+    config, line = WallsConfig(), line_through(0.02)
+    least = []
+    for edge_m in (config.reliability.edge_m, 1e-6):
+        rng = np.random.default_rng(0)
+        rough = replace(config, reliability=replace(config.reliability, edge_m=edge_m))
+        _, split = first_split(stepped(0.02), random_poses(rng, 600), rng, *line, rough)
+        least.append(np.sqrt(split.cov[:, 0, 0].min()))
+    assert least[0] > 1.1 * least[1]
