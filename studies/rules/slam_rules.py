@@ -77,6 +77,8 @@ BENDS = (
            "None", "walls that all scans together show to be two faces are split"),
     Switch("splits.two", "slam.map.polylines.splits", "if «gain <= self._level»:",
            "False", "two lines surely fit better than one"),
+    Switch("splits.short", "slam.map.polylines.kernels.split_kernels", "if «min(at - first, last - at) > reach»:",
+           "False", "one of the faces is short"),
     Switch("splits.explained", "slam.map.polylines.splits",
            "if «sum(face.chi_square for face in faces) > gate_level(1.0 - shared.chance, max(beams - 4, 1))»:",
            "False", "the beams of all scans lie on the two lines"),
