@@ -19,7 +19,7 @@ from ...robot import Scan
 from ..records import Merger, Records
 from .kernels.change_point_kernels import places_between, surest, turns_of_beams
 from .vertices import LEAST_RAD
-from .wall_beams import WallBeams
+from .wall_beams import WallBeams, with_more
 
 Sums = Float[np.ndarray, "2 p"]
 """At each place, information about by how much more the wall leads away beyond it, and that times so much."""
@@ -136,14 +136,8 @@ class ChangePoints:
     def _add_to(self, row: int, first: int, terms: Sums) -> Sums:
         """Add to a wall's sums from its place `first` on; return what they are there now."""
         turns = self._records.columns["turns"]
-        begin, sums = turns[row] or (first, terms[:, :0])
-        before, after = max(begin - first, 0), max(first + terms.shape[1] - begin - sums.shape[1], 0)
-        if before or after:
-            begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
-            turns[row] = begin, sums
-        now = sums[:, first - begin : first - begin + terms.shape[1]]
-        now += terms
-        return now
+        begin, sums = turns[row] = with_more(turns[row], first, terms)
+        return sums[:, first - begin : first - begin + terms.shape[1]]
 
     def keep_apart(self, one: int, other: int) -> None:
         """Take note that two walls are the sides of a bend."""

@@ -21,7 +21,7 @@ from ...geometry.poses import to_robot
 from ..extents import WallsConfig
 from ..records import Records
 from .kernels.split_kernels import Bins, Fit, best_split, binned, fitted, placed
-from .wall_beams import WallBeams
+from .wall_beams import WallBeams, with_more
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,7 @@ class Splits:
     def _add(self, row: int, first: int, more: Bins) -> None:
         """Add to a wall's sums from its piece `first` on."""
         bins = self._records.columns["bins"]
-        begin, sums = bins[row] or (first, more[:, :0])
-        before, after = max(begin - first, 0), max(first + more.shape[1] - begin - sums.shape[1], 0)
-        if before or after:
-            begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
-            bins[row] = begin, sums
-        sums[:, first - begin : first - begin + more.shape[1]] += more
+        bins[row] = with_more(bins[row], first, more)
 
     def _sides(
         self, belief: Belief, row: int, off_line_cov: Callable[[int], Float[np.ndarray, "2 2"]]

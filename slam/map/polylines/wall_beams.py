@@ -11,6 +11,9 @@ from ...extraction.segments import Segments
 from ...robot import Scan
 from .kernels.change_point_kernels import beams_on_lines, feet_along
 
+Sums = tuple[int, Float[np.ndarray, "q _"]]
+"""The number of the first place along a wall, and q sums of each from there on."""
+
 
 @dataclass(frozen=True)
 class WallBeams:
@@ -43,3 +46,13 @@ def beams_on_walls(
     beams = scan.bearings_rad, scan.ranges_m, np.ascontiguousarray(scan.sigmas_m)
     met = beams_on_lines(segments.beams[pairs[:, 0]], lines, feet, *beams, float(shared.noise_sigmas))
     return WallBeams(pairs[:, 0], pairs[:, 1], lines, feet, *met)
+
+
+def with_more(kept: Sums | None, first: int, more: Float[np.ndarray, "q _"]) -> Sums:
+    """Return sums at places along a wall, and the number of the first; `more` are of those from `first` on."""
+    begin, sums = kept or (first, more[:, :0])
+    before, after = max(begin - first, 0), max(first + more.shape[1] - begin - sums.shape[1], 0)
+    if before or after:
+        begin, sums = begin - before, np.pad(sums, ((0, 0), (before, after)))
+    sums[:, first - begin : first - begin + more.shape[1]] += more
+    return begin, sums
