@@ -320,7 +320,8 @@ def test_how_far_a_face_is_from_the_wall_is_what_plain_geometry_says(seed):
     given = joint[3:, 3:] - joint[3:, :3] @ np.linalg.inv(joint[:3, :3]) @ joint[:3, 3:]
     cov = J @ (given + off_line) @ J.T + np.diag([fit.slope_var, fit.across_var])
     expected = off(wall) @ np.linalg.inv(cov) @ off(wall)
-    assert splits._squares(belief, row, [fit], lambda _: off_line) == pytest.approx([expected], rel=0.02)
+    stated = splits._stated(belief, row, lambda _: off_line)
+    assert splits._squares(belief, row, [fit], stated) == pytest.approx([expected], rel=0.02)
 
 
 def test_faces_are_as_long_and_exist_as_surely_as_the_wall_and_may_be_off_as_any():
