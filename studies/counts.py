@@ -6,6 +6,7 @@
 
 import ast
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -178,12 +179,21 @@ def arrows(rooms: tuple[str, ...] = ROOMS) -> dict[str, tuple[int, int]]:
 
 def page(numbers: Iterable[Number]) -> str:
     """Return a page in Markdown: the numbers of each file, with their values and what they are."""
-    lines = [PREFACE]
+    numbers = list(numbers)
+    lines = [PREFACE, "| folder | numbers |", "|---|---|"]
+    lines += [f"| `{folder}/` | {count} |" for folder, count in by_folder(numbers).items()]
+    lines.append("")
     for file, own in groupby(numbers, lambda each: each.file):
         lines += [f"## `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
         lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in own]
         lines.append("")
     return "\n".join(lines)
+
+
+def by_folder(numbers: Iterable[Number]) -> dict[str, int]:
+    """Return how many numbers that one may tune each folder has; those of compiled loops count where these are used."""
+    folders = (Path(each.file).parent for each in numbers if each.kind != "layout")
+    return dict(Counter((each.parent if each.name == "kernels" else each).as_posix() for each in folders))
 
 
 def _cell(text: str) -> str:

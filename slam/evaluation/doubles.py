@@ -8,9 +8,11 @@ from ..geometry.numerics import TINY
 from ..geometry.poses import wrap
 
 TURN_RAD = float(np.deg2rad(5.0))
+"""Lines that differ by more in direction are two walls."""
 APART_M = 0.2
 """Farther apart than this, two lines that face one way may well be two walls, as those of a niche."""
 OVERLAP_M = 0.2
+"""Along less than this, an end that was seen too long may overlap the next wall."""
 
 
 def doubles(ends_world: Float[np.ndarray, "n 2 2"]) -> list[tuple[int, int]]:

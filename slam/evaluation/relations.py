@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from ..geometry.poses import wrap
 
 SAME_TIME_S = 0.01
+"""Times that differ by less are of one scan."""
 FAR_S = 60.0
 """Relations over so long a time say how well a map comes together; shorter ones tell of the odometry."""
 

@@ -9,6 +9,7 @@ from ..geometry.poses import wrap
 from .surface_kernels import Buckets, normal_equations
 
 ROUNDS = 5
+"""No more rounds are made, so that no search takes long."""
 STILL_M = 1e-4
 """A round that moves less is the last one."""
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from studies.counts import LAYOUT, arrows, entries, tunable
+from studies.counts import LAYOUT, arrows, by_folder, entries, tunable
 
 CODE = '''
 """A file."""
@@ -70,6 +70,13 @@ def test_numbers_that_one_may_tune_are_settings_constants_and_sides_of_compariso
         ("x < -9.0", "9.0", "literal", ""),
         ("nearly = 0.5 * max(x, 0.001)", "0.001", "literal", ""),
     ]
+
+
+def test_numbers_of_compiled_loops_count_where_these_are_used(root):
+    loops = root / "slam" / "map" / "kernels"
+    loops.mkdir()
+    (loops / "sums.py").write_text("LEAST = 3\nPOSE = 3\n")
+    assert by_folder(tunable(root)) == {"slam/map": 8}
 
 
 def test_what_is_no_choice_is_a_constant_of_the_product(request):

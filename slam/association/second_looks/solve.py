@@ -14,6 +14,7 @@ from .config import SecondLooksConfig
 from .landmarks import Sightings
 
 START_SIGMA = 1e-6
+"""The first pose is the origin of the map, and is held there (m and rad)."""
 STILL = 1e-5
 """A round that changes no variable by more is the last one."""
 
