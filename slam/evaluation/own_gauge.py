@@ -51,18 +51,19 @@ def own_gauge(
     walls = (means, anchors_world, true_lines_world, np.linalg.inv(np.linalg.cholesky(cov)))
     turn = float(np.angle(np.mean(np.exp(1j * (means[:, 0] - true_lines_world[:, 0])))))
     start = np.array([0.0, 0.0, turn])
-    start[:2] = np.linalg.lstsq(_by_frame(start, *walls)[:, :2], _off(start, *walls), rcond=None)[0]
+    by_shift = _by_motion(true_lines_world[:, 0] + turn, anchors_world, walls[-1])[:, :2]
+    start[:2] = np.linalg.lstsq(by_shift, _off(start, *walls), rcond=None)[0]
     if len(means) > 1:
         start = _nearest_frame(start, *walls)
     frame = np.array([start[0], start[1], wrap(start[2])])
-    error, by_frame = _off(frame, *walls), _by_frame(frame, *walls)
-    about_origin = by_frame.copy()
-    about_origin[:, 2] += by_frame[:, :2] @ (J @ frame[:2])  # a further turn of the world carries the shift along
-    xi = about_origin @ pose_errors(frame[None], np.zeros((1, 3)))[0]
-    rank = int(np.linalg.matrix_rank(by_frame))
+    error = _off(frame, *walls)
+    rank = np.linalg.matrix_rank(_by_motion(true_lines_world[:, 0] + frame[2], anchors_world - frame[:2], walls[-1]))
+    # The covariance is stated where the walls are estimated. At the moved truth, millimetres beside, a heading that is
+    # known to ten degrees would seem to be known to a twentieth of one.
+    xi = _by_motion(means[:, 0], anchors_world, walls[-1]) @ pose_errors(frame[None], np.zeros((1, 3)))[0]
     middle = anchors_world.mean(axis=0)
     shift_m = float(np.hypot(*(middle - to_robot(middle, frame))))
-    return OwnGauge(float(error @ error), len(error) - rank, frame, shift_m, float(xi @ xi))
+    return OwnGauge(float(error @ error), len(error) - int(rank), frame, shift_m, float(xi @ xi))
 
 
 def _nearest_frame(
@@ -79,7 +80,7 @@ def _nearest_frame(
     walls = (means, anchors_world, true_lines_world, white)
     at, error, damping = start, _off(start, *walls), 1e-3
     while damping < DAMPING_MAX:
-        by_frame = _by_frame(at, *walls)
+        by_frame = _by_motion(true_lines_world[:, 0] + at[2], anchors_world - at[:2], white)
         damped = np.vstack([by_frame, np.diag(np.sqrt(damping) * np.linalg.norm(by_frame, axis=0))])
         step = np.linalg.lstsq(damped, np.append(error, np.zeros(3)), rcond=None)[0]
         new = _off(at + step, *walls)
@@ -105,17 +106,16 @@ def _off(
     return white @ error
 
 
-def _by_frame(
-    frame_world: Float[np.ndarray, "3"],
-    means: Float[np.ndarray, "m 2"],
-    anchors_world: Float[np.ndarray, "m 2"],
-    true_lines_world: Float[np.ndarray, "m 2"],
-    white: Float[np.ndarray, "s s"],
+def _by_motion(
+    alpha_rad: Float[np.ndarray, " m"], arms_m: Float[np.ndarray, "m 2"], white: Float[np.ndarray, "s s"]
 ) -> Float[np.ndarray, "s 3"]:
-    """Return how the truth moves, whitened, as a coordinate (x, y, turn) of the frame grows."""
-    n = normals(true_lines_world[:, 0] + frame_world[2])
-    by_frame = np.zeros((2 * len(means), 3))
-    by_frame[0::2, 2] = 1.0
-    by_frame[1::2, :2] = n
-    by_frame[1::2, 2] = np.vecdot(n, (anchors_world - frame_world[:2]) @ J.T)
-    return white @ by_frame
+    """Return how lines of these directions move, whitened, by a motion (x, y, turn) about the origin of the arms.
+
+    An arm leads to where a line's d is told, in world axes.
+    """
+    n = normals(alpha_rad)
+    by_motion = np.zeros((2 * len(n), 3))
+    by_motion[0::2, 2] = 1.0
+    by_motion[1::2, :2] = n
+    by_motion[1::2, 2] = np.vecdot(n, arms_m @ J.T)
+    return white @ by_motion

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
@@ -107,6 +108,23 @@ def test_errors_as_stated_are_chi_square_however_little_is_known_of_the_frame():
         framed.append(found.frame_squared)
     low, high = chi2.ppf([0.001, 0.999], 200 * found.dof) / 200
     assert low < np.mean(values) < high
+    low, high = chi2.ppf([0.001, 0.999], 200 * 3) / 200
+    assert low < np.mean(framed) < high
+
+
+def test_a_frame_that_is_known_to_metres_and_ten_degrees_errs_as_stated():
+    """The covariance has millimetres for the shape: beside the true walls, what it leaves free is no common motion."""
+    rng = np.random.default_rng(8)
+    anchors, true, _ = walls_of(rng, count=20)
+    sigmas, framed = np.array([2.0, 3.0, 0.2]), []
+    for _ in range(200):
+        xi = sigmas * rng.normal(size=3)
+        motion = expm(np.array([[0.0, -xi[2], xi[0]], [xi[2], 0.0, xi[1]], [0.0, 0.0, 0.0]]))
+        there, means = moved(anchors, means_of(true, anchors), motion[:2, 2], xi[2])
+        means = means + 0.003 * rng.normal(size=means.shape)
+        common = motion_of_everything(means[:, 0], there)
+        stated = 0.003**2 * np.eye(2 * len(true)) + common @ np.diag(sigmas**2) @ common.T
+        framed.append(own_gauge(means, stated, there, true).frame_squared)
     low, high = chi2.ppf([0.001, 0.999], 200 * 3) / 200
     assert low < np.mean(framed) < high
 
