@@ -123,7 +123,8 @@ def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a single step: null for all that was not measured."""
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
-        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches merges"
+        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches"
+        " false_matches_few_beams merges"
         " nis nis_in_band unstated_motions lost_steps wheel_noise_factor"
         " false_merges return_to_start certificate step_ms planning_ms"
     )

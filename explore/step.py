@@ -33,7 +33,8 @@ class Step:
     segments: Segments
     matches: Matches
     walls_of_segments: Int[np.ndarray, " s"]
-    """For each segment the id of the wall that it was fused into or began; -1 where it was not used."""
+    """For each segment the id of the wall that it was fused into or began; -1 where it was not used, or has few beams:
+    `matches` has these."""
     map: StochasticMap
     """`map.belief.pose_world` is the estimate available at this step; `belief.joint` answers only until the next."""
     chains: tuple[Chain, ...]

@@ -41,7 +41,8 @@ class MapUpdate:
     segments: Segments
     matches: Matches
     walls_of_segments: Int[np.ndarray, " s"]
-    """For each segment the id of the wall that it was fused into or began; -1 where it was not used."""
+    """For each segment the id of the wall that it was fused into or began; -1 where it was not used, or has few beams:
+    `matches` has these."""
     map: StochasticMap
     chains: tuple[Chain, ...]
     merged: tuple[tuple[int, int], ...]

@@ -14,6 +14,7 @@ from .truth import Truth
 
 OVERLAP_M = 0.2
 """Two lines of one wall that overlap over this length are one too many."""
+NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 
 @dataclass
@@ -25,17 +26,32 @@ class Votes:
     """For each line id ever fused, the number of its beams from each face."""
     fused: list[tuple[int, int]] = field(default_factory=list)
     """(line id, true wall) of each segment fused, `UNLABELLED` where its beams came from several walls."""
+    fused_of_few_beams: list[tuple[int, int]] = field(default_factory=list)
+    """The same of segments of few beams: they move the estimate, but say of no line which wall it is."""
     merges: int = 0
     false_merges: int = 0
     """Of these, lines labelled with two different walls."""
 
-    def add(self, segments: Segments, owners: Int[np.ndarray, " s"], face_of_beam: Int[np.ndarray, " k"]) -> None:
-        """Count the beams of the segments of one scan; `owners` holds line ids, -1 where one was not used."""
+    def add(
+        self,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        face_of_beam: Int[np.ndarray, " k"],
+        matched: Int[np.ndarray, "m 2"] = NO_PAIRS,
+    ) -> None:
+        """Count the beams of the segments of one scan.
+
+        `owners` holds line ids, -1 where a segment was not used or has few beams. `matched` are all pairs
+        (segment, line id) that moved the estimate, those of few beams among them.
+        """
         count = len(self.truth.faces)
         for row in np.flatnonzero(owners >= 0):
             told, owner = vote(segments.beams[row].tolist(), face_of_beam, self.truth.walls), int(owners[row])
             np.add.at(self.beams.setdefault(owner, np.zeros(count, dtype=np.int64)), told.faces, 1)
             self.fused.append((owner, told.wall))
+        for row, line in matched[owners[matched[:, 0]] < 0].tolist():
+            wall = vote(segments.beams[row].tolist(), face_of_beam, self.truth.walls).wall
+            self.fused_of_few_beams.append((line, wall))
 
     def merge(self, keep: int, drop: int) -> None:
         """Count the beams of two lines as one line's from now on, under both ids: the map has made them one."""
@@ -68,9 +84,17 @@ class Votes:
 
     def false_matches(self) -> int:
         """Return how many segments seen on one wall were fused into a line labelled with another."""
+        return self._false(self.fused) + self.false_matches_few_beams()
+
+    def false_matches_few_beams(self) -> int:
+        """Return how many of these segments have few beams."""
+        return self._false(self.fused_of_few_beams)
+
+    def _false(self, fused: list[tuple[int, int]]) -> int:
         ids = np.array(sorted(self.beams), dtype=np.int64)
         label = dict(zip(ids.tolist(), self.walls_of(ids).tolist(), strict=True))
-        return sum(wall not in (UNLABELLED, label[owner]) for owner, wall in self.fused)
+        # A line that took the place of another has no beams of its own until it is seen again.
+        return sum(UNLABELLED not in (wall, of := label.get(line, UNLABELLED)) and wall != of for line, wall in fused)
 
 
 def duplicate_lines(walls: StochasticMap, labels: Int[np.ndarray, " n"], among: Bool[np.ndarray, " n"]) -> int:

@@ -157,7 +157,7 @@ class Recorder:
             self.sketches.append(_sketch(step))
         for keep, drop in step.merged:
             self.votes.merge(keep, drop)
-        self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1])
+        self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1], step.matches.pairs)
         self._reasons.append(sys.intern(step.decision.words))
         self._columns.append(
             {

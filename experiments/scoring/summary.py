@@ -197,6 +197,7 @@ def _map_scores(
         "map_anees_straight": None if errorless or straight is None else straight.anees,
         "duplicate_lines": duplicate_lines(walls, labels, established),
         "false_matches": votes.false_matches(),
+        "false_matches_few_beams": votes.false_matches_few_beams(),
         "merges": votes.merges,
         "false_merges": votes.false_merges,
         "distances": label_distances(corners(walls, step.chains), scenario.world.labels, to_true, joint),

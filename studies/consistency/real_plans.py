@@ -43,7 +43,10 @@ KEPT = (
     "map_frame_rad",
     "pose_rmse_m",
 )
-COUNTED = ("false_matches", "duplicate_lines", "false_merges", "merges", "lines", "lines_crooked", "coverage")
+COUNTED = (
+    *("false_matches", "false_matches_few_beams", "duplicate_lines", "false_merges"),
+    *("merges", "lines", "lines_crooked", "coverage"),
+)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from .rows import Row
 SCORES = (
     *("status", "reason", "steps", "path_length_m", "coverage", "contours_closed", "contours_reachable", "collisions"),
     *("pose_anees", "map_anees", "pose_rmse_m", "wall_rmse_m", "wall_shape_m", "duplicate_lines", "merges"),
-    *("false_merges", "false_matches", "matches_true", "matches_missed", "matches_false"),
+    *("false_merges", "false_matches", "false_matches_few_beams", "matches_true", "matches_missed", "matches_false"),
 )
 
 

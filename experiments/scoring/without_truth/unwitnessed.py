@@ -14,7 +14,7 @@ from slam.evaluation.doubles import doubles
 from slam.extraction.segments import Segments
 
 from ...scenario import Scenario
-from ..association import Votes
+from ..association import NO_PAIRS, Votes
 from ..innovations import innovation_scores
 from ..records import Log
 from ..summary import Ending, run_keys, spread_ms
@@ -23,8 +23,8 @@ from ..truth import Truth
 WITNESSED = (
     "path_length_true_m coverage coverage_own_frame coverage_curve contours_closed contours_reachable swept"
     " pose_rmse_m heading_rmse_rad odometry_rmse_m odometry_max_m odometry_end_m pose_anees pose_nees_in_band map_anees"
-    " map_anees_straight map_frame_anees map_frame_m map_frame_rad lines_unlabelled false_matches false_merges"
-    " collisions map_began_step return_to_start"
+    " map_anees_straight map_frame_anees map_frame_m map_frame_rad lines_unlabelled false_matches"
+    " false_matches_few_beams false_merges collisions map_began_step return_to_start"
 )
 """The keys of summary.json that only the truth tells."""
 
@@ -44,7 +44,13 @@ def no_truth(world: World) -> Truth:
 class NoVotes(Votes):
     """Counts merges; no beam tells which wall it met."""
 
-    def add(self, segments: Segments, owners: Int[np.ndarray, " s"], face_of_beam: Int[np.ndarray, " k"]) -> None:
+    def add(
+        self,
+        segments: Segments,
+        owners: Int[np.ndarray, " s"],
+        face_of_beam: Int[np.ndarray, " k"],
+        matched: Int[np.ndarray, "m 2"] = NO_PAIRS,
+    ) -> None:
         """Count nothing."""
 
     def merge(self, keep: int, drop: int) -> None:

@@ -74,6 +74,23 @@ def test_votes_and_labels_are_those_of_plain_loops(truth, seed):
     assert votes.false_matches() == sum(wall not in (UNLABELLED, labels[line]) for line, wall in fused)
 
 
+def test_segments_of_few_beams_that_moved_the_estimate_are_matches_and_say_nothing_of_a_line(truth):
+    """A line is of wall 0 by its segments; of its few beams some came from there, some from wall 2."""
+    votes = Votes(truth)
+    face_of_beam = np.repeat([0, 3, 2, 0], 10)
+    spans = [(0, 9), (10, 12), (20, 22), (30, 32), (18, 21)]
+    votes.add(segments_of(spans), np.array([5, -1, -1, -1, -1]), face_of_beam,
+              np.array([[0, 5], [1, 5], [3, 5], [2, 9], [4, 5]]))  # fmt: skip
+    assert votes.fused == [(5, 0)]
+    assert votes.fused_of_few_beams == [(5, 2), (5, 0), (9, 1), (5, UNLABELLED)]
+    assert votes.beams.keys() == {5}
+    assert votes.false_matches_few_beams() == votes.false_matches() == 1  # line 9 has no beams of its own yet
+    votes.add(segments_of([(20, 29)]), np.array([5]), face_of_beam)
+    assert (votes.false_matches_few_beams(), votes.false_matches()) == (1, 2)
+    votes.merge(5, 9)
+    assert votes.false_matches_few_beams() == 2  # and now line 9 is known to be line 5
+
+
 @pytest.mark.parametrize(("other", "label"), [(2, 1), (3, UNLABELLED)])
 @pytest.mark.parametrize("missing", [-1, 3])
 def test_a_segment_is_of_one_wall_by_four_fifths_of_all_its_beams(truth, other, label, missing):
