@@ -15,7 +15,7 @@ from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
 from slam.extraction.straightness import StraightnessConfig
-from slam.geometry.poses import compose, inverse
+from slam.geometry.poses import compose, inverse, wrap
 from slam.robot import Scan
 
 from ..scoring.beam_votes import UNLABELLED, vote
@@ -23,6 +23,8 @@ from ..scoring.truth import Truth
 
 MOST_TURN_RAD = 1.0
 """No observation is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
+MOST_SLANT_RAD = 1.5
+"""Nor so that its beams would meet it at more than this from its normal: a wall is not seen from behind."""
 
 
 @dataclass
@@ -116,8 +118,12 @@ class PerfectExtraction:
         pose = self._witness.poses_world[self._witness.at]
         alpha, r = self._witness.truth.lines[faces].T
         exact = np.column_stack([alpha - pose[2], r - np.cos(alpha) * pose[0] - np.sin(alpha) * pose[1]])
+        bearings_rad = segments.lines[:, 0] + np.arctan2(
+            segments.cov[:, 0, 1] / segments.cov[:, 0, 0], segments.lines[:, 1]
+        )
         draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
-        return replace(segments, lines=as_stated(exact, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2)))
+        lines, cov = as_stated(exact, bearings_rad, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2))
+        return replace(segments, lines=lines, cov=cov)
 
 
 def of_true_lines(config: MapperConfig) -> MapperConfig:
@@ -127,22 +133,30 @@ def of_true_lines(config: MapperConfig) -> MapperConfig:
 
 
 def as_stated(
-    lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], standard_normals: Float[np.ndarray, "m 2"]
-) -> Float[np.ndarray, "m 2"]:
+    lines: Float[np.ndarray, "m 2"],
+    bearings_rad: Float[np.ndarray, " m"],
+    cov: Float[np.ndarray, "m 2 2"],
+    standard_normals: Float[np.ndarray, "m 2"],
+) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2 2"]]:
     """Return observations of true lines (alpha, r), robot frame, with the error that `slam.estimation.models` states.
 
+    The middle of the seen piece stays on its beam, at this bearing: a line that is off by epsilon turns about it.
     There (epsilon, r cos(epsilon) - t0 sin(epsilon) - r_true) has independent parts of variance C_alpha_alpha and
-    (C_r_r - C_alpha_r t0) (cos(epsilon) - t0 sin(epsilon) / r)^2, t0 = C_alpha_r / C_alpha_alpha: to first order the
-    covariance C of (alpha, r), but a line off by epsilon turns about the seen piece instead of sliding off it. Solved
-    for r.
+    (C_r_r - C_alpha_r t0) (cos(epsilon) - t0 sin(epsilon) / r)^2, t0 = C_alpha_r / C_alpha_alpha. What is stated along
+    and across the piece is taken from `cov`, and returned for the place of the piece on the drawn line.
     """
-    t0 = cov[:, 0, 1] / cov[:, 0, 0]
-    epsilon = np.clip(np.sqrt(cov[:, 0, 0]) * standard_normals[:, 0], -MOST_TURN_RAD, MOST_TURN_RAD)
-    across = np.sqrt(cov[:, 1, 1] - cov[:, 0, 1] * t0) * standard_normals[:, 1]
-    c, b = np.cos(epsilon), t0 * np.sin(epsilon)
-    half = 0.5 * (lines[:, 1] + across * c + b)
-    r = (half + np.sqrt(np.maximum(half**2 - c * b * across, 0.0))) / c
-    return np.stack([lines[:, 0] + epsilon, r], axis=-1)
+    slant = np.clip(wrap(bearings_rad - lines[:, 0]), -MOST_SLANT_RAD, MOST_SLANT_RAD)
+    across_var = cov[:, 1, 1] - cov[:, 0, 1] ** 2 / cov[:, 0, 0]
+    epsilon = np.sqrt(cov[:, 0, 0]) * standard_normals[:, 0]
+    epsilon = np.clip(epsilon, slant - MOST_SLANT_RAD, slant + MOST_SLANT_RAD).clip(-MOST_TURN_RAD, MOST_TURN_RAD)
+    drawn = slant - epsilon
+    across = np.sqrt(across_var) * standard_normals[:, 1] * np.cos(slant) / np.cos(drawn)
+    range_m = (lines[:, 1] + across) / np.cos(slant)
+    r, t0 = range_m * np.cos(drawn), range_m * np.sin(drawn)
+    turned = np.tile(np.eye(2), (len(r), 1, 1))
+    turned[:, 1, 0] = t0
+    own = np.stack([cov[:, 0, 0], across_var], axis=-1)[:, :, None] * np.eye(2)
+    return np.stack([lines[:, 0] + epsilon, r], axis=-1), turned @ own @ turned.swapaxes(1, 2)
 
 
 def true_odometry(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:

@@ -46,8 +46,11 @@ def test_a_back_end_alone_gets_what_the_mapper_would_hand_it_bit_for_bit(perfect
 
 @few
 @given(seed=st.integers(0, 2**32))
-def test_a_observation_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
-    """Whitened by the model's own R at the truth, the innovation is the draw, however far off the direction is."""
+def test_an_observation_drawn_as_stated_has_the_error_that_the_model_weighs(seed):
+    """Whitened by the model's own R at the truth, the innovation is the draw, however far off the direction is.
+
+    The middle of the piece stays on its beam, wherever the line that it was fitted with lay.
+    """
     rng = np.random.default_rng(seed)
     pose, alpha, r = np.array([1.0, -2.0, 0.4]), rng.uniform(-3, 3, 6), rng.uniform(0.5, 4.0, 6)
     t0, along, across = rng.uniform(-2, 2, 6), rng.uniform(1e-3, 0.15, 6), rng.uniform(1e-3, 0.02, 6)
@@ -55,13 +58,18 @@ def test_a_observation_drawn_as_stated_has_the_error_that_the_model_weighs(seed)
     turn[:, 1, 0] = t0
     cov = turn @ (np.stack([along, across], -1)[..., None] ** 2 * np.eye(2)) @ turn.swapaxes(1, 2)
     draws = rng.standard_normal((6, 2))
-    seen = as_stated(np.stack([alpha, r], axis=-1), cov, draws)
+    bearings = alpha + rng.uniform(-1.0, 1.0, 6)
+    seen, told = as_stated(np.stack([alpha, r], axis=-1), bearings, cov, draws)
     n = np.stack([np.cos(alpha + pose[2]), np.sin(alpha + pose[2])], axis=-1)
     anchors = pose[:2] + r[:, None] * n
-    model = innovations(pose, anchors, np.stack([alpha + pose[2], np.zeros(6)], axis=-1), seen, cov)
+    model = innovations(pose, anchors, np.stack([alpha + pose[2], np.zeros(6)], axis=-1), seen, told)
     white = model.e / np.sqrt(np.diagonal(model.R, axis1=1, axis2=2))
-    facing = np.cos(along * draws[:, 0]) - t0 * np.sin(along * draws[:, 0]) / seen[:, 1] > 0.1
-    np.testing.assert_allclose(white[facing], draws[facing], atol=1e-9)
+    np.testing.assert_allclose(white, draws, atol=1e-9)
+    middle = np.arctan2(told[:, 0, 1] / told[:, 0, 0], seen[:, 1])
+    np.testing.assert_allclose(np.cos(seen[:, 0] + middle - bearings), 1.0, atol=1e-12)
+    for before, after in zip(cov, told, strict=True):
+        assert after[0, 0] == before[0, 0]
+        assert np.linalg.det(after) == pytest.approx(np.linalg.det(before), rel=1e-6)
 
 
 def test_a_recording_is_made_once_and_kept(tmp_path):
