@@ -62,6 +62,11 @@ def closed_contours(rows: Sequence[Row]) -> str:
     return f"{total(rows, 'contours_closed')} of {total(rows, 'contours_reachable')}"
 
 
+def false_matches(rows: Sequence[Row]) -> list[int]:
+    """Return the false matches of each row that are of segments of five beams or more: older rows have no others."""
+    return [row["false_matches"] - row.get("false_matches_few_beams", 0) for row in rows]
+
+
 def touches_of(rows: Sequence[Row]) -> str:
     """Return how often a wall was touched, in words."""
     count = total(rows, "collisions")

@@ -12,6 +12,7 @@ from .figures import (
     Table,
     closed_contours,
     completed,
+    false_matches,
     grouped,
     listed,
     mean_of,
@@ -73,7 +74,11 @@ def bundled(rows: Sequence[Row]) -> Found:
     errorless = rows[0]["errorless"]
     table: Table = [["world", "complete", "coverage: least", "contours closed", "path, mean"]]
     if not errorless:
-        table[0] += ["pose ANEES: mean, median", "map ANEES: mean, median", "false matches"]
+        table[0] += [
+            "pose ANEES: mean, median",
+            "map ANEES: mean, median",
+            "false matches: of five beams or more, of fewer",
+        ]
     for world, mine in grouped(rows, "world").items():
         cells = [f"`{world}`", completed(mine), f"{min(row['coverage'] for row in mine):.4f}", closed_contours(mine)]
         cells.append(f"{mean_of(mine, 'path_length_m'):.1f} m")
@@ -81,7 +86,7 @@ def bundled(rows: Sequence[Row]) -> Found:
             cells += [
                 typical(mine, "pose_anees"),
                 typical(mine, "map_anees"),
-                str(total(mine, "false_matches")),
+                f"{sum(false_matches(mine))}, {total(mine, 'false_matches_few_beams')}",
             ]
         table.append(cells)
     verdict = f"{completed(rows)} complete, {closed_contours(rows)} contours closed, {touches_of(rows)}."

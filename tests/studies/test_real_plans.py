@@ -35,4 +35,4 @@ def test_a_table_has_means_and_medians_over_plans_and_intervals_weighed_by_pairs
     assert [each[0] for each in stages] == ["nothing", "true matches"]
     found = real_plans(rows)
     assert found.table[1] == ["own", "`graph`", "1, 1", "3, 3", "90.0 %", "3.00", "0.00"]
-    assert found.verdict.startswith("The mean map ANEES over 3 apartments: `graph` 3. ")
+    assert found.verdict == "The mean map ANEES over 3 apartments: `graph` 3."

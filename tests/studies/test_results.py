@@ -51,7 +51,8 @@ def test_a_section_has_aim_table_verdict_and_command(tmp_path):
 
 
 def run(backend, seed=1, **more):
-    scores = {"pose_anees": 1.0, "map_anees": 1.0, "false_matches": 2, "duplicate_lines": 1, "planning_ms_mean": 0.5}
+    scores = {"pose_anees": 1.0, "map_anees": 1.0, "duplicate_lines": 1, "false_merges": 1, "planning_ms_mean": 0.5}
+    scores |= {"false_matches": 5, "false_matches_few_beams": 3}
     own = {"backend": backend, "seed": seed, "coverage_own_frame": 0.9, "raised": False, "steps": 100}
     return row("a", "school", **scores) | own | more
 
@@ -63,7 +64,8 @@ def test_apartments_stand_by_back_end_and_the_verdict_says_which_way_the_covaria
     assert cells["measure"] == ["`graph`", "`full-ekf`"]
     assert cells["map ANEES: mean, median"] == ["1.73, 0.7", "1.3, 1.3"]
     assert cells["maps with an ANEES above 3"] == ["1", "0"]
-    assert cells["false matches, duplicate walls, a plan"] == ["2.00, 1.00", "2.00, 1.00"]
+    assert cells["false matches a plan: of five beams or more, of fewer"] == ["2.00, 3.00", "2.00, 3.00"]
+    assert cells["duplicate walls a plan, false mergers in all"] == ["1.00, 3", "1.00, 1"]
     assert (
         "`graph`: 3 of 3 complete, map ANEES 1.73 in the mean, 0.7 at the median: covariances are typically too wide."
         in found.verdict
