@@ -164,3 +164,15 @@ def test_a_back_end_that_smooths_leaves_its_solution_beside_what_each_step_knew(
         np.testing.assert_allclose(arrays["pose"][:2], smoothed[-1, 1:3], atol=1e-8)
         np.testing.assert_array_equal(arrays["ids"], batch.last.map.ids)
         assert np.linalg.eigvalsh(arrays["cov"]).min() > 0
+
+
+def test_every_segment_of_few_beams_that_moved_the_estimate_is_held_against_the_truth():
+    moved = []
+
+    def watch(step):
+        rows = step.matches.pairs[:, 0]
+        moved.extend(step.matches.pairs[step.segments.is_tentative[rows], 1].tolist())
+
+    votes = run_trial(TrialConfig("paper-fig9", "full-ekf", seed=2, max_steps=80), watch).votes
+    assert moved
+    assert [line for line, _ in votes.fused_of_few_beams] == moved

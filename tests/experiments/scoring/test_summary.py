@@ -202,8 +202,10 @@ def test_swept_is_the_share_of_the_floor_within_half_a_metre_of_the_path(run):
 def test_what_was_matched_and_merged_wrongly_is_counted(run, truth):
     run.votes.fused += [(0, int(truth.walls[1])), (0, int(truth.walls[0])), (1, int(truth.walls[0])), (2, -1)]
     run.votes.merges, run.votes.false_merges = 5, 3
+    run.votes.fused_of_few_beams += [(2, int(truth.walls[1]))]
     found = run.summary()
-    assert (found["false_matches"], found["merges"], found["false_merges"]) == (2, 5, 3)
+    assert (found["false_matches"], found["false_matches_few_beams"]) == (3, 1)
+    assert (found["merges"], found["false_merges"]) == (5, 3)
 
 
 def test_a_wall_that_is_mapped_twice_is_counted_once_beyond_the_first(run, truth, make_map):
