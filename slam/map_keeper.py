@@ -36,6 +36,10 @@ class MapKeeper:
         """Return the map as it is now."""
         return self.landmarks.map(self.backend.belief)
 
+    def follow(self) -> None:
+        """Let the ends of walls move along with the map, where an update moved it."""
+        self.landmarks.extents.follow(self.backend.belief)
+
     def without(self, ids: Int[np.ndarray, " n"], walls: StochasticMap) -> StochasticMap:
         """Forget walls of the map that are none, and return what is left of it."""
         if not len(ids):

@@ -11,7 +11,9 @@ from ..estimation.backend import Belief
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..robot import Scan
+from .displacement import across, along
 from .existence import JUST_BEGUN, ExistenceConfig, looked_at
+from .kernels import wall_kernels
 from .kernels.extent_kernels import take_in, weigh
 from .records import Merger, Records
 from .reliability import ReliabilityConfig
@@ -52,6 +54,7 @@ class Extents:
         self._records.declare(
             self._merge,
             extents=np.array([np.inf, -np.inf]),
+            placed=np.full(2, np.nan),
             spacing=np.full(2, np.inf),
             observations=0,
             last_seen=0,
@@ -61,6 +64,26 @@ class Extents:
             log_odds=config.existence.believed,
             place=JUST_BEGUN,
         )
+
+    def follow(self, belief: Belief) -> None:
+        """Move extents along with the map, where long walls have moved by more than ends are known to."""
+        columns, shared = self._records.columns, self._config.shared
+        rows = self._records.rows(belief.ids)
+        placed, extents = columns["placed"][rows], columns["extents"][rows]
+        begun = np.isnan(placed[:, 0])
+        placed[begun] = belief.means[begun]
+        columns["placed"][rows] = placed
+        tell = np.flatnonzero(extents[:, 1] - extents[:, 0] >= shared.long_m)
+        anchors = belief.anchors[tell]
+        ends_world = wall_kernels.ends_world(anchors, placed[tell], extents[tell])
+        moved_m = across(ends_world, anchors, belief.means[tell])
+        if not len(tell) or np.abs(moved_m).max() <= shared.resolution_m:
+            return
+        seen = np.flatnonzero(extents[:, 0] <= extents[:, 1])
+        middles = wall_kernels.ends_world(belief.anchors[seen], placed[seen], extents[seen]).mean(axis=1)
+        told = ends_world, placed[tell, 0], moved_m
+        columns["extents"][rows[seen]] += along(middles, placed[seen, 0], *told, float(shared.long_m))[:, None]
+        columns["placed"][rows] = belief.means
 
     def map(
         self,
