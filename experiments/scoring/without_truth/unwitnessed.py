@@ -11,10 +11,9 @@ from explore.step import Step
 from sim.robot import TrueRecord
 from sim.worlds import Contour, World
 from slam.evaluation.doubles import doubles
-from slam.extraction.segments import Segments
 
 from ...scenario import Scenario
-from ..association import NO_PAIRS, Votes
+from ..association import Votes
 from ..innovations import innovation_scores
 from ..records import Log
 from ..summary import Ending, run_keys, spread_ms
@@ -44,13 +43,7 @@ def no_truth(world: World) -> Truth:
 class NoVotes(Votes):
     """Counts merges; no beam tells which wall it met."""
 
-    def add(
-        self,
-        segments: Segments,
-        owners: Int[np.ndarray, " s"],
-        face_of_beam: Int[np.ndarray, " k"],
-        matched: Int[np.ndarray, "m 2"] = NO_PAIRS,
-    ) -> None:
+    def add(self, *_: Any, **__: Any) -> None:
         """Count nothing."""
 
     def merge(self, keep: int, drop: int) -> None:
