@@ -1,7 +1,6 @@
 """The rules of real drives: second looks at a whole drive, walls that bow, and what scanners and odometry tell."""
 
-from .slam_rules import NO, YES
-from .switches import Switch
+from .switches import NO, YES, Switch
 
 SEARCH, MATCH = "slam.association.second_looks.loop_search", "slam.association.place_search"
 LINES, WALLS = "slam.association.second_looks.landmarks", "slam.association.second_looks.walls"

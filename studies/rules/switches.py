@@ -20,6 +20,8 @@ import numpy as np
 from numba import config
 
 HERE = Path(__file__).parents[2]
+NO = "np.zeros_like(on())"
+YES = "np.ones_like(on())"
 MARKS = "«»"
 """Around the expression that is the rule."""
 

@@ -9,10 +9,8 @@ import shapely
 from sim.lidar import LidarConfig, RangeFinder
 from slam.association.matching import NO_MATCHES, KnownWalls, match
 from slam.backends import BACKENDS
-from slam.backends.full_ekf import FullEkf
 from slam.config import MapperConfig
 from slam.extraction.extract import extract
-from slam.geometry.lines import normals
 from slam.geometry.poses import compose, inverse
 from slam.mapper import Mapper
 from slam.robot import Odometry, Scan
@@ -279,34 +277,3 @@ def test_few_beams_that_show_nothing_in_its_place_undo_a_line_of_few_beams():
         mapper.step(Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.1 * k))
         left.append(len(mapper._keeper._candidates))
     assert left[0] > 0 == left[1]
-
-
-class Corrected(FullEkf):
-    """Moves pose and map at its last update, as where a loop is closed."""
-
-    shift_m = np.array([0.3, -0.2])
-    updates = 0
-
-    def update(self, first, second):
-        super().update(first, second)
-        self.updates += 1
-        if self.updates == len(ROUND):
-            state, slots = self._map._x, self._map._slots
-            state[:2] += self.shift_m
-            state[4 + 2 * slots] += normals(state[3 + 2 * slots]) @ self.shift_m
-            self._move_on()
-
-
-ROUND = [[1.5, 1.5, 0.0], [3.0, 1.5, 0.0], [4.5, 1.5, 0.8], [5.5, 2.5, 1.6], [5.5, 4.0, 1.6], [5.5, 5.5, 2.4]]
-ROUND += [[4.0, 5.5, 3.1], [2.5, 5.5, -2.4], [1.5, 4.5, -1.6], [1.5, 3.0, -1.6], [1.5, 1.5, -1.6], [1.5, 1.4, -1.6]]
-
-
-def test_corners_out_of_sight_stay_corners_where_a_correction_moves_the_map(monkeypatch):
-    """The last scan shows one corner of a hall of 7 m; the others are where the walls' ends say."""
-    monkeypatch.setitem(BACKENDS, "corrected", replace(BACKENDS["full-ekf"], kind=Corrected))
-    *_, before, last = walk(faces_of(shapely.box(0, 0, 7, 7)), ROUND, "corrected", config=AT_ITS_WORD)
-    assert [chain.is_closed for chain in before.chains] == [chain.is_closed for chain in last.chains] == [True]
-    moved = last.map.belief.pose_world[:2] - ROUND[-1][:2]
-    np.testing.assert_allclose(moved, Corrected.shift_m, atol=0.01)
-    far = np.abs(last.map.ends_world - 7.0 - moved).max(axis=-1) < 0.05
-    assert np.count_nonzero(far) == 2  # two walls end in the corner that nobody saw at last

@@ -72,6 +72,15 @@ def test_an_observation_drawn_as_stated_has_the_error_that_the_model_weighs(seed
         assert np.linalg.det(after) == pytest.approx(np.linalg.det(before), rel=1e-6)
 
 
+def test_no_observation_is_drawn_from_behind_however_slanted_its_wall_is():
+    bearings, count = np.repeat([1.49, -1.49, 1.56], 40), 120
+    lines, cov = np.tile([0.0, 1.0], (count, 1)), np.tile(np.diag([0.25, 1e-4]), (count, 1, 1))
+    seen, told = as_stated(lines, bearings, cov, np.random.default_rng(0).standard_normal((count, 2)))
+    assert np.all(seen[:, 1] > 0.0)
+    assert np.all(np.abs(np.arctan2(told[:, 0, 1] / told[:, 0, 0], seen[:, 1])) < 1.5 + 1e-9)
+    assert np.abs(seen[:, 0]).max() <= 1.0
+
+
 def test_a_recording_is_made_once_and_kept(tmp_path):
     config = TrialConfig("paper-fig4", seed=2, max_steps=20)
     new, kept = record(config, tmp_path), record(config, tmp_path)

@@ -1,10 +1,15 @@
 """Where the ends of walls go when a correction moves the map, against motions that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from slam.backends import BACKENDS
+from slam.backends.full_ekf import FullEkf
 from slam.estimation.backend import Belief
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import rotation
@@ -13,6 +18,7 @@ from slam.map.displacement import across, along
 from slam.map.extents import WallsConfig
 from slam.map.landmarks import Landmarks
 from slam.map.polylines.change_points import ChangePointsConfig
+from tests.slam.test_mapper import AT_ITS_WORD, faces_of, walk
 
 NEAR_M = 1.0
 SQUARE = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 4.0], [0.0, 4.0]])
@@ -162,3 +168,41 @@ def test_a_wall_that_is_not_seen_yet_has_no_ends_to_move():
     known.records.columns["extents"][2] = [np.inf, -np.inf]
     follow(known, belief(by([0.4, 0.0], ROOM)))
     np.testing.assert_array_equal(known.records.columns["extents"][2], [np.inf, -np.inf])
+
+
+class Corrected(FullEkf):
+    """Moves pose and map at its last update, as where a loop is closed."""
+
+    shift_m = np.array([0.3, -0.2])
+    updates = 0
+
+    def update(self, first, second):
+        super().update(first, second)
+        self.updates += 1
+        if self.updates == len(ROUND):
+            state, slots = self._map._x, self._map._slots
+            state[:2] += self.shift_m
+            state[4 + 2 * slots] += normals(state[3 + 2 * slots]) @ self.shift_m
+            self._move_on()
+
+
+ROUND = [[1.5, 1.5, 0.0], [3.0, 1.5, 0.0], [4.5, 1.5, 0.8], [5.5, 2.5, 1.6], [5.5, 4.0, 1.6], [5.5, 5.5, 2.4]]
+ROUND += [[4.0, 5.5, 3.1], [2.5, 5.5, -2.4], [1.5, 4.5, -1.6], [1.5, 3.0, -1.6], [1.5, 1.5, -1.6], [1.5, 1.4, -1.6]]
+
+
+def test_corners_out_of_sight_stay_corners_where_a_correction_moves_the_map(monkeypatch):
+    """The last scan shows one corner of a hall of 7 m; the others are where the walls' ends say."""
+    monkeypatch.setitem(BACKENDS, "corrected", replace(BACKENDS["full-ekf"], kind=Corrected))
+    *_, before, last = walk(faces_of(shapely.box(0, 0, 7, 7)), ROUND, "corrected", config=AT_ITS_WORD)
+    assert [chain.is_closed for chain in before.chains] == [chain.is_closed for chain in last.chains] == [True]
+    moved = last.map.belief.pose_world[:2] - ROUND[-1][:2]
+    np.testing.assert_allclose(moved, Corrected.shift_m, atol=0.01)
+    far = np.abs(last.map.ends_world - 7.0 - moved).max(axis=-1) < 0.05
+    assert np.count_nonzero(far) == 2  # two walls end in the corner that nobody saw at last
+
+
+def test_ends_that_followed_are_where_they_are_told_and_go_no_farther():
+    known, belief = landmarks_of(ROOM)
+    there = belief(by([0.4, -0.3], ROOM))
+    once = follow(known, there).ends_world
+    np.testing.assert_array_equal(follow(known, there).ends_world, once)
