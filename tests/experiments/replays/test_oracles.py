@@ -2,9 +2,15 @@
 
 import numpy as np
 
-from experiments.replays.oracles import of_true_lines
+from experiments.replays.oracles import PerfectExtraction, Witness, of_true_lines
+from experiments.scoring.truth import truth_of
+from sim.lidar import LidarConfig, RangeFinder
+from sim.robot import RobotConfig
 from slam.config import MapperConfig
+from slam.extraction.config import ExtractionConfig
+from slam.extraction.extract import extract
 from slam.map.reliability import Reliability
+from slam.robot import Scan
 
 
 def test_walls_of_true_lines_lie_on_them_however_short_they_are():
@@ -18,3 +24,21 @@ def test_walls_of_true_lines_lie_on_them_however_short_they_are():
     usual, true = told
     assert usual[0, 0, 0] > 0.0
     np.testing.assert_array_equal(true, np.zeros((1, 2, 2)))
+
+
+def middles_rad(segments):
+    """Where the middle of each seen piece is, as its line and its covariance have it."""
+    return segments.lines[:, 0] + np.arctan2(segments.cov[:, 0, 1] / segments.cov[:, 0, 0], segments.lines[:, 1])
+
+
+def test_a_piece_whose_line_is_true_stays_on_the_beams_that_showed_it(world):
+    truth, pose = truth_of(world, RobotConfig()), np.array([0.4, 0.3, 0.2])
+    finder = RangeFinder(truth.faces, LidarConfig())
+    ranges, faces = finder.cast(pose)[:2]
+    noisy = ranges + 0.01 * np.random.default_rng(1).standard_normal(len(ranges))
+    scan = Scan(finder.bearings_rad, noisy, 0.01, 4.0, 0.0)
+    seen = extract(scan, ExtractionConfig())
+    drawn = PerfectExtraction(Witness(truth, pose[None], np.asarray(faces)[None]), seed=3)(scan, ExtractionConfig())
+    assert len(drawn) == len(seen) >= 2
+    assert np.abs(drawn.lines - seen.lines).max() > 1e-4
+    np.testing.assert_allclose(np.cos(middles_rad(drawn) - middles_rad(seen)), 1.0, atol=1e-9)

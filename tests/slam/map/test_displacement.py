@@ -95,7 +95,7 @@ def test_the_motion_about_a_wall_is_that_of_a_dense_weighted_least_squares(seed)
 
 def test_what_no_wall_tells_is_taken_for_none():
     """A corridor without a cross wall moves obliquely: only what is across it shows."""
-    corridor = ROOM[[0, 2]]
+    corridor = moved(ROOM[[0, 2]], np.zeros(2), 0.3)  # not along an axis: its walls are parallel but for rounding
     np.testing.assert_allclose(shifts(corridor, by([0.5, 0.2], corridor)), 0.0, atol=1e-9)
 
 
@@ -199,6 +199,12 @@ def test_corners_out_of_sight_stay_corners_where_a_correction_moves_the_map(monk
     np.testing.assert_allclose(moved, Corrected.shift_m, atol=0.01)
     far = np.abs(last.map.ends_world - 7.0 - moved).max(axis=-1) < 0.05
     assert np.count_nonzero(far) == 2  # two walls end in the corner that nobody saw at last
+
+
+def test_the_ends_of_each_room_follow_the_walls_within_some_metres():
+    known, belief = landmarks_of(np.concatenate([ROOM, by([40.0, 0.0], ROOM)]))
+    after = np.concatenate([by([0.3, 0.2], ROOM), by([39.7, -0.2], ROOM)])
+    np.testing.assert_allclose(follow(known, belief(after)).ends_world, after, atol=0.05)
 
 
 def test_ends_that_followed_are_where_they_are_told_and_go_no_farther():
