@@ -1,0 +1,45 @@
+"""Walls that bend or step, noisy scans of them, and drives past them."""
+
+import numpy as np
+
+from sim.lidar import LidarConfig, RangeFinder
+from slam.backends import BACKENDS
+from slam.geometry.poses import compose, inverse
+from slam.mapper import Mapper
+from slam.robot import Odometry, Scan
+
+SIGMA_M, WALL = 0.01, 7
+AROUND = np.array([[[3.0, -4.0], [3.0, 2.0]], [[3.0, 2.0], [-3.0, 2.0]], [[-3.0, 2.0], [-3.0, -4.0]]])
+"""Long walls about the robot, by which it knows where it stands."""
+
+
+def bent(turn_rad, at_m=0.0, half_m=6.0):
+    """Return the faces of a wall along y = 0, free side below, which turns at `at_m`."""
+    bend, end = np.array([at_m, 0.0]), half_m - at_m
+    return np.array([[[half_m, -end * np.tan(turn_rad)], bend], [bend, [-half_m, 0.0]]])
+
+
+def stepped(step_m, half_m=0.4):
+    """Return two faces along y = 0, free side below, the left one farther back; and what is between and beside them."""
+    way = [[half_m, 1.0], [half_m, 0.0], [0.0, 0.0], [0.0, step_m], [-half_m, step_m], [-half_m, 1.0]]
+    return np.array([[way[k], way[k + 1]] for k in range(len(way) - 1) if way[k] != way[k + 1]])
+
+
+def scans(faces, poses, rng, sigma_m=SIGMA_M, range_max_m=4.0):
+    """Yield noisy scans from poses; the noise stated is 10 mm."""
+    finder = RangeFinder(faces, LidarConfig())
+    for k, pose in enumerate(poses):
+        ranges = finder.cast(pose)[0]
+        noise = sigma_m * rng.standard_normal(len(ranges)) if sigma_m else 0.0
+        yield Scan(finder.bearings_rad, ranges + noise, SIGMA_M, range_max_m, 0.1 * k)
+
+
+def drive(poses, seen, backend, config, sigmas):
+    """Go from pose to pose with exact wheels, stated to `sigmas` (m, m, rad); return the update of each scan."""
+    mapper = Mapper(BACKENDS[backend].make(poses[0].copy(), 1e-6 * np.eye(3)), config)
+    updates = []
+    for k, scan in enumerate(seen):
+        if k:
+            mapper.predict(Odometry(compose(inverse(poses[k - 1]), poses[k]), np.diag(sigmas) ** 2))
+        updates.append(mapper.step(scan))
+    return updates
