@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from slam.estimation.backend import PathKeeper
 
-from ..artifacts.results import path_of, smoothed_path
+from ..artifacts.trajectories import path_of, smoothed_path
 from ..scoring.records import Log
 from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalised_relations, pair_covs_of
 from ..scoring.without_truth.references import References, scored_by

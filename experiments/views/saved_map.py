@@ -14,7 +14,7 @@ from slam.map.stochastic_map import StochasticMap
 from viz.figures.maps import Picture
 
 from ..artifacts.maps.map_files import read_features
-from ..artifacts.picture import over_truth
+from ..artifacts.maps.picture import over_truth
 from ..artifacts.reading import fit, told
 from ..artifacts.saved import REMEDY, read_summary
 from ..scenario import TrialConfig, load_world

@@ -16,12 +16,12 @@ from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 from viz.figures.maps import Picture, draw_map, png
 
-from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
-from ..scoring.corners import corners
-from ..scoring.coverage import own_alignment
-from ..scoring.records import Log
-from ..scoring.summary import odometry_poses
-from ..trial import TrialResult
+from ...scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ...scoring.corners import corners
+from ...scoring.coverage import own_alignment
+from ...scoring.records import Log
+from ...scoring.summary import odometry_poses
+from ...trial import TrialResult
 
 
 def picture_of(result: TrialResult) -> bytes:
