@@ -1,7 +1,7 @@
 """Which walls carry a map's error in real plans: lines over several faces, short faces, or the long straight ones.
 
-Each plan is explored once, and its map is scored in its own gauge: all of it, with tentative walls, and without each
-kind of wall.
+Each plan is explored once, and its map is scored in its own gauge: all of it, with tentative walls, without each
+kind of wall, and without the walls that carry most, one by one.
 
 .venv/bin/python -m studies.exploration.map_causes --plans ../shared/data/plans   # goes on where it was interrupted
 """
@@ -21,6 +21,10 @@ from experiments.scoring.summary import map_error
 from experiments.terminal.console import plain_console
 from experiments.trial import TrialResult, run_trial
 from experiments.usage import UsageError
+from slam.estimation.backend import POSE
+from slam.evaluation.own_gauge import OwnGauge
+from slam.geometry.lines import lines_to_world, normals
+from slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
@@ -30,6 +34,10 @@ ONE_FACE_SHARE = 0.9
 """A line with fewer of its beams from one wall is a line over several faces."""
 SHORT_M = 0.2
 """Shorter true faces are ends of walls."""
+ONE_FACE_OF_SEVERAL = 0.1
+"""A face with fewer of a wall's beams is not one that the wall lies over."""
+WORST = 3
+"""So many walls are left out, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,8 @@ class MapCauses:
             raise UsageError(f"expected plan files in {self.plans}, found no {self.pattern}")
         tasks = [(plan, [(plan.stem, self.seed, self.backend, self.max_steps)]) for plan in plans]
         perform = partial(_row_of, self.backend, self.seed, self.max_steps)
-        plain_console(width=130).print(table(list(rows_of(self.out, NAMES, tasks, perform, self.jobs))))
+        rows = list(rows_of(self.out, NAMES, tasks, perform, self.jobs))
+        plain_console(width=130).print(table(rows), table_of_worst(rows))
 
 
 def _row_of(backend: str, seed: int, max_steps: int, plan: Path) -> list[Row]:
@@ -93,7 +102,67 @@ def causes(result: TrialResult) -> Row:
         "without_several_faces": anees(told & ~several),
         "short_alone": anees(told & short),
         "long_of_one_face": anees(told & ~short & ~several),
+        "worst": worst(result, told),
     }
+
+
+def worst(result: TrialResult, among: Bool[np.ndarray, " n"]) -> list[Row]:
+    """Return the walls without which a map's ANEES is least, one after the other, and what is left without them."""
+    assert result.last is not None
+    walls, votes, found = result.last.map, result.votes, list[Row]()
+    for _ in range(WORST):
+        tried = [
+            (error.anees, row, error)
+            for row in np.flatnonzero(among).tolist()
+            if (error := map_error(votes, walls.ids, result.joint, _without(among, row))) and error.anees is not None
+        ]
+        if not tried:
+            break
+        anees, row, rest = min(tried, key=lambda each: each[0])
+        among, wall = _without(among, row), int(walls.ids[row])
+        found.append(
+            {
+                "wall": wall,
+                "length_m": float(np.ptp(walls.extents[row])),
+                "observations": int(walls.observations[row]),
+                **_error_of(result, row, rest),
+                "other_faces": other_faces(votes, wall),
+                "map_anees_without": anees,
+            }
+        )
+    return found
+
+
+def _without(among: Bool[np.ndarray, " n"], row: int) -> Bool[np.ndarray, " n"]:
+    rest = among.copy()
+    rest[row] = False
+    return rest
+
+
+def _error_of(result: TrialResult, row: int, rest: OwnGauge) -> Row:
+    """Return how far a wall is from its true face where the others have the frame, and how far it says it may be."""
+    assert result.joint is not None
+    assert result.last is not None
+    wall, face = result.joint.take(np.array([row])), result.votes.face_of(int(result.last.map.ids[row]))
+    true = lines_to_world(result.votes.truth.lines[[face]], rest.frame_world)[0]
+    d = true[1] - normals(true[:1])[0] @ wall.anchors[0]
+    sigmas = np.sqrt(np.diag(wall.cov)[POSE:])
+    return {
+        "off_deg": float(np.rad2deg(wrap(wall.mean[POSE] - true[0]))),
+        "off_sigma_deg": float(np.rad2deg(sigmas[0])),
+        "off_mm": float(1e3 * (wall.mean[POSE + 1] - d)),
+        "off_sigma_mm": float(1e3 * sigmas[1]),
+    }
+
+
+def other_faces(votes: Votes, line: int) -> list[tuple[float, float]]:
+    """Return of the faces that a wall lies over how they turn (deg) and lie aside (mm) of the one with most beams."""
+    beams = votes.beams[line]
+    faces = np.argsort(-beams)[: np.count_nonzero(beams >= ONE_FACE_OF_SEVERAL * beams.sum())]
+    lines, middles = votes.truth.lines[faces], votes.truth.faces[faces].mean(axis=1)
+    turned = np.rad2deg(wrap(lines[1:, 0] - lines[0, 0]))
+    aside = 1e3 * (middles[1:] @ normals(lines[:1, 0])[0] - lines[0, 1])
+    return list(zip(turned.tolist(), aside.tolist(), strict=True))
 
 
 def shares_of_one_wall(votes: Votes, ids: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
@@ -116,6 +185,20 @@ def table(rows: Sequence[Row]) -> Table:
     for row in rows:
         cells = (row[column] for column in columns)
         shown.add_row(row["world"], *("-" if cell is None else f"{cell:.3g}" for cell in cells))
+    return shown
+
+
+def table_of_worst(rows: Sequence[Row]) -> Table:
+    """Return a row for each wall that was left out, in that order."""
+    shown = Table(title="The walls that carry most, left out one after the other", title_justify="left")
+    columns = ("length_m", "observations", "off_deg", "off_sigma_deg", "off_mm", "off_sigma_mm", "map_anees_without")
+    for column in ("plan", *columns, "other faces: deg, mm"):
+        shown.add_column(column.replace("_", " "), justify="left" if column == "plan" else "right")
+    for row in rows:
+        for wall in row["worst"]:
+            cells = (wall[column] for column in columns)
+            others = "; ".join(f"{turn:.1f}, {aside:.0f}" for turn, aside in wall["other_faces"]) or "-"
+            shown.add_row(row["world"], *("-" if cell is None else f"{cell:.3g}" for cell in cells), others)
     return shown
 
 
