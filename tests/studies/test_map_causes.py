@@ -9,6 +9,7 @@ import pytest
 from experiments.scenario import TrialConfig
 from experiments.scoring.summary import map_error
 from experiments.trial import run_trial
+from slam.geometry.lines import lines_to_world
 from studies.exploration.map_causes import (
     causes,
     other_faces,
@@ -74,6 +75,16 @@ def test_a_wall_that_is_turned_is_the_worst_and_its_error_is_told():
     assert list(shown.columns[0].cells) == ["paper-fig4"] * 3
 
 
+def test_where_the_frame_lies_is_no_error_of_a_wall():
+    result = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+    truth, among = result.votes.truth, ~result.last.map.tentative
+    elsewhere = replace(truth, lines=lines_to_world(truth.lines, np.array([0.3, -0.2, 0.4])))
+    before, moved = worst(result, among), worst(replace(result, votes=replace(result.votes, truth=elsewhere)), among)
+    for there, here in zip(moved, before, strict=True):
+        told = [{key: value for key, value in wall.items() if key != "other_faces"} for wall in (there, here)]
+        assert told[0] == pytest.approx(told[1], rel=1e-3, abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_what_a_wall_states_beside_others_is_how_far_it_is_off_where_they_have_the_frame(seed):
     """Of drawn maps, each moved onto the mean by all walls but the last; however little is known of the frame."""
@@ -97,8 +108,8 @@ def test_what_a_wall_states_beside_others_is_how_far_it_is_off_where_they_have_t
 
 
 def test_the_faces_beside_the_one_with_most_beams_are_told_by_turn_and_distance():
-    faces = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.02], [2.0, 0.02]], [[2.0, 0.0], [2.0, 1.0]]])
-    lines = np.array([[-np.pi / 2, 0.0], [-np.pi / 2, -0.02], [0.0, 2.0]])
+    faces = np.array([[[0.0, 3.0], [1.0, 3.0]], [[1.0, 3.02], [2.0, 3.02]], [[2.0, 3.0], [2.0, 4.0]]])
+    lines = np.array([[-np.pi / 2, -3.0], [-np.pi / 2, -3.02], [0.0, 2.0]])
     votes = SimpleNamespace(truth=SimpleNamespace(faces=faces, lines=lines), beams={4: np.array([50, 30, 20])})
     np.testing.assert_allclose(other_faces(votes, 4), [[0.0, -20.0], [90.0, -500.0]], atol=1e-9)
     votes.beams[4] = np.array([95, 5, 0])
