@@ -57,7 +57,7 @@ bench: setup
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
 
-.PHONY: rows apartments schools-whole bundled paper-method navigation-apartments odometry-twice
+.PHONY: rows apartments apartments-errorless schools-whole bundled paper-method navigation-apartments odometry-twice
 
 # What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
 rows: intervals paper paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
@@ -66,6 +66,11 @@ rows: intervals paper paper-method bundled apartments real-plans schools schools
 apartments: setup
 	for backend in invariant-ekf graph; do $(BIN)/python -m studies.exploration.suite --plans $(PLANS) --named 'lifull_*' \
 	    --backend $$backend --out $(ROWS)/apartments.jsonl || exit; done
+
+# The same without noise, by the full EKF: what is not mapped is not for want of a sure estimate.
+apartments-errorless: setup
+	$(BIN)/python -m studies.exploration.suite --plans $(PLANS) --named 'lifull_*' --errorless \
+	    --out $(ROWS)/in_text/apartments-errorless.jsonl
 
 # 39 schools and offices, 1,500 noisy steps each: every back end with one seed, and three of them with a second.
 schools: setup

@@ -1,6 +1,7 @@
 """Which walls carry a map's error: what is told of one short run, and how a table shows it."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,11 @@ from studies.exploration.map_causes import (
 )
 
 
+@cache
+def figure_4():
+    return run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+
+
 def test_the_share_of_one_wall_counts_all_its_faces():
     truth = SimpleNamespace(walls=np.array([0, 0, 1]))
     votes = SimpleNamespace(truth=truth, beams={3: np.array([4, 2, 2]), 5: np.array([0, 0, 7]), 8: np.zeros(3, int)})
@@ -28,7 +34,7 @@ def test_the_share_of_one_wall_counts_all_its_faces():
 
 
 def test_of_one_run_all_walls_are_scored_as_in_its_summary():
-    result = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+    result = figure_4()
     found = causes(result)
     assert found["map_anees"] == pytest.approx(result.summary["map_anees"])
     assert 0 < found["lines"] >= found["short"]
@@ -59,7 +65,7 @@ def test_the_walls_left_out_are_those_without_which_the_rest_is_best():
 
 
 def test_a_wall_that_is_turned_is_the_worst_and_its_error_is_told():
-    result = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+    result = figure_4()
     mean, row = result.joint.mean.copy(), int(np.argmax(np.ptp(result.last.map.extents, axis=1)))
     before = worst(result, ~result.last.map.tentative)
     mean[3 + 2 * row : 5 + 2 * row] += [np.deg2rad(20.0), 0.4]
@@ -76,7 +82,7 @@ def test_a_wall_that_is_turned_is_the_worst_and_its_error_is_told():
 
 
 def test_where_the_frame_lies_is_no_error_of_a_wall():
-    result = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+    result = figure_4()
     truth, among = result.votes.truth, ~result.last.map.tentative
     elsewhere = replace(truth, lines=lines_to_world(truth.lines, np.array([0.3, -0.2, 0.4])))
     before, moved = worst(result, among), worst(replace(result, votes=replace(result.votes, truth=elsewhere)), among)
@@ -89,7 +95,7 @@ def test_where_the_frame_lies_is_no_error_of_a_wall():
 def test_what_a_wall_states_beside_others_is_how_far_it_is_off_where_they_have_the_frame(seed):
     """Of drawn maps, each moved onto the mean by all walls but the last; however little is known of the frame."""
     rng = np.random.default_rng(seed)
-    result = run_trial(TrialConfig("paper-fig4", "invariant-ekf", seed=1, max_steps=40))
+    result = figure_4()
     joint = result.joint
     walls, n = np.arange(5), (len(joint.mean) - 3) // 2
     frames = np.zeros((2 * n, 3))
