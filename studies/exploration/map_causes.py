@@ -21,10 +21,8 @@ from experiments.scoring.summary import map_error
 from experiments.terminal.console import plain_console
 from experiments.trial import TrialResult, run_trial
 from experiments.usage import UsageError
-from slam.estimation.backend import POSE, Joint
-from slam.evaluation.own_gauge import OwnGauge
-from slam.geometry.lines import lines_to_world, normals
-from slam.geometry.poses import J, wrap
+from slam.geometry.lines import normals
+from slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
@@ -112,20 +110,19 @@ def worst(result: TrialResult, among: Bool[np.ndarray, " n"]) -> list[Row]:
     walls, votes, found = result.last.map, result.votes, list[Row]()
     for _ in range(WORST):
         tried = [
-            (error.anees, row, error)
+            (error.anees, row)
             for row in np.flatnonzero(among).tolist()
             if (error := map_error(votes, walls.ids, result.joint, _without(among, row))) and error.anees is not None
         ]
         if not tried:
             break
-        anees, row, rest = min(tried, key=lambda each: each[0])
+        anees, row = min(tried)
         among, wall = _without(among, row), int(walls.ids[row])
         found.append(
             {
                 "wall": wall,
                 "length_m": float(np.ptp(walls.extents[row])),
                 "observations": int(walls.observations[row]),
-                **_error_of(result, row, among, rest),
                 "other_faces": other_faces(votes, wall),
                 "map_anees_without": anees,
             }
@@ -137,35 +134,6 @@ def _without(among: Bool[np.ndarray, " n"], row: int) -> Bool[np.ndarray, " n"]:
     rest = among.copy()
     rest[row] = False
     return rest
-
-
-def _error_of(result: TrialResult, row: int, others: Bool[np.ndarray, " n"], rest: OwnGauge) -> Row:
-    """Return how far a wall is from its true face where the others have the frame, and how far it says it may be."""
-    assert result.joint is not None
-    assert result.last is not None
-    wall, face = result.joint.take(np.array([row])), result.votes.face_of(int(result.last.map.ids[row]))
-    true = lines_to_world(result.votes.truth.lines[[face]], rest.frame_world)[0]
-    d = true[1] - normals(true[:1])[0] @ wall.anchors[0]
-    sigmas = np.sqrt(np.diag(stated_beside(result.joint, row, np.flatnonzero(others))))
-    return {
-        "off_deg": float(np.rad2deg(wrap(wall.mean[POSE] - true[0]))),
-        "off_sigma_deg": float(np.rad2deg(sigmas[0])),
-        "off_mm": float(1e3 * (wall.mean[POSE + 1] - d)),
-        "off_sigma_mm": float(1e3 * sigmas[1]),
-    }
-
-
-def stated_beside(joint: Joint, row: int, others: Int[np.ndarray, " m"]) -> Float[np.ndarray, "2 2"]:
-    """Return the covariance of a wall (alpha, d) in the frame that the others have, wherever that lies."""
-    part = joint.take(np.append(others, row))
-    cov, alpha = part.cov[POSE:, POSE:], part.mean[POSE::2]
-    moved = np.zeros((len(alpha), 2, POSE))
-    moved[:, 0, 2], moved[:, 1, :2] = 1.0, normals(alpha)
-    moved[:, 1, 2] = np.vecdot(moved[:, 1, :2], part.anchors @ J.T)
-    rest, own = moved[:-1].reshape(-1, POSE), moved[-1]
-    weights = np.linalg.solve(cov[:-2, :-2], rest)
-    relative = np.hstack([-own @ np.linalg.solve(rest.T @ weights, weights.T), np.eye(2)])
-    return relative @ cov @ relative.T
 
 
 def other_faces(votes: Votes, line: int) -> list[tuple[float, float]]:
@@ -197,22 +165,26 @@ def table(rows: Sequence[Row]) -> Table:
         shown.add_column(column.replace("_", " "), justify="left" if column == "plan" else "right")
     for row in rows:
         cells = (row[column] for column in columns)
-        shown.add_row(row["world"], *("-" if cell is None else f"{cell:.3g}" for cell in cells))
+        shown.add_row(row["world"], *map(_cell, cells))
     return shown
 
 
 def table_of_worst(rows: Sequence[Row]) -> Table:
     """Return a row for each wall that was left out, in that order."""
     shown = Table(title="The walls that carry most, left out one after the other", title_justify="left")
-    columns = ("length_m", "observations", "off_deg", "off_sigma_deg", "off_mm", "off_sigma_mm", "map_anees_without")
+    columns = ("length_m", "observations", "map_anees_without")
     for column in ("plan", *columns, "other faces: deg, mm"):
         shown.add_column(column.replace("_", " "), justify="left" if column == "plan" else "right")
     for row in rows:
         for wall in row["worst"]:
             cells = (wall[column] for column in columns)
             others = "; ".join(f"{turn:.1f}, {aside:.0f}" for turn, aside in wall["other_faces"]) or "-"
-            shown.add_row(row["world"], *("-" if cell is None else f"{cell:.3g}" for cell in cells), others)
+            shown.add_row(row["world"], *map(_cell, cells), others)
     return shown
+
+
+def _cell(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
 
 
 if __name__ == "__main__":
