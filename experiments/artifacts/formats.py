@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 14,
+    CONFIG: 15,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -34,7 +34,7 @@ format 5 the body and the step stood at several places (`MOVED`), until format 6
 Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
 Until format 11 no scan told a drive's motion (`odometry`). Until format 12 a place in the whole map was sought by
 pairs of walls (`DROPPED`), until format 13 walls and lines of few beams were believed and forgotten by rules of their
-own (`DROPPED`).
+own (`DROPPED`), until format 14 no wall was followed to and fro (`mission.explorer.following.method`).
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 

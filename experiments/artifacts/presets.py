@@ -15,7 +15,7 @@ from sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
 from slam.robot import RobotSpec, of_outline
 
 from ..usage import UsageError, did_you_mean
-from .settings import NAVIGATION, Record, leaves, nested, trial_of
+from .settings import FOLLOWING, NAVIGATION, Record, leaves, nested, trial_of
 
 PresetName = Literal["paper-method"]
 SWEEP = "mission.explorer.sweep"
@@ -47,7 +47,7 @@ METHODS: dict[str, MethodPreset] = {
             ("mission.mapper.vertices", False),
             ("mission.mapper.change_points", None),
         ),
-        driving=((NAVIGATION, "visibility"), (SWEEP, False)),
+        driving=((FOLLOWING, "paper"), (NAVIGATION, "visibility"), (SWEEP, False)),
     ),
 }
 """What the paper describes and today's software does otherwise (docs/exploration.md, "The paper's method")."""

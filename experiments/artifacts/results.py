@@ -50,7 +50,7 @@ STEP_COLUMNS = (
     *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
     *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
     *("odometry_error_m", "collisions", "nis", "nis_dof", "nis_window", "nis_in_band", "unstated_motion", "lost"),
-    *("wheel_noise_factor", "reason", "step_ms"),
+    *("wheel_noise_factor", "behaviour", "route_walls", "reason", "step_ms"),
 )
 """Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
 with the poses beside it, all that `pose_nees` is made of."""
@@ -253,6 +253,8 @@ def steps_csv(log: Log) -> bytes:
         log.unstated_motion.astype(int),
         log.is_lost.astype(int),
         log.wheel_noise_factor,
+        log.behaviours,
+        log.route_walls,
         log.reasons,
         1e3 * log.seconds,
     ]

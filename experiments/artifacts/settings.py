@@ -20,6 +20,7 @@ from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
+FOLLOWING = "mission.explorer.following.method"
 SEE = "config.json of any run names all"
 Record = dict[str, Any]
 

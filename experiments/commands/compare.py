@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 import tyro
 
+from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 
 from ..artifacts.presets import against_methods, robot_of
-from ..artifacts.settings import NAVIGATION, asked, differing, nested, over, trial_of
+from ..artifacts.settings import FOLLOWING, NAVIGATION, asked, differing, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.story import decisive_arm, story_of
 from ..campaign.comparison.tables import write_tables
@@ -74,6 +75,9 @@ class Compare:
     navigation: Navigation = "floor"
     """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Presets paper and
     paper-method go by walls."""
+    following: Following = "viewpoints"
+    """How the robot explores an open end in every trial: from viewpoints, or by following its wall to and fro. Preset
+    paper-method follows walls."""
     robot: str | None = None
     """The robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file (docs/robots.md).
     --config and --set go before it."""
@@ -104,6 +108,8 @@ class Compare:
         settings = over(nested(preset.pop("settings", ())), robot_of(self.robot), asked(self.config, self.set, DECIDED))
         if "navigation" in self.given or self.navigation != Compare.navigation:
             settings = over(settings, nested([(NAVIGATION, self.navigation)]))
+        if "following" in self.given or self.following != Compare.following:
+            settings = over(settings, nested([(FOLLOWING, self.following)]))
         if self.errorless:
             settings = over(settings, {"errorless": True})
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}

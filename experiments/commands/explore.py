@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 from explore.step import Step
 from sim.worlds import World
@@ -16,7 +17,7 @@ from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
-from ..artifacts.settings import NAVIGATION, nested, parse_setting, read_settings, trial_of
+from ..artifacts.settings import FOLLOWING, NAVIGATION, nested, parse_setting, read_settings, trial_of
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -35,6 +36,7 @@ KEYS = {
     "sweep": "mission.explorer.sweep",
     "return_to_start": "mission.return_to_start",
     "navigation": NAVIGATION,
+    "following": FOLLOWING,
 }
 """Options that decide a run, and their keys in `config.json`."""
 SETTLED = (
@@ -46,6 +48,7 @@ SETTLED = (
     "errorless",
     "sweep",
     "navigation",
+    "following",
     "odometry",
     "start",
     "scale",
@@ -78,6 +81,9 @@ class Explore:
     """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
     navigation: Navigation = "floor"
     """How the robot finds its way: over the floor seen free, or by sequences of walls, as the paper's did."""
+    following: Following = "viewpoints"
+    """How the robot explores an open end: from viewpoints around it, or as the paper's did, by following its wall to
+    and fro and driving round its ends."""
     odometry: OdometrySource = "wheels"
     """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
     matching*), with the wheels for a first guess."""
@@ -103,7 +109,8 @@ class Explore:
     force: bool = False
     """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
     preset: PresetName | None = None
-    """A method by name: paper-method is all that the paper describes, its filter, its matching and its navigation
+    """A method by name: paper-method is all that the paper describes, its filter, its matching, its navigation
+    and its wall following
     (docs/exploration.md). --config, --set and options go before it."""
     robot: str | None = None
     """What the robot states of itself, and its devices: a bundled robot (paper, turtlebot, front-scanner) or a YAML

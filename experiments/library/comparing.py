@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 
 from ..artifacts.reading import read_json
@@ -77,6 +78,7 @@ def compare(
     p0: P0 = "small",
     max_steps: int | None = None,
     navigation: Navigation = "floor",
+    following: Following = "viewpoints",
     robot: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     jobs: int | None = None,
@@ -96,7 +98,7 @@ def compare(
     command = Compare(
         out=Path(out), worlds=tuple(map(str, worlds)), backends=tuple(backends), strategies=tuple(strategies),
         trials=trials, first_seed=first_seed, modes=tuple(modes), association=tuple(association), driver=driver, p0=p0,
-        max_steps=max_steps, navigation=navigation, robot=None if robot is None else str(robot),
+        max_steps=max_steps, navigation=navigation, following=following, robot=None if robot is None else str(robot),
         set=tuple(options_of((settings or {}).items())[1::2]), jobs=jobs,
     )  # fmt: skip
     campaign = command.campaign

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, overload
 
+from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 from explore.step import Step
 from slam.backends import BACKENDS
@@ -39,6 +40,7 @@ def explore(
     p0: P0 = "small",
     errorless: bool = False,
     navigation: Navigation = "floor",
+    following: Following = "viewpoints",
     sweep: bool = True,
     odometry: OdometrySource = "wheels",
     max_steps: int | None = None,
@@ -66,8 +68,8 @@ def explore(
     spec = robot if isinstance(robot, RobotSpec) else None
     options = Explore(
         world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
-        sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path, time_limit=time_limit,
-        return_to_start=return_to_start, start=start, scale=scale, fence=fence,
+        following=following, sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path,
+        time_limit=time_limit, return_to_start=return_to_start, start=start, scale=scale, fence=fence,
         robot=None if robot is None or spec is not None else str(robot),
         set=tuple(_words(settings or {})),
     )  # fmt: skip

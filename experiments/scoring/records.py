@@ -66,6 +66,10 @@ class Log:
     """Whether the scan fitted nowhere and was not taken in."""
     wheel_noise_factor: Float[np.ndarray, " s"]
     """How many times as large as stated the wheels' noise was taken to be."""
+    route_walls: Int[np.ndarray, " s"]
+    """How many walls the planned sequence holds; 0 without one."""
+    behaviours: tuple[str, ...]
+    """What the robot was doing, a word a step."""
     reasons: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -139,6 +143,7 @@ class Recorder:
     """Of the map, every `EVERY_M` metres and at the last step."""
     _columns: Columns = field(default_factory=Columns)
     _reasons: list[str] = field(default_factory=list)
+    _behaviours: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -159,6 +164,7 @@ class Recorder:
             self.votes.merge(keep, drop)
         self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1], step.matches.pairs)
         self._reasons.append(sys.intern(step.decision.words))
+        self._behaviours.append(step.decision.behaviour.value)
         self._columns.append(
             {
                 "time_s": step.time_s,
@@ -186,6 +192,7 @@ class Recorder:
                 "unstated_motion": step.localisation.unstated_motion is not None,
                 "is_lost": step.localisation.is_lost,
                 "wheel_noise_factor": step.localisation.noise_factor,
+                "route_walls": len(step.decision.walls_to_follow),
             }
         )
 
@@ -212,6 +219,7 @@ class Recorder:
             sigma_share=scan.sigma_share,
             range_max_m=float(scan.range_max_m),
             reasons=tuple(self._reasons),
+            behaviours=tuple(self._behaviours),
             **columns,
         )
 

@@ -16,7 +16,7 @@ from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.maps.mapped import read_corners
 from ..artifacts.saved import read_config, read_summary
-from ..artifacts.settings import NAVIGATION, differing, leaves, options_of
+from ..artifacts.settings import FOLLOWING, NAVIGATION, differing, leaves, options_of
 from ..replays.real_log import REAL_WALLS
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..replays.sources import RECORDED, was_real
@@ -49,7 +49,7 @@ LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_pat
 
 LARGEST_PLAN = 20_000_000
 """Bytes; a floor plan of more would make the page too slow to read."""
-BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start", NAVIGATION)
+BY_OPTION = ("mission.explorer.sweep", "mission.return_to_start", NAVIGATION, FOLLOWING)
 
 
 def is_run(folder: Path) -> bool:
@@ -239,6 +239,8 @@ def _command(trial: TrialConfig, names: list[str], options: ReplayOptions) -> st
     words += ["--return-to-start"] if mission.return_to_start else []
     navigation = mission.explorer.following.navigation
     words += [] if navigation == FollowingConfig.navigation else ["--navigation", navigation]
+    method = mission.explorer.following.method
+    words += [] if method == FollowingConfig.method else ["--following", method]
     for option, name in LIMITS.items():
         value = getattr(trial, name)
         words += [] if value == getattr(plain, name) else [option, str(value)]

@@ -1,5 +1,7 @@
 """From a path to one safe motion command; safe by the raw scan, also where the map is wrong."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
@@ -70,18 +72,16 @@ class Pilot:
         a narrow place the noise of so many would leave none. What the body touched, `touched_robot`, always
         counts.
         """
-        points, ahead = returns(scan, self._config.robot.scanner), self._aim(pose_world, self._config.lookahead_m)
-        aim, gap_m, narrow = centred(ahead, points, self._config)
-        if gap_m < self._config.narrow_m:
-            steady = steadied(scan, recent_robot, self._config.robot)
-            aim, gap_m, narrow = centred(ahead, steady, self._config)
-        points = np.concatenate([steady if narrow else points, _NOTHING if narrow else recent_robot, touched_robot])
-        if gap_m < self._config.narrow_m:
+        seen = ahead_of(
+            self._aim(pose_world, self._config.lookahead_m), scan, recent_robot, touched_robot, self._config
+        )
+        aim, points, narrow = seen.aim_robot, seen.points_robot, seen.fits
+        if seen.gap_m < self._config.narrow_m:
             command = step_towards(aim, points, self._config, narrow)
         else:
-            command = self._clear_step(ahead, pose_world, points)
+            command = self._clear_step(aim, pose_world, points)
         if command is not None:
-            return self._careful(command, pose_world, free_space)
+            return careful(command, pose_world, free_space, self._config)
         if narrow and self._config.robot.can_reverse:
             back = MotionCommand(-self._config.slow_m, 0.0)
             return back if is_safe(back, points, self._config, narrow) else None
@@ -121,13 +121,45 @@ class Pilot:
         clear = (row for row in range(last, 0, -1) if self._planner.clear_ahead(position_world, ahead[row]))
         return to_robot(ahead[next(clear, min(2, len(ahead) - 1))][None], pose_world)[0]
 
-    def _careful(
-        self, command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace
-    ) -> MotionCommand:
-        """Shorten a step whose end would cover floor that was not seen yet."""
-        x, y, _ = arc(command.forward_m, command.turn_rad)
-        c, s = np.cos(pose_world[2]), np.sin(pose_world[2])
-        end = pose_world[:2] + np.array([c * x - s * y, s * x + c * y])
-        if np.any(free_space.unknown_at(end + self._config.radius_m * _RIM)):
-            return MotionCommand(min(command.forward_m, self._config.slow_m), command.turn_rad)
-        return command
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """What lies between the robot and its aim."""
+
+    aim_robot: Float[np.ndarray, "2"]
+    """Robot frame, m; in a narrow gap moved to its middle."""
+    points_robot: Float[np.ndarray, "m 2"]
+    """The returns from which the body keeps clear, robot frame, m."""
+    gap_m: float
+    """Between the returns on both sides; infinite without returns on both."""
+    fits: bool
+    """Whether the gap is narrow and the body fits through it."""
+
+
+def ahead_of(
+    aim_robot: Float[np.ndarray, "2"],
+    scan: Scan,
+    recent_robot: Float[np.ndarray, "r 2"],
+    touched_robot: Float[np.ndarray, "t 2"],
+    config: DrivingConfig,
+) -> Ahead:
+    """Return what lies on the way to an aim, by this scan, the returns of the last ones and what the body touched."""
+    points = returns(scan, config.robot.scanner)
+    aim, gap_m, narrow = centred(aim_robot, points, config)
+    if gap_m < config.narrow_m:
+        steady = steadied(scan, recent_robot, config.robot)
+        aim, gap_m, narrow = centred(aim_robot, steady, config)
+    kept = [steady, touched_robot] if narrow else [points, recent_robot, touched_robot]
+    return Ahead(aim, np.concatenate(kept), gap_m, narrow)
+
+
+def careful(
+    command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace, config: DrivingConfig
+) -> MotionCommand:
+    """Shorten a step whose end would cover floor that was not seen yet."""
+    x, y, _ = arc(command.forward_m, command.turn_rad)
+    c, s = np.cos(pose_world[2]), np.sin(pose_world[2])
+    end = pose_world[:2] + np.array([c * x - s * y, s * x + c * y])
+    if np.any(free_space.unknown_at(end + config.radius_m * _RIM)):
+        return MotionCommand(min(command.forward_m, config.slow_m), command.turn_rad)
+    return command

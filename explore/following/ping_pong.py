@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 from slam.map.chains import HEAD, TAIL, OpenEnd
 
+from ..behaviour import Behaviour
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_near
 from .wall_following import Errand, FollowingConfig, Surroundings
@@ -21,6 +22,11 @@ class WallErrand(Errand):
         super().__init__(config)
         self._wall = wall
         self._first = side
+
+    @property
+    def behaviour(self) -> Behaviour:
+        """Along the wall, or round its end."""
+        return Behaviour.ROUND if self._stage % len(ROUNDING) else Behaviour.FOLLOW
 
     def _plan(self, around: Surroundings) -> bool:
         if self._wall not in around.walls.ids:

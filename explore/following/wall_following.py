@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import networkx as nx
 import numpy as np
@@ -18,6 +19,7 @@ from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
+from ..behaviour import Behaviour
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
 from ..planning.passable import PathConfig
@@ -26,12 +28,19 @@ from ..survey.viewpoints import LOOKS, ViewpointsConfig, ideal_places, lane, pla
 from .driving import Pilot
 from .driving_config import DrivingConfig
 
+Following = Literal["viewpoints", "paper"]
+
 
 @dataclass(frozen=True)
 class FollowingConfig:
     """The rules of the lowest layer."""
 
     robot: RobotSpec = of_robot()
+    method: Following = "viewpoints"
+    """How an open end is explored: from viewpoints, or by following its wall to and fro, as the paper does."""
+    ping_pongs: int = 1
+    """By the paper's following, a wall is given up after so many times to and fro along it without a change of the
+    map."""
     navigation: Navigation = "floor"
     """How the robot finds its way: over the floor seen free, or by sequences of walls."""
     paths: PathConfig = field(default_factory=PathConfig)
@@ -107,6 +116,11 @@ class Errand(ABC):
         self.walls_to_follow: tuple[int, ...] | None = None
         """The walls along which the navigator leads, in order; None where it asks for none."""
         self._no_way = ""
+
+    @property
+    def behaviour(self) -> Behaviour:
+        """What the robot does on this errand, as one word."""
+        return Behaviour.LOOK
 
     def command(self, around: Surroundings) -> MotionCommand | None:
         """Return the next step, or None when nothing is left to do; then `trouble` says what was in the way."""
@@ -213,6 +227,11 @@ class EndErrand(Errand):
             self._pilot = None
             self._visited = []
 
+    @property
+    def behaviour(self) -> Behaviour:
+        """To a viewpoint, or along a wall of the route to it."""
+        return Behaviour.FOLLOW if self._on_route else Behaviour.LOOK
+
     def _arrived(self) -> None:
         if self._on_route:
             self._on_route = False
@@ -290,6 +309,11 @@ class PlaceErrand(Errand):
         super().__init__(config)
         self._places = places_world
         self.doing = doing
+
+    @property
+    def behaviour(self) -> Behaviour:
+        """To floor that was not seen, or to something that is no wall of the map."""
+        return Behaviour.SWEEP
 
     def _plan(self, around: Surroundings) -> bool:
         if self._stage > 0:

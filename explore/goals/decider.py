@@ -10,6 +10,7 @@ import networkx as nx
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry
 
+from ..behaviour import Behaviour
 from ..following.wall_following import Surroundings
 from ..goal import GivenUp, Goal
 from ..outcome import Outcome
@@ -28,6 +29,8 @@ class Decision:
     walls_to_follow: tuple[int, ...] = ()
     """The walls along which the goal is approached."""
     given_up: GivenUp = field(default_factory=GivenUp)
+    behaviour: Behaviour = Behaviour.LOOK
+    """What the robot is doing, as one word."""
     outcome: Outcome | None = None
     """Why the mission is over, at its last step, else None."""
 

@@ -8,7 +8,7 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import Chain, OpenEnd
+from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
 from slam.robot import MotionCommand, RobotSpec, of_robot
 
 from ..following.ping_pong import WallErrand
@@ -21,6 +21,7 @@ from ..survey.frontiers import known_floor
 from ..survey.round_things import RoundConfig, is_round
 from .decider import Decision
 from .ledger import Event, Key, Ledger
+from .paper_errand import PaperErrand
 from .sweep import Sweep, SweepConfig
 
 
@@ -66,7 +67,7 @@ class _Task:
     """What the robot is about."""
 
     choice: Choice
-    errand: Errand
+    errand: Errand | PaperErrand
     goal: Goal
     walls_to_follow: tuple[int, ...]
     is_sweep: bool
@@ -122,7 +123,7 @@ class Explorer:
                 return Decision(command, "", given_up=given_up)
             led = task.errand.walls_to_follow
             walls = task.walls_to_follow if led is None else led
-            return Decision(command, task.doing, task.goal, walls, given_up)
+            return Decision(command, task.doing, task.goal, walls, given_up, task.errand.behaviour)
         left = len(given_up.keys & ends.keys())
         words = "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
         outcome = Outcome.ENDS_LEFT if left else Outcome.ALL_CLOSED
@@ -139,10 +140,11 @@ class Explorer:
                 break
             task.steps += 1
             command = task.errand.command(around)
-            if command is not None and task.steps <= self._config.patience_steps:
+            in_time = task.steps <= self._config.patience_steps or isinstance(task.errand, PaperErrand)
+            if command is not None and in_time:
                 self._looked_again = 0
                 return command
-            self._task = self._give_up(task, around)
+            self._task = self._give_up(task, around, ends)
         return self._look_again(around, len(self._ledger.set_aside) > known)
 
     def interrupt(self, around: Surroundings) -> None:
@@ -180,9 +182,10 @@ class Explorer:
         target = task.choice.target
         if isinstance(target, OpenEnd):
             key = (target.wall, target.side)
-            if key not in ends:
+            is_open = task.errand.is_open(ends) if isinstance(task.errand, PaperErrand) else key in ends
+            if not is_open:
                 self._ledger.note(Event.GONE, target.position_world)
-            holds = holds and key in ends and self._ledger.end(key).set_aside is None
+            holds = holds and is_open and self._ledger.end(key).set_aside is None
             if holds and isinstance(task.errand, EndErrand):
                 task.errand.follow(ends[key])
         if not holds:
@@ -240,19 +243,27 @@ class Explorer:
     def _set_out(self, choice: Choice, situation: Situation, is_sweep: bool) -> _Task:
         target, following = choice.target, self._config.following
         if isinstance(target, OpenEnd):
-            walls = route(situation.graph, situation.current_wall, target.wall)
             goal = Goal("open-end", target.wall, target.side, target.position_world, choice.reason)
+            if following.method == "paper":
+                return _Task(choice, PaperErrand(target, following), goal, (), is_sweep)
+            walls = route(situation.graph, situation.current_wall, target.wall)
             return _Task(choice, EndErrand(target, walls, following), goal, walls, is_sweep)
         errand = PlaceErrand(target.points_world, f"to where {target.what}", following)
         return _Task(choice, errand, Goal(target.kind, None, None, target.centre_world, choice.reason), (), is_sweep)
 
-    def _give_up(self, task: _Task, around: Surroundings) -> _Task | None:
+    def _give_up(self, task: _Task, around: Surroundings, ends: dict[Key, OpenEnd]) -> _Task | None:
         """Set the goal aside with the reason; an end that nothing was seen of, only after a walk along its wall."""
         errand, target, following = task.errand, task.choice.target, self._config.following
         in_time = task.steps <= self._config.patience_steps
         late = "" if in_time else f"not reached in {self._config.patience_steps} steps"
         if isinstance(target, Place):
             self._sweep.ended(target, late or errand.trouble)
+            return None
+        if isinstance(errand, PaperErrand):
+            for side in (TAIL, HEAD):
+                if (end := ends.get((target.wall, side))) is not None:
+                    self._ledger.put_aside(end, errand.trouble)
+                    self._ledger.note(Event.SET_ASIDE, end.position_world)
             return None
         key = (target.wall, target.side)
         if in_time and isinstance(errand, WallErrand):

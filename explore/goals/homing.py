@@ -11,6 +11,7 @@ from jaxtyping import Float
 from slam.map.chains import Chain
 from slam.robot import RobotSpec, of_robot
 
+from ..behaviour import Behaviour
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from ..goal import Goal
 from ..planning.sight import cells_within
@@ -64,8 +65,9 @@ class Homing:
         if command is not None:
             goal = Goal("start", None, None, self._start, "nothing is left to explore")
             return replace(
-                self._explored, command=command, words=self._way.doing, goal=goal, walls_to_follow=(), outcome=None
-            )
+                self._explored, command=command, words=self._way.doing, goal=goal, walls_to_follow=(), outcome=None,
+                behaviour=Behaviour.HOME,
+            )  # fmt: skip
         trouble, self._way = self._way.trouble, None
         if not self._is_home(around):
             return self._end(f"the start cannot be reached: {trouble or 'no way leads there'}")

@@ -10,6 +10,7 @@ import numpy as np
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
+from ..behaviour import Behaviour
 from ..following.wall_following import Surroundings
 from ..goal import GivenUp
 from ..outcome import Outcome
@@ -56,4 +57,5 @@ class Lost:
             words = f"lost at step {self._since}: its scans contradict the map, and no place in it fits"
             return Decision(None, words, given_up=self._given_up, outcome=Outcome.FAILED)
         words = f"lost since step {self._since}: turns to find its place"
-        return Decision(MotionCommand(0.0, self._config.robot.turn_rad), words, given_up=self._given_up)
+        turn = MotionCommand(0.0, self._config.robot.turn_rad)
+        return Decision(turn, words, given_up=self._given_up, behaviour=Behaviour.LOST)

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
+from ..behaviour import Behaviour
 from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory
 from ..floor.touches import Touches
@@ -106,7 +107,8 @@ class Retreat:
             command = MotionCommand(-last.forward_m, -last.turn_rad)
             may = command.forward_m >= 0.0 or self._config.robot.can_reverse
             if may and keeps_clear(command, self._points(around), self._following.driving):
-                return replace(self._decided, command=command, words=f"back along its way ({self._why})")
+                words = f"back along its way ({self._why})"
+                return replace(self._decided, command=command, words=words, behaviour=Behaviour.RETREAT)
         self._why = ""
         return None
 

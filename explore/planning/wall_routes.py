@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import networkx as nx
 
 
@@ -20,3 +22,23 @@ def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...
     while walls[-1] != here:
         walls.append(came_from[walls[-1]])
     return tuple(reversed(walls))
+
+
+def sequence(
+    graph: nx.DiGraph[int], near: Collection[int], goal: int, closed: Collection[tuple[int, int]] = ()
+) -> tuple[int, ...]:
+    """Return the walls to follow, from one of those `near` the robot to the goal, by the fewest changes of wall.
+
+    Edges that are `closed` are left out. Without a sequence there is no wall.
+    """
+    if goal in near:
+        return (goal,)
+    sources = {wall for wall in near if wall in graph}
+    if not sources or goal not in graph:
+        return ()
+    open_edges = nx.restricted_view(graph, (), closed)
+    try:
+        _, walls = nx.multi_source_dijkstra(open_edges, sources, goal, weight=None)
+    except nx.NetworkXNoPath:
+        return ()
+    return tuple(walls)

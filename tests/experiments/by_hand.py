@@ -62,7 +62,7 @@ def log_of(estimated=None, **changes):
         "closed_chains": np.array([0, 0, 1]), "set_aside": np.zeros(3, int), "seconds": np.array([0.006, 0.001, 0.002]),
         "planning_seconds": np.array([0.0005, 0.0001, 0.0003]), "nis": np.zeros(3), "nis_dof": np.zeros(3, int),
         "unstated_motion": np.zeros(3, bool), "is_lost": np.zeros(3, bool), "wheel_noise_factor": np.ones(3),
-        "reasons": ("", "", ""),
+        "route_walls": np.zeros(3, int), "reasons": ("", "", ""), "behaviours": ("look", "look", "look"),
     }  # fmt: skip
     kept |= changes
     heard = {"heard": kept["odometry"], "heard_cov": kept["odometry_cov"]}

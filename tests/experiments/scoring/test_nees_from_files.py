@@ -30,7 +30,9 @@ def folder(tmp_path_factory):
 def columns(folder):
     with (folder / "steps.csv").open() as file:
         rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0] if name != "reason"}
+    return {
+        name: np.array([float(row[name]) for row in rows]) for name in rows[0] if name not in ("behaviour", "reason")
+    }
 
 
 def matrix(pose):

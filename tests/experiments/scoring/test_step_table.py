@@ -13,6 +13,8 @@ from tests.experiments.by_hand import COVS, OFF, TRUE, log_of
 def test_each_column_is_that_of_its_name():
     log = log_of(
         reasons=("begins", "follows", "ends"),
+        behaviours=("look", "follow", "look"),
+        route_walls=np.array([0, 3, 0]),
         set_aside=np.array([0, 1, 2]),
         touched=np.array([True, False, True]),
         nis=np.array([0.0, 3.0, 9.0]),
@@ -24,6 +26,7 @@ def test_each_column_is_that_of_its_name():
     rows = list(csv.DictReader(steps_csv(log).decode().splitlines()))
     table = {name: [row[name] for row in rows] for name in STEP_COLUMNS}
     assert table.pop("reason") == ["begins", "follows", "ends"]
+    assert table.pop("behaviour") == ["look", "follow", "look"]
     estimated = TRUE + OFF
     # The odometry alone go to (1.1, 1) and (1.2, 1) from the true start.
     expected = {
@@ -39,6 +42,7 @@ def test_each_column_is_that_of_its_name():
         "step_ms": [6.0, 1.0, 2.0], "nis": [0.0, 3.0, 9.0], "nis_dof": [0, 4, 4], "nis_in_band": [0, 1, 1],
         "nis_window": [0.0, 0.75, 1.5],
         "unstated_motion": [0, 1, 0], "lost": [0, 0, 1], "wheel_noise_factor": [1.0, 1.0, 3.0],
+        "route_walls": [0, 3, 0],
     }  # fmt: skip
     for name, values in expected.items():
         assert [float(value) for value in table.pop(name)] == pytest.approx(list(values), abs=1e-6), name

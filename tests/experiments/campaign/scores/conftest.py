@@ -24,12 +24,12 @@ def made(world, make_map, make_chains):
         for name in ("ranges_m", "odometry", "odometry_cov", "heard", "heard_cov", "face_of_beam", "open_ends",
                      "tentative", "closed_chains",
                      "set_aside", "seconds", "planning_seconds", "touched", "nis", "nis_dof",
-                     "unstated_motion", "is_lost", "wheel_noise_factor")
+                     "unstated_motion", "is_lost", "wheel_noise_factor", "route_walls")
     }  # fmt: skip
     log = replace(
         run.log, **columns, time_s=np.arange(float(N)), scan_start_s=np.arange(float(N)) - 0.1,
         estimated_world=TRUE + OFF, estimated_cov=COVS, true_world=TRUE,
-        path_length_m=PATH, lines=np.arange(N), reasons=("",) * N,
+        path_length_m=PATH, lines=np.arange(N), reasons=("",) * N, behaviours=("look",) * N,
     )  # fmt: skip
     return replace(run, log=log, step=replace(run.step, index=N - 1, path_length_m=12.0))
 

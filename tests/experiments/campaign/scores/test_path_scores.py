@@ -44,7 +44,12 @@ def test_errors_of_the_path_are_those_of_plain_loops(made):
 def test_the_relative_error_takes_more_than_ten_steps(made):
     def shortened(n):
         names = [name for name, value in vars(made.log).items() if isinstance(value, np.ndarray) and len(value) == N]
-        log = replace(made.log, **{name: getattr(made.log, name)[:n] for name in names}, reasons=("",) * n)
+        log = replace(
+            made.log,
+            **{name: getattr(made.log, name)[:n] for name in names},
+            reasons=("",) * n,
+            behaviours=("look",) * n,
+        )
         return kept(replace(made, log=log)).summary
 
     assert (shortened(10)["rpe_m"], shortened(10)["rpe_rad"]) == (None, None)

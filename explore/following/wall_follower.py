@@ -1,0 +1,164 @@
+"""The paper's wall following layer: approach a wall, follow it, drive round its ends, and turn back (section 3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from slam.geometry.poses import to_robot, wrap
+from slam.map.chains import HEAD, TAIL
+from slam.robot import MotionCommand
+
+from ..behaviour import Behaviour
+from ..planning.lanes import lanes_of
+from ..planning.paths import Planner
+from .driving import Ahead, ahead_of, careful
+from .safe_steps import step_away, step_towards
+from .track import Track, track_of
+from .wall_following import FollowingConfig, PlaceErrand, Surroundings
+
+LOOKAHEADS_M = (0.3, 0.15)
+"""The robot aims at the place of the track so far ahead; at the nearer one where no step towards the other is safe."""
+ON_TRACK = 0.3
+"""An approach ends within this share of the stand-off of the track; following goes on up to twice the stand-off."""
+PROGRESS_M, PATIENCE_STEPS = 0.02, 30
+"""A motion is no longer possible, too, where so many steps led no farther along the track than this: a turn on the
+spot takes up to 18 of them."""
+
+
+class WallFollower:
+    """Follows one wall to and fro until another is given; it never ends by itself.
+
+    The wall is followed at the stand-off, which yields where the body would not fit otherwise; round an end the robot
+    goes on until no motion free of collision is left. Then it changes the driving direction (paper, section 3.1).
+    """
+
+    def __init__(self, wall: int, side: int | None, config: FollowingConfig) -> None:
+        """Follow `wall`, towards `side` (`TAIL` or `HEAD`) first; without a side, towards the nearer end."""
+        self.wall = wall
+        self._side, self._config = side, config
+        self._approach: PlaceErrand | None = None
+        self._is_on_track, self._is_turning = False, False
+        self._farthest_m, self._since, self._failed = -np.inf, 0, False
+        self._turns = 0
+        self.behaviour = Behaviour.APPROACH
+        self.trouble = ""
+
+    @property
+    def ping_pongs(self) -> int:
+        """How often the robot went to and fro: it turned back at both ends."""
+        return self._turns // 2
+
+    @property
+    def doing(self) -> str:
+        """What the robot does, in words."""
+        end = ("tail", "head")[self._side or TAIL]
+        return {
+            Behaviour.APPROACH: f"approaches wall {self.wall}",
+            Behaviour.FOLLOW: f"follows wall {self.wall} towards its {end}",
+            Behaviour.ROUND: f"drives round the {end} of wall {self.wall}",
+            Behaviour.REVERSE: f"turns back along wall {self.wall}",
+        }[self.behaviour]
+
+    def command(self, around: Surroundings) -> MotionCommand | None:
+        """Return the next step; None where the wall is not in the map or no way leads to it, told in `trouble`."""
+        if self.wall not in around.walls.ids:
+            self.trouble = f"wall {self.wall} is no longer in the map"
+            return None
+        track = track_of(self.wall, around.walls, self._config.viewpoints.standoff_m)
+        position_m, distance_m = track.locate(around.pose_world[:2])
+        if self._side is None:
+            self._side = TAIL if position_m < 0.5 * track.length_m else HEAD
+        if not self._on_track(track, position_m, distance_m):
+            command = self._come_near(around)
+            if command is not None or self._approach is not None:
+                return command
+        return self._follow(track, position_m, around)
+
+    def interrupt(self, around: Surroundings) -> None:
+        """Turn back: something stands in the way that no return shows."""
+        if self._approach is not None:
+            self._approach.interrupt(around)
+        elif self._is_on_track:
+            self._reverse()
+
+    def _on_track(self, track: Track, position_m: float, distance_m: float) -> bool:
+        """Return whether the robot is beside the wall, on its free side or round an end."""
+        slack_m = 1.0 if self._is_on_track else ON_TRACK
+        turn_m = np.pi * track.standoff_m
+        is_beside = -turn_m <= position_m <= track.length_m + turn_m or self._is_on_track
+        self._is_on_track = bool(is_beside and abs(distance_m - track.standoff_m) <= slack_m * track.standoff_m)
+        if self._is_on_track:
+            self._approach = None
+        return self._is_on_track
+
+    def _come_near(self, around: Surroundings) -> MotionCommand | None:
+        """Return the next step to the nearest place of the track; None, without an approach, once it is there."""
+        self.behaviour = Behaviour.APPROACH
+        if self._approach is None:
+            over_floor = replace(self._config, navigation="floor")
+            planner = Planner(around.free_space, around.pose_world[:2], self._config.paths)
+            lanes = lanes_of(self.wall, around.walls, planner, self._config.viewpoints.standoff_m)
+            stops = np.concatenate([np.zeros((0, 2)), *(lane.stops_world for lane in lanes)])
+            self._approach = PlaceErrand(stops, self.doing, over_floor)
+        command = self._approach.command(around)
+        if command is None:
+            self.trouble = self._approach.trouble
+            if not self.trouble:  # as near to the track as the floor allows
+                self._approach, self._is_on_track = None, True
+        return command
+
+    def _follow(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand:
+        """Return the next step along the track; where none is safe in two scans in a row, the robot turns back."""
+        ahead_m = position_m if self._side == HEAD else -position_m
+        if ahead_m > self._farthest_m + PROGRESS_M:
+            self._farthest_m, self._since = ahead_m, 0
+        self._since += 1
+        command = self._along(track, position_m, around) if self._since <= PATIENCE_STEPS else None
+        if command is not None:
+            self._failed = False
+            return command
+        if not self._failed:  # in a tight place the noise of one scan may leave no safe step
+            self._failed = True
+            return MotionCommand(0.0, 0.0)
+        self._reverse()
+        points = self._ahead(np.zeros(2), around).points_robot
+        command = self._along(track, position_m, around) or step_away(points, self._config.driving)
+        return command or MotionCommand(0.0, 0.0)
+
+    def _along(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand | None:
+        """Return a safe step along the track, as near to the stand-off as there is one; None where there is none."""
+        onward = 1.0 if self._side == HEAD else -1.0
+        for distance_m, lookahead_m in product(self._distances(track.standoff_m), LOOKAHEADS_M):
+            aim_world = track.place(position_m + onward * lookahead_m, distance_m)
+            aim_robot = to_robot(aim_world[None], around.pose_world)[0]
+            seen = self._ahead(aim_robot, around)
+            command = step_towards(seen.aim_robot, seen.points_robot, self._config.driving, seen.fits)
+            if command is not None:
+                turn_rad = abs(float(wrap(np.arctan2(aim_robot[1], aim_robot[0]))))
+                self._is_turning = self._is_turning and turn_rad > self._config.driving.spin_rad
+                self.behaviour = self._word(track, position_m)
+                return careful(command, around.pose_world, around.free_space, self._config.driving)
+        return None
+
+    def _word(self, track: Track, position_m: float) -> Behaviour:
+        if self._is_turning:
+            return Behaviour.REVERSE
+        return Behaviour.ROUND if track.is_past_end(position_m) else Behaviour.FOLLOW
+
+    def _distances(self, standoff_m: float) -> Float[np.ndarray, 3]:
+        """Return the distances from the wall that will do, the stand-off first, then nearer ones."""
+        return np.linspace(standoff_m, self._config.viewpoints.close_m, 3)
+
+    def _reverse(self) -> None:
+        self._side = TAIL + HEAD - (HEAD if self._side is None else self._side)
+        self._turns += 1
+        self._is_turning, self._failed = True, False
+        self._farthest_m, self._since = -np.inf, 0
+        self.behaviour = Behaviour.REVERSE
+
+    def _ahead(self, aim_robot: Float[np.ndarray, 2], around: Surroundings) -> Ahead:
+        return ahead_of(aim_robot, around.scan, around.recent_robot, around.touched_robot, self._config.driving)

@@ -1,0 +1,131 @@
+"""The paper's wall following layer: approach, follow, round, reverse, over and over (section 3.1)."""
+
+from collections import Counter
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+
+from explore.behaviour import Behaviour
+from explore.floor.free_space import FreeSpace
+from explore.following.wall_follower import WallFollower
+from explore.following.wall_following import FollowingConfig, Surroundings
+from sim.lidar import LidarConfig, RangeFinder
+from slam.geometry.poses import arc, compose
+from slam.map.chains import HEAD, TAIL
+from slam.robot import Scan
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+
+CONFIG = FollowingConfig()
+STANDOFF_M = CONFIG.viewpoints.standoff_m
+
+
+def faces_of(ring):
+    """Faces of a ring of corners, free side on the left."""
+    corners = np.array(ring, dtype=float)
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+HALL = faces_of([(0, 0), (8, 0), (8, 6), (0, 6)])
+BOARD = faces_of([(3, 3), (3, 3.1), (5, 3.1), (5, 3)])
+"""A free-standing wall of 2 m: its long faces are numbers 5 and 7 of the scene."""
+
+
+@pytest.fixture
+def hall_with_board(scene_of, look):
+    room = shapely.box(0, 0, 8, 6).difference(shapely.box(3, 3, 5, 3.1))
+    scene = replace(scene_of(0), room=room, faces=np.concatenate([HALL, BOARD]), grid=FreeSpace())
+    look(scene, np.array([[1.0, 1.0], [7.0, 1.0], [7.0, 5.0], [1.0, 5.0], [4.0, 2.0], [4.0, 4.0]]))
+    return scene
+
+
+def drive(scene, follower, pose, steps):
+    """Let the robot follow without errors; return its poses, and what it did at each step."""
+    finder, poses, words = RangeFinder(scene.faces, LidarConfig()), [pose], []
+    for _ in range(steps):
+        scan = Scan(finder.bearings_rad, finder.cast(poses[-1])[0], 0.01, 4.0, 0.0)
+        command = follower.command(Surroundings(scene.walls(poses[-1]), scene.grid, scan))
+        if command is None:
+            break
+        words.append(follower.behaviour)
+        poses.append(compose(poses[-1], arc(command.forward_m, command.turn_rad)))
+    return np.array(poses), words
+
+
+@pytest.mark.parametrize("side", [TAIL, HEAD])
+def test_the_robot_goes_to_and_fro_along_a_free_wall_until_another_is_given(hall_with_board, side):
+    follower = WallFollower(7, side, CONFIG)
+    poses, words = drive(hall_with_board, follower, np.array([1.0, 1.0, 0.0]), 500)
+    assert len(words) == 500
+    assert follower.ping_pongs >= 2
+    assert set(words) == {Behaviour.APPROACH, Behaviour.FOLLOW, Behaviour.ROUND, Behaviour.REVERSE}
+    changes = [b for a, b in pairwise([None, *words]) if a is not b]
+    assert changes[0] is Behaviour.APPROACH
+    assert Behaviour.APPROACH not in changes[1:]
+    reverses = [k for k, word in enumerate(changes) if word is Behaviour.REVERSE]
+    assert all(changes[k - 1] is Behaviour.ROUND for k in reverses)
+    boards = shapely.box(3, 3, 5, 3.1)
+    assert shapely.distance(shapely.MultiPoint(poses[:, :2]), boards) > CONFIG.robot.radius_m
+
+
+@pytest.mark.parametrize("side", [TAIL, HEAD])
+def test_it_follows_and_rounds_at_the_set_distance(hall_with_board, side):
+    poses, words = drive(hall_with_board, WallFollower(7, side, CONFIG), np.array([4.0, 2.0, 0.0]), 400)
+    board = shapely.box(3, 3, 5, 3.1)
+    gaps = shapely.distance(shapely.points(poses[:-1, :2]), board)
+    for word in (Behaviour.FOLLOW, Behaviour.ROUND):
+        own = gaps[np.array(words) == word]
+        # A circle about the wall's end comes nearer to its other face than to the end itself.
+        assert np.median(own) == pytest.approx(STANDOFF_M, abs=0.08)
+        assert own.max() < 1.5 * STANDOFF_M
+
+
+def test_it_goes_round_an_end_until_no_motion_is_left(hall_with_board):
+    """A thin wall lets it round by more than half a circle: the wall's other face is what stops it."""
+    poses, words = drive(hall_with_board, WallFollower(7, HEAD, CONFIG), np.array([4.0, 2.0, 0.0]), 200)
+    turned = words.index(Behaviour.REVERSE)
+    assert poses[turned, 1] > 3.1 + CONFIG.robot.radius_m
+    assert 2.0 < poses[turned, 0] < 6.0
+
+
+def test_in_an_inner_corner_it_turns_back_where_the_next_wall_stands(hall_with_board):
+    poses, words = drive(hall_with_board, WallFollower(0, HEAD, CONFIG), np.array([4.0, 1.0, 0.0]), 300)
+    turned = words.index(Behaviour.REVERSE)
+    assert poses[turned, 0] == pytest.approx(8.0 - CONFIG.robot.radius_m, abs=0.15)
+    back = words.index(Behaviour.REVERSE, words.index(Behaviour.FOLLOW, turned))
+    assert poses[back, 0] == pytest.approx(CONFIG.robot.radius_m, abs=0.15)
+    assert Behaviour.ROUND not in words
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_from_anywhere_every_wall_is_approached_and_nothing_is_touched(scene_of, seed):
+    """Rooms with blocks, walls and places by chance: the body keeps clear, and most walls are followed."""
+    scene, rng, followed = scene_of(seed), np.random.default_rng(seed), Counter()
+    for _ in range(3):
+        wall, place = int(rng.integers(len(scene.faces))), scene.places[rng.integers(30)]
+        poses, words = drive(scene, WallFollower(wall, None, CONFIG), np.append(place, rng.uniform(-3, 3)), 150)
+        assert shapely.distance(shapely.MultiPoint(poses[:, :2]), scene.room.boundary) > CONFIG.robot.radius_m
+        followed[bool(set(words) & {Behaviour.FOLLOW, Behaviour.ROUND})] += 1
+    assert followed[True] >= 1
+
+
+def test_a_narrow_passage_takes_the_standoff_but_not_the_clearance(scene_of, look):
+    """Along a corridor of 0.5 m, where the stand-off would touch the other side."""
+    room = shapely.box(0, 0, 5, 0.5)
+    scene = replace(scene_of(0), room=room, faces=faces_of([(0, 0), (5, 0), (5, 0.5), (0, 0.5)]), grid=FreeSpace())
+    look(scene, np.array([[1.0, 0.25], [4.0, 0.25]]))
+    poses, words = drive(scene, WallFollower(0, HEAD, CONFIG), np.array([1.0, 0.25, 0.0]), 120)
+    assert shapely.distance(shapely.MultiPoint(poses[:, :2]), room.boundary) > CONFIG.robot.radius_m
+    assert poses[:, 0].max() > 4.5
+    assert Behaviour.FOLLOW in words
+
+
+def test_a_wall_that_is_gone_is_not_followed(scene_of):
+    scene = scene_of(0)
+    follower = WallFollower(999, None, CONFIG)
+    poses, words = drive(scene, follower, np.append(scene.places[0], 0.0), 5)
+    assert (len(poses), words) == (1, [])
+    assert "999" in follower.trouble

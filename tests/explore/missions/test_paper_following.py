@@ -1,0 +1,102 @@
+"""Missions by the paper's three layers: a wall that is the end of a chain, the walls that lead there, one at a time."""
+
+from collections import Counter
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from explore.behaviour import Behaviour
+from explore.following.wall_following import EndErrand, FollowingConfig
+from explore.goals.explorer import ExplorerConfig
+from explore.limits import Limits, limited
+from explore.mission import MissionConfig, explore_mission
+from explore.outcome import Outcome
+from explore.strategies import STRATEGIES
+from sim.robot import SimulatedRobot
+from sim.worlds import load
+from slam.backends import BACKENDS
+from slam.mapper import Mapper
+
+pytestmark = pytest.mark.usefixtures("_unchecked")
+P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
+FOLLOWED = {Behaviour.APPROACH, Behaviour.FOLLOW, Behaviour.ROUND, Behaviour.REVERSE}
+
+
+def mission(world, navigation="visibility", ping_pongs=1, seed=1, errorless=True, max_steps=1500):
+    drawn = load(world)
+    robot = SimulatedRobot(drawn, seed, errorless)
+    following = FollowingConfig(method="paper", navigation=navigation, ping_pongs=ping_pongs)
+    config = MissionConfig(explorer=ExplorerConfig(following=following, sweep=False))
+    mapper = Mapper(BACKENDS["full-ekf"].make(drawn.start.copy(), P0.copy()))
+    steps = limited(explore_mission(robot, mapper, STRATEGIES["nearest-robot"].make(), config), Limits(steps=max_steps))
+    seen = []
+    for step in steps:
+        edges = set(step.graph.edges)
+        seen.append((step, edges))
+    return seen, robot
+
+
+@cache
+def figure_9():
+    return mission("paper-fig9")
+
+
+def test_figure_9_is_explored_by_following_walls_and_the_ping_pong_turns_back():
+    """In this run the robot turns back along walls 14 and 19 of its map, and goes on to their other ends."""
+    seen, robot = figure_9()
+    last = seen[-1][0]
+    assert last.outcome is Outcome.ALL_CLOSED
+    assert robot.record.collisions == 0
+    counts = Counter(step.decision.behaviour for step, _ in seen)
+    assert all(counts[word] > 0 for word in FOLLOWED)
+    assert sum(counts[word] for word in FOLLOWED) >= len(seen) - 3
+    reversed_walls = {
+        step.decision.walls_to_follow[0] for step, _ in seen if step.decision.behaviour is Behaviour.REVERSE
+    }
+    assert len(reversed_walls) >= 2
+    for wall in reversed_walls:
+        words = [s.decision.behaviour for s, _ in seen if s.decision.walls_to_follow[:1] == (wall,)]
+        changes = [b for a, b in pairwise([None, *words]) if a is not b]
+        turned = changes.index(Behaviour.REVERSE)
+        assert {Behaviour.FOLLOW, Behaviour.ROUND} & set(changes[turned + 1 :])
+
+
+def test_each_goal_is_a_wall_that_begins_or_ends_a_chain_and_the_last_to_be_followed():
+    seen, _ = figure_9()
+    for step, _ in seen:
+        goal = step.decision.goal
+        if goal is None:
+            continue
+        open_walls = {end.wall for chain in step.chains for end in chain.open_ends}
+        assert goal.wall in open_walls
+        assert step.decision.walls_to_follow[-1] == goal.wall
+
+
+def test_a_sequence_follows_edges_of_the_visibility_graph():
+    seen, _ = figure_9()
+    longest, planned = 0, ()
+    for step, edges in seen:
+        walls = step.decision.walls_to_follow
+        if walls != planned[len(planned) - len(walls) :]:  # planned at this step
+            assert all(pair in edges for pair in pairwise(walls))
+        longest, planned = max(longest, len(walls)), walls
+    assert longest >= 2
+
+
+def test_no_viewpoint_is_looked_at(monkeypatch):
+    def refused(*_):
+        raise AssertionError("a viewpoint was asked for")
+
+    monkeypatch.setattr(EndErrand, "_plan", refused)
+    seen, _ = mission("paper-fig8")
+    assert seen[-1][0].outcome is Outcome.ALL_CLOSED
+
+
+@pytest.mark.parametrize("navigation", ["floor", "visibility"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_with_noise_and_by_either_navigation_figure_4_is_explored_untouched(navigation, seed):
+    seen, robot = mission("paper-fig4", navigation, seed=seed, errorless=False)
+    assert seen[-1][0].ended == "complete"
+    assert robot.record.collisions == 0
