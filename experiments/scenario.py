@@ -11,8 +11,8 @@ from jaxtyping import Float
 from explore.limits import Limits
 from explore.mission import MissionConfig
 from explore.strategies import STRATEGIES, Strategy, make_strategy
-from sim.chance import SEED_MAX, Channel, standard_normals
-from sim.robot import RobotConfig, SimulatedRobot, TrueRecord
+from sim.chance import SEED_MAX, Chance, Channel
+from sim.robot import RobotConfig, SimulatedRobot, TrueRecord, chance_in
 from sim.worlds import World, WorldError, listing, load
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.backends import BACKENDS, BackendOptions
@@ -156,12 +156,9 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
     check(config)
     strategy = strategy_of(config.strategy)
     world = world or load_world(config.world, config.start, config.scale)
-    position_m, heading_rad = P0_SIGMAS[config.p0]
-    sigmas = np.array([position_m, position_m, heading_rad])
-    draw = np.zeros(3) if config.errorless else standard_normals(config.seed, Channel.START, 0, 3)
-    start = np.asarray(world.start, dtype=np.float64) + sigmas * draw
+    chance = None if config.errorless else chance_in(world, config.seed)
+    start, cov = drawn_start(chance, world.start, config.p0)
     world = fenced(world, config)
-    cov = np.diag(sigmas**2)
     return Scenario(
         config,
         world,
@@ -171,6 +168,19 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
         start,
         cov,
     )
+
+
+def drawn_start(
+    chance: Chance | None, true_start_world: Float[np.ndarray, "3"], p0: str
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+    """Return the pose (3,) m m rad at which the estimate starts, and its covariance (3, 3).
+
+    It is drawn about the true one; without chance it is the true one.
+    """
+    position_m, heading_rad = P0_SIGMAS[p0]
+    sigmas = np.array([position_m, position_m, heading_rad])
+    draw = np.zeros(3) if chance is None else chance.standard_normals(Channel.START, 0, 3)
+    return np.asarray(true_start_world, dtype=np.float64) + sigmas * draw, np.diag(sigmas**2)
 
 
 def fenced(world: World, config: TrialConfig) -> World:

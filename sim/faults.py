@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from slam.geometry.poses import inverse, to_world
 
-from .chance import Channel, uniforms
+from .chance import Chance, Channel
 from .drive import Slip
 
 MOMENTS = 32
@@ -44,7 +44,7 @@ class FaultsConfig:
 
 
 def with_mixed_pixels(
-    ranges: Float[np.ndarray, " k"], config: FaultsConfig, is_full_turn: bool, seed: int, step: int
+    ranges: Float[np.ndarray, " k"], config: FaultsConfig, is_full_turn: bool, chance: Chance, step: int
 ) -> tuple[Float[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
     """Return exact ranges (k,) m with some of the beams at edges between both surfaces, evenly drawn, and which."""
     if config.mixed <= 0.0:
@@ -55,7 +55,7 @@ def with_mixed_pixels(
     both = np.isfinite(ranges) & np.isfinite(after)
     leap = np.where(both, after, 0.0) - np.where(both, ranges, 0.0)
     at_edge = np.abs(leap) > config.edge_m
-    draws = uniforms(seed, Channel.MIXED, step, 2 * len(ranges)).reshape(2, -1)
+    draws = chance.uniforms(Channel.MIXED, step, 2 * len(ranges)).reshape(2, -1)
     taken = at_edge & (draws[0] < config.mixed)
     between = ranges.copy()
     between[taken] += draws[1, taken] * leap[taken]
@@ -63,12 +63,12 @@ def with_mixed_pixels(
 
 
 def with_dropouts(
-    ranges: Float[np.ndarray, " k"], config: FaultsConfig, seed: int, step: int
+    ranges: Float[np.ndarray, " k"], config: FaultsConfig, chance: Chance, step: int
 ) -> Float[np.ndarray, " k"]:
     """Return measured ranges (k,) m, +inf at the beams that were lost."""
     if config.dropout <= 0.0:
         return ranges
-    return np.where(uniforms(seed, Channel.DROPOUTS, step, len(ranges)) < config.dropout, np.inf, ranges)
+    return np.where(chance.uniforms(Channel.DROPOUTS, step, len(ranges)) < config.dropout, np.inf, ranges)
 
 
 def slipped(slip: Slip, config: FaultsConfig) -> Slip:
@@ -83,17 +83,17 @@ def slipped(slip: Slip, config: FaultsConfig) -> Slip:
     )
 
 
-def bump_rad(config: FaultsConfig, seed: int, step: int) -> float:
+def bump_rad(config: FaultsConfig, chance: Chance, step: int) -> float:
     """Return by how much a bump turns the robot after a drive, rad; 0 for most."""
     if config.bump <= 0.0:
         return 0.0
-    share, side = uniforms(seed, Channel.BUMPS, step, 2)
+    share, side = chance.uniforms(Channel.BUMPS, step, 2)
     return 0.0 if share >= config.bump else float(np.copysign(config.bump_rad, side - 0.5))
 
 
-def is_moving(config: FaultsConfig, seed: int, step: int) -> bool:
+def is_moving(config: FaultsConfig, chance: Chance, step: int) -> bool:
     """Return whether a scan is taken while the robot still drives."""
-    return config.moving > 0.0 and bool(uniforms(seed, Channel.MOVING, step, 1)[0] < config.moving)
+    return config.moving > 0.0 and bool(chance.uniforms(Channel.MOVING, step, 1)[0] < config.moving)
 
 
 def places_of_beams(way: Float[np.ndarray, "n 3"], drive_s: float, scan_s: float) -> Float[np.ndarray, "m 3"]:

@@ -10,7 +10,7 @@ from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
-from .chance import Channel, standard_normals
+from .chance import Chance, Channel, world_key
 from .drive import clamp, draw_slip, odometry, seconds, true_motion
 from .faults import (
     FaultsConfig,
@@ -40,6 +40,11 @@ class Building(Protocol):
     def start(self) -> Float[np.ndarray, "3"]:
         """Start pose, m m rad."""
         ...
+
+
+def chance_in(world: Building, seed: int) -> Chance:
+    """Return the streams that a robot in a world, and the estimate of its start, draw from on a seed."""
+    return Chance(seed, world_key(world.faces, world.start))
 
 
 @dataclass(frozen=True)
@@ -92,7 +97,8 @@ class SimulatedRobot:
         """Stand at the start of `world`; `errorless` makes ranges and wheels exact but keeps the stated noise."""
         self.config = config or RobotConfig()
         self._record = TrueRecord()
-        self._seed, self._errorless = seed, errorless
+        self._errorless = errorless
+        self._chance = chance_in(world, seed)
         self._finder = RangeFinder(world.faces, self.config.lidar)
         self._faces = np.asarray(world.faces, dtype=np.float64)
         self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
@@ -113,12 +119,12 @@ class SimulatedRobot:
     def sense(self) -> Scan:
         """Return the scan at the present place and record the truth about it."""
         lidar, faults, step = self.config.lidar, self.config.faults, len(self._record.poses_world)
-        ranges, faces = self._cast(len(self._way) > 0 and is_moving(faults, self._seed, step))
-        ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._seed, step)
+        ranges, faces = self._cast(len(self._way) > 0 and is_moving(faults, self._chance, step))
+        ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._chance, step)
         if not self._errorless:
-            draws = standard_normals(self._seed, Channel.LASER, step, len(ranges))
+            draws = self._chance.standard_normals(Channel.LASER, step, len(ranges))
             ranges = noisy(ranges, beam_sigmas(ranges, lidar), draws, lidar.range_max_m)
-        ranges = with_dropouts(ranges, faults, self._seed, step)
+        ranges = with_dropouts(ranges, faults, self._chance, step)
         self._record.poses_world.append(self._pose.copy())
         told = np.where(np.isfinite(ranges) & ~mixed, faces, -1)
         self._record.faces_of_beams.append(told.astype(np.min_scalar_type(-len(self._faces) - 1)))
@@ -153,7 +159,7 @@ class SimulatedRobot:
         """
         drive = self.config.wheels
         command = clamp(command, self.config)
-        draws = np.zeros(3) if self._errorless else standard_normals(self._seed, Channel.WHEELS, self._drives, 3)
+        draws = np.zeros(3) if self._errorless else self._chance.standard_normals(Channel.WHEELS, self._drives, 3)
         slip = slipped(draw_slip(command, drive, draws), self.config.faults)
         count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
         shares = np.linspace(0.0, 1.0, count + 1)[1:]
@@ -167,7 +173,7 @@ class SimulatedRobot:
         if free:
             self._pose = compose(self._pose, motions[free - 1])
             self._record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
-        self._pose[2] += bump_rad(self.config.faults, self._seed, self._drives)
+        self._pose[2] += bump_rad(self.config.faults, self._chance, self._drives)
         self._drives += 1
         duration = seconds(command, drive, self.config.wheel_speed_m_s)
         self._time_s += duration

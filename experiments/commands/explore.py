@@ -72,7 +72,7 @@ class Explore:
     strategy: str = "nearest-robot"
     """Where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at step 200."""
     seed: int = 1
-    """Decides all noise and the error of the first estimate; the same seed gives the same bytes."""
+    """Decides, in this world, all noise and the error of the first estimate; the same seed gives the same bytes."""
     p0: P0 = "small"
     """Covariance of the start: zero (0.1 mm, 1e-5 rad), small (0.01 m, 0.1 degree) or large (0.1 m, 2 degrees)."""
     errorless: bool = False

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
+from sim.chance import Chance, Channel, world_key
 from slam.geometry.lines import directions, normals, through
 from slam.geometry.poses import compose, inverse, to_world
 
@@ -51,23 +52,23 @@ class Loop:
 
 def drive(loop: Loop, seed: int) -> DriveObservations:
     """Return a drive round a ring whose niches are drawn with `seed`, all noise being the stated one."""
-    rng = np.random.default_rng([seed, 0])
-    walls = ring(loop.length_m, rng)
+    walls = ring(loop.length_m, np.random.default_rng(seed))
     way = loop.way_m
     poses = on_ring(way, loop.length_m)
-    motions, covs = _wheels(poses, loop, np.random.default_rng([seed, 1]))
+    chance = Chance(seed, world_key(walls, poses[0]))
+    motions, covs = _wheels(poses, loop, chance)
     again, first = [], []
     lines, known = through(walls), np.zeros(len(walls), dtype=bool)
-    noise = np.random.default_rng([seed, 2])
-    for at, pose in zip(way, poses, strict=True):
-        looks = look(walls, lines, pose, noise.standard_normal((len(walls), 2)))
+    for step, (at, pose) in enumerate(zip(way, poses, strict=True)):
+        draws = chance.standard_normals(Channel.LASER, step, 2 * len(walls))
+        looks = look(walls, lines, pose, draws.reshape(-1, 2))
         if loop.length_m - loop.gap_m < at < loop.length_m:
             looks = looks.take(np.zeros(0, dtype=np.int64))
         old = known[looks.walls]
         again.append(looks.take(old))
         first.append(looks.take(~old))
         known[looks.walls] = True
-    return DriveObservations(motions, covs, tuple(again), tuple(first), poses, dict(enumerate(lines)))
+    return DriveObservations(motions, covs, tuple(again), tuple(first), poses, dict(enumerate(lines)), chance)
 
 
 def on_ring(way_m: Float[np.ndarray, " s"], length_m: float) -> Float[np.ndarray, "s 3"]:
@@ -112,12 +113,13 @@ def ring(length_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2 2"
 
 
 def _wheels(
-    poses: Float[np.ndarray, "s 3"], loop: Loop, rng: np.random.Generator
+    poses: Float[np.ndarray, "s 3"], loop: Loop, chance: Chance
 ) -> tuple[Float[np.ndarray, "s 3"], Float[np.ndarray, "s 3 3"]]:
     """Return what the wheels report and its covariance, 14 mm along and 6 mm across per square root of a metre."""
     cov = loop.step_m * np.diag([0.014, 0.006, np.deg2rad(loop.heading_deg)]) ** 2
     true = [compose(inverse(a), b) for a, b in pairwise(poses)]
-    noise = rng.standard_normal((len(true), 3)) * np.sqrt(np.diag(cov))
+    draws = [chance.standard_normals(Channel.WHEELS, step, 3) for step in range(len(true))]
+    noise = np.array(draws) * np.sqrt(np.diag(cov))
     return np.concatenate([np.zeros((1, 3)), np.array(true) + noise]), np.tile(cov, (len(poses), 1, 1))
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.chance import Channel, standard_normals
+from sim.chance import Chance
+from sim.robot import chance_in
 from slam.estimation.backend import POSE, Backend, Joint, Observations
 from slam.estimation.mounting import odometry_of_scanner, scanner_poses
 from slam.evaluation.consistency import nees, pose_covariances, pose_errors
@@ -21,7 +22,7 @@ from slam.map.reliability import as_told
 from slam.map_keeper import seen_centres
 from slam.robot import Odometry
 
-from ..scenario import P0_SIGMAS, load_world
+from ..scenario import load_world
 from ..scoring.truth import truth_of
 from .oracles import PerfectExtraction, Witness, begins_a_line, of_true_lines
 from .replay import RecordedRun
@@ -61,6 +62,8 @@ class DriveObservations:
     true_poses_world: Float[np.ndarray, "s 3"]
     true_lines_world: dict[int, Float[np.ndarray, "2"]]
     """(alpha rad, r m) of each wall that begins a line."""
+    chance: Chance
+    """What drew its noise, and is to draw the error of the estimate's start."""
 
     def told(self, share: float) -> "DriveObservations":
         """Return the same observations with their covariances stated as this share of what they are."""
@@ -105,8 +108,9 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         for each in zip(recording.odometry, recording.odometry_cov, strict=True)
     ]
     world = load_world(trial.world, trial.start, trial.scale)
+    chance = chance_in(world, trial.seed)
     witness = Witness(truth_of(world, trial.robot), poses_world, run.true_face_of_beam)
-    extractor = PerfectExtraction(witness, trial.seed) if perfect_extraction else extract
+    extractor = PerfectExtraction(witness, chance) if perfect_extraction else extract
     mapper = of_true_lines(trial.mission.mapper) if perfect_extraction else trial.mission.mapper
     rules, extraction = mapper.walls.reliability, mapper.extraction
     true_lines: dict[int, np.ndarray] = {}
@@ -127,18 +131,11 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         first.append(_looks(segments, walls).take(begun))
         true_lines |= zip(walls[begun].tolist(), witness.truth.lines[faces[begun]], strict=True)
     motions, covs = np.array([each.motion for each in reported]), np.array([each.cov for each in reported])
-    return DriveObservations(motions, covs, tuple(again), tuple(first), poses_world, true_lines)
+    return DriveObservations(motions, covs, tuple(again), tuple(first), poses_world, true_lines, chance)
 
 
 def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> ScanObservations:
     return ScanObservations(walls, segments.lines, segments.cov, seen_centres(segments, np.arange(len(segments))))
-
-
-def start(seed: int, true_pose_world: Float[np.ndarray, "3"], p0: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pose (3,) at which the estimate starts, drawn about the true one, and its covariance (3, 3)."""
-    position_m, heading_rad = P0_SIGMAS[p0]
-    sigmas = np.array([position_m, position_m, heading_rad])
-    return true_pose_world + sigmas * standard_normals(seed, Channel.START, 0, 3), np.diag(sigmas**2)
 
 
 def ride(backend: Backend, drive: DriveObservations) -> Ridden:

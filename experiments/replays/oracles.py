@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sim.chance import Channel, standard_normals
+from sim.chance import Chance, Channel
 from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
 from slam.config import MapperConfig
 from slam.estimation.backend import Joint
@@ -103,8 +103,8 @@ def begins_a_line(
 class PerfectExtraction:
     """Real segmentation, but each line is the true one with an error drawn as the measurement model states it."""
 
-    def __init__(self, witness: Witness, seed: int) -> None:
-        self._witness, self._seed = witness, seed
+    def __init__(self, witness: Witness, chance: Chance) -> None:
+        self._witness, self._chance = witness, chance
 
     def __call__(
         self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
@@ -121,7 +121,7 @@ class PerfectExtraction:
         bearings_rad = segments.lines[:, 0] + np.arctan2(
             segments.cov[:, 0, 1] / segments.cov[:, 0, 0], segments.lines[:, 1]
         )
-        draws = standard_normals(self._seed, Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
+        draws = self._chance.standard_normals(Channel.ORACLE, self._witness.at, 2 * len(scan.bearings_rad))
         lines, cov = as_stated(exact, bearings_rad, segments.cov, draws[: 2 * len(segments)].reshape(-1, 2))
         return replace(segments, lines=lines, cov=cov)
 

@@ -21,7 +21,7 @@ from sim.logs.recorded_robot import (
     recording_of,
     within,
 )
-from sim.robot import TrueRecord
+from sim.robot import TrueRecord, chance_in
 from sim.worlds import World
 from slam.association.methods import METHODS, Matcher
 from slam.config import MapperConfig
@@ -194,6 +194,7 @@ def replay(
     witness = Witness(truth_of(world, config.robot), scanner_world, run.true_face_of_beam)
     if len(witness.truth.faces) <= int(run.true_face_of_beam.max(initial=-1)):
         raise UsageError(f"expected the world that the log was made in, found another {config.world}: bring it back")
+    chance = chance_in(world, config.seed)
     oracle = TrueAssociation(witness) if options.association == "true" else None
 
     def learn(step: Step) -> None:
@@ -208,7 +209,7 @@ def replay(
         mapper = Mapper(
             scenario.backend,
             rules,
-            PerfectExtraction(witness, config.seed) if options.perfect_extraction else extractor,
+            PerfectExtraction(witness, chance) if options.perfect_extraction else extractor,
             around(METHODS[rules.matching.method].matcher if oracle is None else oracle),
         )
         heard = heard_by(options.odometry or config.odometry, robot, config)

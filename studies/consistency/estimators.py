@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.replays.observations import DriveObservations, observations_of, ride, start
+from experiments.replays.observations import DriveObservations, observations_of, ride
 from experiments.replays.recordings import record
 from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
-from experiments.scenario import P0, P0_SIGMAS, TrialConfig
+from experiments.scenario import P0, P0_SIGMAS, TrialConfig, drawn_start, load_world
 from experiments.usage import UsageError, choose
+from sim.robot import chance_in
 from slam.backends import BACKENDS
 from slam.evaluation.consistency import anees, share_in_band
 
@@ -85,9 +86,10 @@ def rows_of(study: EstimatorStudy, seed: int) -> dict[Key, Scores]:
     drive = (
         observations_of(made, study.perfect_extraction).told(study.told_noise) if study.association == "true" else None
     )
+    chance = chance_in(load_world(study.world), seed)
     rows: dict[Key, Scores] = {}
     for p0 in study.p0:
-        pose, cov = start(seed, made.true_poses_world[0], p0)
+        pose, cov = drawn_start(chance, made.true_poses_world[0], p0)
         run = replace(made, trial=replace(made.trial, p0=p0), start_pose=pose, start_cov=cov)
         for name in study.backends:
             rows[study.key(p0, name, seed)] = (

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from experiments.replays.corridor import Loop, drive
-from experiments.replays.observations import DriveObservations, ride, start
-from experiments.scenario import P0, P0_SIGMAS
+from experiments.replays.observations import DriveObservations, ride
+from experiments.scenario import P0, P0_SIGMAS, drawn_start
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.geometry.poses import wrap
@@ -72,12 +72,12 @@ def rows_of(study: LoopStudy, task: tuple[Loop, int]) -> dict[Key, Scores]:
     """Make one ring and send its drive through every back end."""
     loop, seed = task
     seen = drive(loop, seed)
-    return {study.key(loop, name, seed): ridden_scores(study.p0, name, loop, seed, seen) for name in study.backends}
+    return {study.key(loop, name, seed): ridden_scores(study.p0, name, loop, seen) for name in study.backends}
 
 
-def ridden_scores(p0: str, name: str, loop: Loop, seed: int, seen: DriveObservations) -> Scores:
+def ridden_scores(p0: str, name: str, loop: Loop, seen: DriveObservations) -> Scores:
     """Return the scores of one back end on one ring's drive: None where its covariance is none."""
-    ridden = ride(BACKENDS[name].make(*start(seed, seen.true_poses_world[0], p0)), seen)
+    ridden = ride(BACKENDS[name].make(*drawn_start(seen.chance, seen.true_poses_world[0], p0)), seen)
     heading = np.abs(wrap(ridden.estimated_world[:, 2] - ridden.true_poses_world[:, 2])).max()
     rest = float(np.rad2deg(heading)), len(ridden.true_lines_world)
     try:

@@ -18,7 +18,7 @@ from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
 from sim.faults import FaultsConfig, bump_rad
 from sim.lidar import LidarConfig
-from sim.robot import RobotConfig
+from sim.robot import RobotConfig, chance_in
 from slam.estimation.gates import gate_level
 from slam.geometry.poses import wrap
 
@@ -87,7 +87,8 @@ def _one_of(study: BumpsStudy, task: tuple[int, int]) -> list[Row]:
     result = run_trial(config)
     assert result.log is not None
     log, summary = result.log, result.summary
-    at = np.array([k + 1 for k in range(len(log) - 1) if bump_rad(config.robot.faults, seed, k)], dtype=int)
+    chance = chance_in(result.scenario.world, seed)
+    at = np.array([k + 1 for k in range(len(log) - 1) if bump_rad(config.robot.faults, chance, k)], dtype=int)
     nees = pose_nees(log)
     off_rad = np.abs(wrap(log.estimated_world[:, 2] - log.true_world[:, 2]))
     knows = (nees < gate_level(CHANCE, 3)) & (off_rad < SHARE * config.robot.faults.bump_rad)

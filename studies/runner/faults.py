@@ -9,8 +9,9 @@ import numpy as np
 
 from experiments.replays.replay import RecordedRun
 from experiments.scenario import load_world
-from sim.chance import Channel, standard_normals
+from sim.chance import Channel
 from sim.lidar import RangeFinder, noisy
+from sim.robot import chance_in
 
 KINDS = ("none", "wheel-scale", "heading", "range", "range-noise")
 """Share by which the wheels report too much; degrees of heading that they gain in a metre; metres by which ranges are
@@ -55,12 +56,12 @@ def _noisier(run: RecordedRun, sigma_m: float) -> RecordedRun:
     """Return the recording with its ranges measured again from the true poses, the same draws a different size."""
     trial, recording = run.trial, run.recording
     world, lidar = load_world(trial.world, trial.start, trial.scale), trial.robot.lidar
-    finder = RangeFinder(world.faces, lidar)
+    finder, chance = RangeFinder(world.faces, lidar), chance_in(world, trial.seed)
     ranges, faces = np.empty_like(recording.ranges_m), np.empty_like(run.true_face_of_beam)
     for k, pose in enumerate(run.true_poses_world):
         true, hit = finder.cast(pose)
-        draws = standard_normals(trial.seed, Channel.LASER, k, len(true))
+        draws = chance.standard_normals(Channel.LASER, k, len(true))
         ranges[k] = noisy(true, sigma_m, draws, lidar.range_max_m)
-        faces[k] = np.where(np.isfinite(true), hit, -1)
+        faces[k] = np.where(np.isfinite(ranges[k]), hit, -1)
     told = replace(recording, ranges_m=ranges, sigma_m=np.full_like(recording.sigma_m, sigma_m))
     return replace(run, recording=told, true_face_of_beam=faces)

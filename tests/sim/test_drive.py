@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.chance import Channel, standard_normals
+from sim.chance import Chance, Channel
 from sim.drive import Slip, clamp, draw_slip, odometry, true_motion, wheels
 from slam.geometry.poses import arc
 from slam.robot import MotionCommand, RobotSpec
@@ -80,18 +80,19 @@ def test_turning_in_place_moves_the_wheels_against_each_other():
 
 def test_streams_are_keyed_and_independent_of_each_other():
     draws = {
-        (seed, channel, step): standard_normals(seed, channel, step, 3).tobytes()
+        (world, seed, channel, step): Chance(seed, world).standard_normals(channel, step, 3).tobytes()
+        for world in (0, 1, 2**64 - 1)
         for seed in (0, 1)
         for channel in Channel
         for step in range(3)
     }
     assert len(set(draws.values())) == len(draws)
-    assert standard_normals(1, Channel.LASER, 2, 3).tobytes() == draws[(1, Channel.LASER, 2)]
+    assert Chance(1, 0).standard_normals(Channel.LASER, 2, 3).tobytes() == draws[(0, 1, Channel.LASER, 2)]
     with pytest.raises(ValueError, match="seed"):
-        standard_normals(-1, Channel.LASER, 0, 3)
+        Chance(-1, 0).standard_normals(Channel.LASER, 0, 3)
 
 
 def test_draws_over_many_steps_are_standard_normal():
-    draws = np.concatenate([standard_normals(3, Channel.LASER, step, 50) for step in range(400)])
+    draws = np.concatenate([Chance(3, 0).standard_normals(Channel.LASER, step, 50) for step in range(400)])
     assert abs(draws.mean()) < 4 / np.sqrt(len(draws))
     assert draws.var() == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(draws)))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.chance import Chance
 from sim.drive import Slip, seconds
 from sim.faults import FaultsConfig, bump_rad, is_moving, slipped, with_dropouts, with_mixed_pixels
 from sim.lidar import RangeFinder
@@ -13,6 +14,7 @@ from slam.geometry.poses import arc, compose
 from slam.robot import MotionCommand
 from tests.sim.test_robot import room
 
+CHANCE = Chance(3, 0)
 DRIVES = [MotionCommand(0.1, 0.1), MotionCommand(0.15, -0.1), MotionCommand(0.0, 0.17)] * 3
 
 
@@ -29,11 +31,11 @@ def driven(faults, seed=5):
 def test_without_faults_nothing_changes():
     ranges = np.array([1.0, np.inf, 2.0])
     none = FaultsConfig()
-    assert with_dropouts(ranges, none, 1, 0) is ranges
-    np.testing.assert_array_equal(with_mixed_pixels(ranges, none, True, 1, 0)[0], ranges)
+    assert with_dropouts(ranges, none, CHANCE, 0) is ranges
+    np.testing.assert_array_equal(with_mixed_pixels(ranges, none, True, CHANCE, 0)[0], ranges)
     slip = Slip(0.1, 0.2, 0.3)
     assert slipped(slip, none) is slip
-    assert bump_rad(none, 1, 0) == 0.0
+    assert bump_rad(none, CHANCE, 0) == 0.0
 
 
 def test_lost_beams_are_empty_and_hit_nothing_and_the_others_are_as_they_were():
@@ -51,7 +53,7 @@ def test_mixed_pixels_lie_between_the_two_surfaces_and_only_at_edges():
     ranges = np.array([1.0, 1.05, 3.0, 3.1, np.inf, 2.0, 1.0])
     config, drawn = FaultsConfig(mixed=0.5), []
     for step in range(200):
-        found, mixed = with_mixed_pixels(ranges, config, False, 3, step)
+        found, mixed = with_mixed_pixels(ranges, config, False, CHANCE, step)
         assert not mixed[[0, 2, 3, 4, 6]].any()
         np.testing.assert_array_equal(found[~mixed], ranges[~mixed])
         assert np.all(found[mixed] <= np.maximum(ranges, np.roll(ranges, -1))[mixed])
@@ -59,8 +61,8 @@ def test_mixed_pixels_lie_between_the_two_surfaces_and_only_at_edges():
         drawn.append(mixed[[1, 5]])
     assert 0.4 < np.mean(drawn) < 0.6
     turned = np.array([1.0, 2.0, 2.0, 3.0])
-    assert any(with_mixed_pixels(turned, config, True, 3, step)[1][3] for step in range(20))
-    assert not any(with_mixed_pixels(turned, config, False, 3, step)[1][3] for step in range(20))
+    assert any(with_mixed_pixels(turned, config, True, CHANCE, step)[1][3] for step in range(20))
+    assert not any(with_mixed_pixels(turned, config, False, CHANCE, step)[1][3] for step in range(20))
 
 
 def test_a_bump_turns_the_robot_and_the_wheels_say_nothing_of_it():
@@ -70,7 +72,7 @@ def test_a_bump_turns_the_robot_and_the_wheels_say_nothing_of_it():
         np.testing.assert_array_equal(before.cov, after.cov)
     off = np.diff(bumped[2][:, 2]) - np.diff(right[2][:, 2])
     np.testing.assert_allclose(np.abs(off), 0.1, atol=1e-12)
-    sides = [bump_rad(FaultsConfig(bump=0.5, bump_rad=0.1), 1, step) for step in range(400)]
+    sides = [bump_rad(FaultsConfig(bump=0.5, bump_rad=0.1), CHANCE, step) for step in range(400)]
     assert 0.4 < np.mean(np.abs(sides) > 0) < 0.6
     assert abs(np.mean(sides)) < 0.02
 
@@ -114,4 +116,4 @@ def test_as_many_scans_as_asked_are_in_motion_and_no_other_draw_is_shifted():
     np.testing.assert_array_equal(right[2], moving[2])
     np.testing.assert_array_equal(right[0][0].ranges_m, moving[0][0].ranges_m)
     assert all(np.any(a.ranges_m != b.ranges_m) for a, b in zip(right[0][1:], moving[0][1:], strict=True))
-    assert 0.4 < np.mean([is_moving(FaultsConfig(moving=0.5), 1, step) for step in range(400)]) < 0.6
+    assert 0.4 < np.mean([is_moving(FaultsConfig(moving=0.5), CHANCE, step) for step in range(400)]) < 0.6

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sim.chance import Chance
 from sim.faults import bump_rad
 from studies.robots.bumps import BumpsStudy, recoveries, table
 
@@ -16,7 +17,7 @@ def test_a_turn_is_recovered_from_at_the_first_step_that_knows_the_pose_again():
 
 def test_the_robot_is_turned_as_often_and_as_far_as_asked():
     faults = BumpsStudy(share=0.5, bump_deg=4.0).trial(180, 1).robot.faults
-    turns = np.rad2deg([bump_rad(faults, 1, step) for step in range(400)])
+    turns = np.rad2deg([bump_rad(faults, Chance(1, 0), step) for step in range(400)])
     assert 0.4 < np.mean(turns != 0.0) < 0.6
     np.testing.assert_allclose(np.abs(turns[turns != 0.0]), 4.0)
 

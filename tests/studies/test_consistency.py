@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from experiments.campaign.scores.score import offsets
 from experiments.replays.corridor import FIRM_RAD, Loop, drive, on_ring
-from experiments.replays.observations import observations_of, ride, start
+from experiments.replays.observations import observations_of, ride
 from experiments.replays.oracles import as_stated
 from experiments.replays.recordings import record, recorded
 from experiments.replays.replay import ReplayOptions, replay
 from experiments.reproductions.runs.origin import ShiftedOrigin
 from experiments.reproductions.runs.standing import slope, stand
-from experiments.scenario import TrialConfig
+from experiments.scenario import TrialConfig, drawn_start
 from experiments.trial import run_trial
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
@@ -130,7 +130,10 @@ def mean_anees(told, loops=16):
     for seed in range(1, loops + 1):
         seen = drive(Loop(20.0, after_m=5.0), seed)
         make = BACKENDS["invariant-ekf"].make
-        found.append(ride(make(*start(seed, seen.true_poses_world[0], "zero")), seen.told(told)).pose_nees.mean() / 3)
+        found.append(
+            ride(make(*drawn_start(seen.chance, seen.true_poses_world[0], "zero")), seen.told(told)).pose_nees.mean()
+            / 3
+        )
     return np.array(found)
 
 

@@ -22,8 +22,8 @@ from slam.estimation.backend import Backend
 from slam.geometry.lines import normals
 
 from ...replays.corridor import Loop, drive
-from ...replays.observations import DriveObservations, ride, start
-from ...scenario import P0, P0_SIGMAS
+from ...replays.observations import DriveObservations, ride
+from ...scenario import P0, P0_SIGMAS, drawn_start
 from ...terminal.console import plain_console
 from ...usage import choose
 
@@ -67,7 +67,7 @@ class ShiftedOrigin:
         shift = np.array(self.shift_m)
 
         def make(by: Float[np.ndarray, "2"]) -> Backend:
-            pose, cov = start(seed, seen.true_poses_world[0], self.p0)
+            pose, cov = drawn_start(seen.chance, seen.true_poses_world[0], self.p0)
             backend: Backend = kind(pose + np.append(by, 0.0), cov, EkfConfig(at_wall=at_wall))
             return backend
 

@@ -11,14 +11,14 @@ import tyro
 from jaxtyping import Float
 from rich.table import Table
 
+from sim.chance import Chance, Channel, world_key
 from slam.backends import BACKENDS
 from slam.estimation.backend import Observations
 from slam.geometry.lines import through
 from slam.geometry.poses import J
 
 from ...replays.corridor import look, on_ring, ring
-from ...replays.observations import start
-from ...scenario import P0, P0_SIGMAS
+from ...scenario import P0, P0_SIGMAS, drawn_start
 from ...terminal.console import plain_console
 from ...usage import UsageError, choose
 
@@ -60,18 +60,19 @@ class StandingStill:
 
 def stand(name: str, p0: str, looks: int, seed: int) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return, after each look, tr P / tr P0 and the least eigenvalue of P - A P0 A' over tr P0."""
-    rng = np.random.default_rng(seed)
-    walls = ring(40.0, rng)
+    walls = ring(40.0, np.random.default_rng(seed))
     lines = through(walls)
     # Where most walls are in sight: between parallel ones alone nothing would be seen of the way along them.
     true = max(on_ring(np.arange(0.0, 10.0, 0.25), 40.0), key=lambda p: len(look(walls, lines, p, 0.0 * lines)))
-    begin, cov = start(seed, true, p0)
+    chance = Chance(seed, world_key(walls, true))
+    draws = [chance.standard_normals(Channel.LASER, k, 2 * len(walls)).reshape(-1, 2) for k in range(looks + 1)]
+    begin, cov = drawn_start(chance, true, p0)
     backend = BACKENDS[name].make(begin.copy(), cov.copy())
-    seen = look(walls, lines, true, rng.standard_normal((len(walls), 2)))
+    seen = look(walls, lines, true, draws[-1])
     ids = backend.grow(seen.lines, seen.cov, seen.centres)
     trace, bound = np.empty(looks), np.empty(looks)
     for k in range(looks):
-        seen = look(walls, lines, true, rng.standard_normal((len(walls), 2)))
+        seen = look(walls, lines, true, draws[k])
         observed = Observations(ids, seen.lines, seen.cov)
         backend.update(observed, observed)
         belief = backend.belief

@@ -4,6 +4,7 @@ import numpy as np
 
 from experiments.replays.oracles import PerfectExtraction, Witness, of_true_lines
 from experiments.scoring.truth import truth_of
+from sim.chance import Chance
 from sim.lidar import LidarConfig, RangeFinder
 from sim.robot import RobotConfig
 from slam.config import MapperConfig
@@ -38,7 +39,8 @@ def test_a_piece_whose_line_is_true_stays_on_the_beams_that_showed_it(world):
     noisy = ranges + 0.01 * np.random.default_rng(1).standard_normal(len(ranges))
     scan = Scan(finder.bearings_rad, noisy, 0.01, 4.0, 0.0)
     seen = extract(scan, ExtractionConfig())
-    drawn = PerfectExtraction(Witness(truth, pose[None], np.asarray(faces)[None]), seed=3)(scan, ExtractionConfig())
+    witness = Witness(truth, pose[None], np.asarray(faces)[None])
+    drawn = PerfectExtraction(witness, Chance(3, 0))(scan, ExtractionConfig())
     assert len(drawn) == len(seen) >= 2
     assert np.abs(drawn.lines - seen.lines).max() > 1e-4
     np.testing.assert_allclose(np.cos(middles_rad(drawn) - middles_rad(seen)), 1.0, atol=1e-9)
