@@ -148,6 +148,7 @@ navigation-apartments: setup
 
 # The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
 paper: setup
+	$(BIN)/python -m studies.paper.following --jobs 2
 	$(BIN)/python -m studies.paper.study --seeds 20
 
 # Campaign, bias, heading, strategies, intervals, the paper's figures, and one report; hours, goes on where it was. TRIALS=...

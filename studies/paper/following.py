@@ -15,6 +15,7 @@ import numpy as np
 
 from experiments.artifacts.presets import METHODS
 from experiments.artifacts.settings import FOLLOWING, nested, over, trial_of
+from experiments.reproductions.runs.traversals import passes
 from experiments.scenario import TrialConfig, check
 from experiments.trial import TrialResult, run_trial
 from explore.behaviour import Behaviour
@@ -85,7 +86,7 @@ class FollowingStudy:
             check(trial(task, self.max_steps))
         numbered = [(task, [task]) for task in tasks]
         rows = list(rows_of(self.out, NAMES, numbered, partial(_one, self.max_steps), self.jobs))
-        print(f"{len(rows)} rows in {self.out}; `make paper-page` writes their tables")
+        print(f"{len(rows)} rows in {self.out}; `python -m studies.paper.page` writes their tables")
 
 
 def trial(task: Task, max_steps: int) -> TrialConfig:
@@ -102,7 +103,7 @@ def _one(max_steps: int, task: Task) -> Sequence[Row]:
 
 
 def scores(result: TrialResult) -> Row:
-    """Return what a run came to, what its steps were spent on, and when its first chain was closed."""
+    """Return what a run came to, what its steps were spent on, and where it led."""
     row: dict[str, Any] = {name: _short(result.summary.get(name)) for name in KEPT}
     log = result.log
     if log is None:
@@ -111,6 +112,7 @@ def scores(result: TrialResult) -> Row:
     counts = Counter(log.behaviours)
     return row | {
         "first_closed_m": _short(float(log.path_length_m[closed[0]])) if len(closed) else None,
+        "start_passes": passes(log.true_world),
         "longest_route": int(log.route_walls.max()),
         "behaviours": {word.value: counts[word.value] for word in Behaviour if counts[word.value]},
     }

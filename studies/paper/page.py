@@ -18,13 +18,14 @@ from experiments.reproductions.reproduction import Value
 from viz.reports.report import PageTable
 
 from ..runner.rows import Row, fingerprint
+from .following_tables import following_section, read_following, strategies_in_words
 
 ROWS, PAGE = Path("studies/paper/rows.jsonl"), Path("docs/paper.md")
 HEAD = """# The paper's figures
 
-This page is made by `make paper` from the rows in `studies/paper/rows.jsonl`. For each figure the paper's filter,
-`block-ekf`, drives the robot along sequences of walls, as in the paper. The other back ends map the same scans, and
-each matches with its own gate. `chainslam reproduce NAME --seed N` draws the picture of one drive.
+This page is made by `make paper` from the rows in `studies/paper/`. For each figure `--preset paper-method` drives the
+robot: the paper's filter, matching, navigation and wall following. The other back ends map the same scans with the same
+mapper, and each matches with its own gate. `chainslam reproduce NAME --seed N` draws the picture of one drive.
 
 A cell holds the median over the drives, and in brackets the least and the largest value. Counts have their mean
 in place of the median. Of what is either so or not, a cell holds the share of the drives in which it is so.
@@ -33,9 +34,7 @@ NOTES = {
     "table1": "Lengths are in metres, as measured between mapped corners.",
     "fig5": "In the paper motion and perception are without error. Here they have noise, a drive for each seed."
     " Sigmas are of each back end on the same observations, with the true association.",
-    "fig6": "As figure 5. The ratio is that of two drives with one seed. Without noise, as in the paper,"
-    " `chainslam reproduce fig5 fig6` drives 147.9 m and 452.4 m, 3.06 times as far. It passes the start once and 14"
-    " times.",
+    "fig6": "As figure 5. The ratio is that of two drives with one seed.",
     "fig10": "The robot starts with an uncertainty of 0.1 m and 2 degrees, and drives back to its start in the end.",
     "fig11": "The drives of figure 10.",
     "eq4": "`wall` attaches r to the wall, `origin` to the world's origin, as the paper does. A ring of 40 m is driven"
@@ -54,18 +53,19 @@ def stale(rows: Iterable[Row]) -> list[str]:
     return sorted({row["figure"] for row in rows if row["code"] != fingerprint()})
 
 
-def page_of(rows: Sequence[Row]) -> str:
-    """Return the whole page."""
+def page_of(rows: Sequence[Row], followed: Sequence[Row] = ()) -> str:
+    """Return the whole page; `followed` are the drives by both followings."""
     parts = [HEAD]
     for name, own in _by_figure(rows).items():
         parts.append(f"## {_title(name)}\n")
-        parts += [f"{NOTES[name]}\n"] if name in NOTES else []
+        note = " ".join(filter(None, [NOTES.get(name, ""), strategies_in_words(followed) if name == "fig6" else ""]))
+        parts += [f"{note}\n"] if note else []
         made = ", ".join(sorted({row["commit"] for row in own}))
         parts.append(f"Drives with seeds {own[0]['seed']} to {own[-1]['seed']}, made at {made}.\n")
         header, *lines = table_of([row["numbers"] for row in own], REPRODUCTIONS[name].paper)
         parts += map(_line, (header, ["---"] * len(header), *lines))
         parts.append("")
-    return "\n".join(parts)
+    return "\n".join([*parts, *following_section(followed)])
 
 
 def tables_of(rows: Sequence[Row]) -> list[PageTable]:
@@ -115,7 +115,7 @@ def cell(values: Sequence[Value]) -> str:
 
 def write_page(rows: Sequence[Row], page: Path) -> None:
     """Write the page of the tables."""
-    page.write_text(page_of(rows))
+    page.write_text(page_of(rows, read_following()))
 
 
 def _title(name: str) -> str:

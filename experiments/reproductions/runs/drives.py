@@ -12,7 +12,8 @@ from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 from viz.figures.curves import SmallMap
 
-from ...artifacts.settings import NAVIGATION, nested, trial_of
+from ...artifacts.presets import preset_of
+from ...artifacts.settings import trial_of
 from ...replays.recordings import recorded
 from ...replays.replay import replay
 from ...scenario import TrialConfig
@@ -41,9 +42,8 @@ def replayed(config: TrialConfig, backend: str) -> TrialResult:
 
 
 def drive_by_walls(world: str, **settings: Any) -> TrialConfig:
-    """Return a drive of the paper's robot: by its estimator, along sequences of walls."""
-    by_walls = trial_of(nested([(NAVIGATION, "visibility")]))
-    return replace(by_walls, world=world, backend=PAPER, **settings)
+    """Return a drive of the paper's robot: its estimator, matching, wall following and navigation (paper-method)."""
+    return replace(trial_of(preset_of("paper-method")), world=world, **settings)
 
 
 def there_and_back(seed: int) -> TrialConfig:
