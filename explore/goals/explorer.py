@@ -199,7 +199,8 @@ class Explorer:
     ) -> _Task | None:
         """Ask the strategy where to go, and set out; None when there is nowhere left."""
         self._tire(ends)
-        self._pass_round(around, ends)
+        if self._config.following.method == "viewpoints":
+            self._pass_round(around, ends)
         if not self._candidates(ends):
             self._retry(around, ends)
         situation = Situation(
