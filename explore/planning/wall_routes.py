@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Collection
 
 import networkx as nx
 
-
-def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...]:
-    """Return the walls to follow from the present one to the goal, both included, by the fewest changes of wall.
-
-    Among equals the one with the lowest ids comes first. Where no way is known the goal stands alone: the robot
-    then looks for one over the free floor.
-    """
-    if here is None or here == goal or here not in graph or goal not in graph:
-        return (goal,)
-    came_from = dict(nx.bfs_predecessors(graph, here, sort_neighbors=sorted))
-    if goal not in came_from:
-        return (goal,)
-    walls = [goal]
-    while walls[-1] != here:
-        walls.append(came_from[walls[-1]])
-    return tuple(reversed(walls))
+from .visibility_graph import NEIGHBOUR
 
 
 def sequence(
@@ -29,16 +15,30 @@ def sequence(
 ) -> tuple[int, ...]:
     """Return the walls to follow, from one of those `near` the robot to the goal, by the fewest changes of wall.
 
-    Edges that are `closed` are left out. Without a sequence there is no wall.
+    Among equals the one with the most neighbours in a chain comes first: round a corner the robot goes on following,
+    across the floor to a wall that was seen it has to find a way. Then the one with the lowest ids. Edges that are
+    `closed` are left out. Without a sequence there is no wall.
     """
-    if goal in near:
-        return (goal,)
-    sources = {wall for wall in near if wall in graph}
-    if not sources or goal not in graph:
-        return ()
-    open_edges = nx.restricted_view(graph, (), closed)
-    try:
-        _, walls = nx.multi_source_dijkstra(open_edges, sources, goal, weight=None)
-    except nx.NetworkXNoPath:
-        return ()
-    return tuple(walls)
+    queue: list[tuple[int, int, tuple[int, ...]]] = [(0, 0, (wall,)) for wall in sorted(near)]
+    done: set[int] = set()
+    while queue:
+        changes, sights, walls = heapq.heappop(queue)
+        here = walls[-1]
+        if here == goal:
+            return walls
+        if here in done or here not in graph:
+            continue
+        done.add(here)
+        for wall, edge in graph[here].items():
+            if wall not in done and (here, wall) not in closed:
+                is_sight = edge.get("kind") != NEIGHBOUR
+                heapq.heappush(queue, (changes + 1, sights + is_sight, (*walls, wall)))
+    return ()
+
+
+def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...]:
+    """Return the walls to follow from the present one to the goal, both included (`sequence`).
+
+    Where no way is known the goal stands alone: the robot then looks for one over the free floor.
+    """
+    return (() if here is None else sequence(graph, (here,), goal)) or (goal,)

@@ -1,0 +1,106 @@
+"""Where the nodes and edges of a visibility graph are drawn: beside the walls, round their corners, across the floor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+CURVED = 0.07
+"""How far a sight bends out of the straight line, over its length."""
+ROUNDS = 60
+"""Nodes are moved apart so often at most."""
+POINTS = 17
+"""Of a curve."""
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Circles of one size beside the middles of walls, on the free side, moved apart where they would overlap."""
+
+    at: Float[np.ndarray, "n 2"]
+    radius_m: float
+    ends_world: Float[np.ndarray, "n 2 2"]
+
+    def sights(self, pairs: Int[np.ndarray, "e 2"]) -> Float[np.ndarray, "e p 2"]:
+        """Return a slight curve for each pair, from the rim of one circle to that of the other."""
+        a, b = self.at[pairs[:, 0]], self.at[pairs[:, 1]]
+        way = b - a
+        middle = 0.5 * (a + b) + CURVED * np.stack([way[:, 1], -way[:, 0]], axis=-1)
+        share = np.linspace(0.0, 1.0, POINTS)[:, None]
+        curve = (1 - share) ** 2 * a[:, None] + 2 * share * (1 - share) * middle[:, None] + share**2 * b[:, None]
+        cut = np.minimum(1.3 * self.radius_m / np.maximum(np.hypot(*way.T), 1e-9), 0.45)
+        # The curve is flat enough for its parameter to be the way along it.
+        inside = cut[:, None, None] + share * (1.0 - 2.0 * cut[:, None, None])
+        return (
+            (1 - inside) ** 2 * a[:, None] + 2 * inside * (1 - inside) * middle[:, None] + inside**2 * b[:, None]
+            if len(pairs)
+            else curve
+        )
+
+    def round_corner(self, first: int, second: int, corner_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "p 2"]:
+        """Return the way from one wall's circle round their corner, on the free side, to its neighbour's."""
+        normals = free_normals(self.ends_world[[first, second]])
+        gap_m = beside_m(self.radius_m)
+        try:
+            turn = corner_world + gap_m * np.linalg.solve(normals, np.ones(2))
+        except np.linalg.LinAlgError:
+            turn = corner_world + gap_m * normals[0]
+        if np.hypot(*(turn - corner_world)) > 3.0 * gap_m:  # walls on one line, or a sharp tooth
+            turn = corner_world + gap_m * normals[0]
+        a, b = self.at[first], self.at[second]
+        legs = [_towards(turn, end, self.radius_m) for end in (a, b)]
+        share = np.linspace(0.0, 1.0, POINTS)[:, None]
+        bend = (1 - share) ** 2 * legs[0] + 2 * share * (1 - share) * turn + share**2 * legs[1]
+        return np.concatenate([_towards(a, turn, self.radius_m)[None], bend, _towards(b, turn, self.radius_m)[None]])
+
+
+def beside_m(radius_m: float) -> float:
+    """Return how far from its wall the middle of a circle is."""
+    return 1.45 * radius_m
+
+
+def free_normals(ends_world: Float[np.ndarray, "n 2 2"]) -> Float[np.ndarray, "n 2"]:
+    """Return the unit normals of walls towards their free side, which is on the left."""
+    way = ends_world[:, 1] - ends_world[:, 0]
+    return np.stack([-way[:, 1], way[:, 0]], axis=-1) / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+
+
+def nodes_of(ends_world: Float[np.ndarray, "n 2 2"], radius_m: float) -> Nodes:
+    """Return a circle for each wall."""
+    at = ends_world.mean(axis=1) + beside_m(radius_m) * free_normals(ends_world)
+    return Nodes(_apart(at, 2.2 * radius_m), radius_m, ends_world)
+
+
+def _apart(at: Float[np.ndarray, "n 2"], least_m: float) -> Float[np.ndarray, "n 2"]:
+    """Push places apart until no two are nearer than this, or for so many rounds."""
+    at = at.copy()
+    for _ in range(ROUNDS):
+        between = at[:, None] - at[None]
+        metres = np.hypot(*between.transpose(2, 0, 1))
+        np.fill_diagonal(metres, np.inf)
+        near = np.argwhere(np.triu(metres < least_m * (1.0 - 1e-6)))
+        if not len(near):
+            break
+        for a, b in near:
+            away = at[a] - at[b]
+            length = float(np.hypot(*away))
+            unit = away / length if length > 1e-9 else np.array([1.0, 0.0])
+            push = 0.5 * max(least_m - length, 0.0) * unit
+            at[a] += push
+            at[b] -= push
+    return at
+
+
+def _towards(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], most_m: float) -> Float[np.ndarray, "2"]:
+    """Return the place so far on the way from one place to another, half the way at most."""
+    way = end - start
+    length = float(np.hypot(*way))
+    return start + way * (min(most_m, 0.5 * length) / max(length, 1e-9))
+
+
+def heads(tips: Float[np.ndarray, "e 2"], before: Float[np.ndarray, "e 2"], size_m: float) -> Float[np.ndarray, "e 3 2"]:
+    """Return arrow heads, triangles, at the ends of curves, given each end and the point before it."""
+    way = tips - before
+    along = size_m * way / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+    across = 0.42 * np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    return np.stack([tips, tips - along + across, tips - along - across], axis=1)
