@@ -19,6 +19,7 @@ FORMATS = {
     "log.arrow": 2,
     "map.npz": 1,
     "map.geojson": 1,
+    "visibility.json": 1,
     RECORD: 1,
     "comparison.json": 1,
     "contrast.json": 1,

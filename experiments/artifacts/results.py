@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from .maps.dxf import map_dxf
 from .maps.geojson import map_geojson
 from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
+from .maps.visibility import VISIBILITY, visibility_record
 from .settings import own
 from .trajectories import smoothed_path, trajectory, tum, wheels_alone
 
@@ -37,8 +39,8 @@ RUNNING = "log.arrow"
 RECORDING = "run.rrd"
 RUN_FILES = (
     *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.dxf", "map.png"),
-    *("map.pgm", "map.yaml", "steps.csv", "trajectory_true.tum", "trajectory_estimated.tum", "trajectory_smoothed.tum"),
-    "trajectory_odometry.tum",
+    *(VISIBILITY, "visibility.png", "map.pgm", "map.yaml", "steps.csv"),
+    *(f"trajectory_{name}.tum" for name in ("true", "estimated", "smoothed", "odometry")),
     *(RECORDING, "report.html", "tables.tex"),
 )
 """All that a run leaves, and what `view` and `report` make of it in the same folder."""
@@ -105,7 +107,9 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
         "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
-        "map.png": lambda: _picture(result),
+        "map.png": lambda: _pictures().picture_of(result),
+        VISIBILITY: lambda: json_bytes(visibility_record(last, log)),
+        "visibility.png": lambda: _pictures().graph_png(result),
     }
     floor = last.free_space
     if recorded is not None and not floor.evidence.size:  # Nobody planned, so nobody kept it.
@@ -136,11 +140,11 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
     return {**stamp(CONFIG), "trial": own(config), "versions": versions, "commit": _commit()}
 
 
-def _picture(result: TrialResult) -> bytes:
+def _pictures() -> ModuleType:
     # matplotlib takes as long to import as all else: a campaign's workers draw nothing.
-    from .maps.picture import picture_of
+    from .maps import picture
 
-    return picture_of(result)
+    return picture
 
 
 def _commit() -> str | None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 REMEDY = "name a folder that explore or replay left"
 STEPS = "steps.csv"
-Picture = Literal["map", "paths", "nees", "model", "traversals"]
+Picture = Literal["map", "visibility", "paths", "nees", "model", "traversals"]
 
 
 class Home:
@@ -86,9 +86,9 @@ class Run:
         return Map(arrays["ids"], arrays["lines_world"], ends, arrays["tentative"], arrays["pose"], arrays["cov"])
 
     def plot(self, picture: Picture = "map") -> Figure:
-        """Return a picture as a matplotlib figure: the map, the paths, the NEES, the model space or the traversals.
+        """Return a picture as a matplotlib figure: map, visibility graph, paths, NEES, model space or traversals.
 
-        All but the map need the truth, which a real robot does not know.
+        All but the first two need the truth, which a real robot does not know.
         """
         from ..views.pictures import figure_of
 

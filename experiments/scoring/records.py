@@ -3,7 +3,7 @@
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from typing import IO, Any
 
@@ -18,6 +18,16 @@ from .association import Votes
 
 EVERY_M = 1.0
 """Metres driven between two sketches of the map."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """A sequence of walls that was planned."""
+
+    step: int = 0
+    """At which it was planned first."""
+    walls: tuple[int, ...] = ()
+    """Ids, in order; a wall that was merged since has the id of what is left of it."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,8 @@ class Log:
     behaviours: tuple[str, ...]
     """What the robot was doing, a word a step."""
     reasons: tuple[str, ...]
+    longest_route: Route = Route()
+    """The first one of the most walls."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -141,6 +153,7 @@ class Recorder:
     """Pose and all lines at the last step; None where the back end could no longer tell."""
     sketches: list[Sketch] = field(default_factory=list)
     """Of the map, every `EVERY_M` metres and at the last step."""
+    longest_route: Route = Route()
     _columns: Columns = field(default_factory=Columns)
     _reasons: list[str] = field(default_factory=list)
     _behaviours: list[str] = field(default_factory=list)
@@ -162,6 +175,10 @@ class Recorder:
             self.sketches.append(_sketch(step))
         for keep, drop in step.merged:
             self.votes.merge(keep, drop)
+            kept = (keep if wall == drop else wall for wall in self.longest_route.walls)
+            self.longest_route = replace(self.longest_route, walls=tuple(kept))
+        if len(step.decision.walls_to_follow) > len(self.longest_route.walls):
+            self.longest_route = Route(step.index, step.decision.walls_to_follow)
         self.votes.add(step.segments, step.walls_of_segments, record.faces_of_beams[-1], step.matches.pairs)
         self._reasons.append(sys.intern(step.decision.words))
         self._behaviours.append(step.decision.behaviour.value)
@@ -220,6 +237,7 @@ class Recorder:
             range_max_m=float(scan.range_max_m),
             reasons=tuple(self._reasons),
             behaviours=tuple(self._behaviours),
+            longest_route=self.longest_route,
             **columns,
         )
 

@@ -1,7 +1,7 @@
 """Pictures for papers from the folders that runs left: `python -m experiments.views.pictures DIR ... --out PICTURES`.
 
-Paths and NEES of several folders (replays of one log) come together; the map, the model space and the traversals are of
-the first.
+Paths and NEES of several folders (replays of one log) come together; the map, the visibility graph, the model space and
+the traversals are of the first.
 """
 
 import csv
@@ -20,12 +20,15 @@ from PIL import Image
 from sim.logs.archive import regular
 from sim.logs.recorded_robot import MOST_M, read_log, within
 from viz import palette
-from viz.figures.maps import draw_map, saved
+from viz.figures.maps import Picture, draw_map, saved
 from viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
+from viz.figures.visibility import draw_graph
 from viz.shapes import hessian_cov
 
 from ..artifacts.files import write
 from ..artifacts.maps.map_files import read_map
+from ..artifacts.maps.picture import graph_picture
+from ..artifacts.maps.visibility import VISIBILITY, read_visibility
 from ..artifacts.reading import UnfitError, told
 from ..artifacts.results import LOG
 from ..artifacts.run_folder import prepare
@@ -33,6 +36,7 @@ from ..artifacts.saved import REMEDY
 from ..replays.replay import read_run
 from ..scenario import TrialConfig, load_world
 from ..scoring.summary import odometry_poses
+from ..terminal.console import say
 from ..usage import UsageError, choose
 from .saved_map import saved_map
 from .timelines import true_rings
@@ -42,7 +46,7 @@ BAD_USAGE = 2
 
 @dataclass(frozen=True)
 class Pictures:
-    """Draw map, paths, NEES, model space and traversals of the runs in some folders."""
+    """Draw map, visibility graph, paths, NEES, model space and traversals of the runs in some folders."""
 
     runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR")]
     """Folders of runs in one world."""
@@ -57,7 +61,9 @@ class Pictures:
         first = runs[0]
         shown = saved_map(self.runs[0], first.trial, first.log, first.walls, first.estimated_world)
         prepare(self.out)
-        pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown), **draw_all(runs)}
+        pictures = {**draw_maps(self.runs[0], shown), **draw_all(runs)}
+        if "visibility" not in pictures:
+            say(f"pictures: no {VISIBILITY} in {self.runs[0]}, an older run: its graph is not drawn", stderr=True)
         for name, draw in pictures.items():
             figure = draw()
             for kind in self.kinds:
@@ -126,21 +132,30 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     }
 
 
+def draw_maps(folder: Path, shown: Picture) -> dict[str, Callable[[], Figure]]:
+    """Return, by name, what draws the map of a run and its visibility graph, which runs of older versions lack."""
+    pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown)}
+    if (folder / VISIBILITY).is_file():
+        graph, route = read_visibility(folder, shown.map.ids)
+        pictures["visibility"] = lambda: draw_graph(graph_picture(shown, graph, route))
+    return pictures
+
+
 def figure_of(folder: Path, name: str) -> Figure:
     """Return one picture of a run; raises UsageError for a name that is none, or where the files do not tell it."""
     with told(folder / LOG, REMEDY):
         is_witnessed = "true_poses" in read_log(folder / LOG)
     if not is_witnessed:
-        return _as_written(folder / "map.png", name)
+        return _as_written(folder, name)
     run = read_pictured(folder)
     shown = saved_map(folder, run.trial, run.log, run.walls, run.estimated_world)
-    pictures: dict[str, Callable[[], Figure]] = {"map": lambda: draw_map(shown), **draw_all([run])}
+    pictures: dict[str, Callable[[], Figure]] = {**draw_maps(folder, shown), **draw_all([run])}
     return pictures[choose("picture", name, pictures)]()
 
 
-def _as_written(path: Path, name: str) -> Figure:
-    """Return the map of a drive without truth as it was written; raises UsageError for another picture."""
-    choose("picture of a drive whose truth nobody knows", name, ("map",))
+def _as_written(folder: Path, name: str) -> Figure:
+    """Return a picture of a drive without truth as it was written; raises UsageError for one that needs the truth."""
+    path = folder / f"{choose('picture of a drive whose truth nobody knows', name, ('map', 'visibility'))}.png"
     with told(path, REMEDY), Image.open(regular(path)) as image:
         figure = Figure(figsize=(image.width / 150, image.height / 150), dpi=150)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -14,7 +14,9 @@ from viz.figures.plots import draw_coverage
 from viz.reports.drawing import PageDrawing, drawing
 from viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
+from ..artifacts.maps.map_files import read_map
 from ..artifacts.maps.mapped import read_corners
+from ..artifacts.maps.visibility import VISIBILITY, graph_words, read_visibility
 from ..artifacts.saved import read_config, read_summary
 from ..artifacts.settings import FOLLOWING, NAVIGATION, differing, leaves, options_of
 from ..replays.real_log import REAL_WALLS
@@ -79,6 +81,7 @@ def run_page(folder: Path) -> Page:
         for home, name in zip(homes, names, strict=True)
         if (home / "map.png").is_file()
     ]
+    graphs = tuple(filter(None, map(_graph, homes, names)))
     plans = tuple(filter(None, map(_plan, homes, names)))
     drawn = {} if is_real else draw_all([read_pictured(home) for home in homes if (home / "map.npz").is_file()])
     pictures = tuple(PagePicture(png(draw()), CAPTIONS[kind]) for kind, draw in drawn.items())
@@ -99,6 +102,7 @@ def run_page(folder: Path) -> Page:
         (
             *filled(
                 Section("The map", _PLAN_WORDS if plans else (), pictures=tuple(maps), drawings=plans),
+                Section("The visibility graph", _GRAPH_WORDS, pictures=graphs),
                 Section("In numbers", tables=(table,)),
                 Section("Rooms and islands", _ROOM_WORDS, tuple(filter(None, map(_rooms, homes, names)))),
                 Section("Along the way", pictures=pictures),
@@ -111,6 +115,10 @@ def run_page(folder: Path) -> Page:
 _PLAN_WORDS = (
     "The floor plan has the length of each wall and the area of each room, with 95 % intervals. Point at a number to"
     " see its ends.",
+)
+_GRAPH_WORDS = (
+    "By this the robot plans which walls to follow. Each circle is a wall, at its middle. A blue line joins neighbours"
+    " in a chain; an arrow leads from a wall to one that was seen while the robot followed it.",
 )
 _ROOM_WORDS = (
     "Areas and lengths of the closed chains, with 95 % intervals through the joint covariance of all walls, as far as"
@@ -131,6 +139,14 @@ def _plan(home: Path, name: str) -> PageDrawing | None:
     if not path.is_file() or path.stat().st_size > LARGEST_PLAN:
         return None
     return drawing(regular(path).read_bytes(), f"Floor plan by {name}, with 95 % intervals as it states them")
+
+
+def _graph(home: Path, name: str) -> PagePicture | None:
+    """Return the visibility graph of a run as it was drawn, with what its file says of it; None where it has none."""
+    if not (home / VISIBILITY).is_file() or not (home / "visibility.png").is_file():
+        return None
+    words = graph_words(*read_visibility(home, read_map(home)["ids"]))
+    return PagePicture((home / "visibility.png").read_bytes(), f"Visibility graph by {name}: {words}")
 
 
 def _homes(folder: Path) -> list[Path]:

@@ -100,6 +100,10 @@ def test_every_key_of_a_map_is_told(runs):
     assert told("`map.geojson`") == both(runs, "map.geojson") - {"features"}
 
 
+def test_every_key_of_a_graph_is_told(runs):
+    assert told("`visibility.json`") == both(runs, "visibility.json")
+
+
 def test_every_part_of_a_comparison_is_told(runs):
     document = json.loads((runs / "campaign" / "comparison.json").read_text())
     found = {key if key.startswith(("counts.", "format")) else key.partition("[")[0] for key in keys_of(document)}

@@ -1,4 +1,4 @@
-"""Where the nodes and edges of a visibility graph are drawn: beside the walls, round their corners, across the floor."""
+"""Where nodes and edges of a visibility graph are drawn: beside the walls, round their corners, across the floor."""
 
 from dataclasses import dataclass
 
@@ -11,6 +11,12 @@ ROUNDS = 60
 """Nodes are moved apart so often at most."""
 POINTS = 17
 """Of a curve."""
+STRAIGHT = 0.1
+"""Walls that turn by less, as a sine, go on straight."""
+FAR = 6.0
+"""No line goes round a corner farther out than so many times its distance from a wall."""
+CLEAR = 1.3
+"""So many radii from the middle of a circle a sight ends."""
 
 
 @dataclass(frozen=True)
@@ -26,32 +32,37 @@ class Nodes:
         a, b = self.at[pairs[:, 0]], self.at[pairs[:, 1]]
         way = b - a
         middle = 0.5 * (a + b) + CURVED * np.stack([way[:, 1], -way[:, 0]], axis=-1)
-        share = np.linspace(0.0, 1.0, POINTS)[:, None]
-        curve = (1 - share) ** 2 * a[:, None] + 2 * share * (1 - share) * middle[:, None] + share**2 * b[:, None]
-        cut = np.minimum(1.3 * self.radius_m / np.maximum(np.hypot(*way.T), 1e-9), 0.45)
         # The curve is flat enough for its parameter to be the way along it.
-        inside = cut[:, None, None] + share * (1.0 - 2.0 * cut[:, None, None])
-        return (
-            (1 - inside) ** 2 * a[:, None] + 2 * inside * (1 - inside) * middle[:, None] + inside**2 * b[:, None]
-            if len(pairs)
-            else curve
-        )
+        cut = np.minimum(CLEAR * self.radius_m / np.maximum(np.hypot(*way.T), 1e-9), 0.45)
+        return bezier(a, middle, b, cut[:, None] + np.linspace(0.0, 1.0, POINTS) * (1.0 - 2.0 * cut[:, None]))
 
-    def round_corner(self, first: int, second: int, corner_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "p 2"]:
-        """Return the way from one wall's circle round their corner, on the free side, to its neighbour's."""
-        normals = free_normals(self.ends_world[[first, second]])
-        gap_m = beside_m(self.radius_m)
-        try:
-            turn = corner_world + gap_m * np.linalg.solve(normals, np.ones(2))
-        except np.linalg.LinAlgError:
-            turn = corner_world + gap_m * normals[0]
-        if np.hypot(*(turn - corner_world)) > 3.0 * gap_m:  # walls on one line, or a sharp tooth
-            turn = corner_world + gap_m * normals[0]
+    def round_corner(self, first: int, second: int) -> Float[np.ndarray, "p 2"]:
+        """Return the way from one wall's circle round their corner, on the free side, to its neighbour's.
+
+        Where the first wall ends, the free side on its left, the second one begins.
+        """
+        meet = np.stack([self.ends_world[first, 1], self.ends_world[second, 0]])
+        normals, gap_m = free_normals(self.ends_world[[first, second]]), beside_m(self.radius_m)
+        turn = meet.mean(axis=0) + gap_m * normals[0]
+        if abs(np.linalg.det(normals)) > STRAIGHT:
+            crossing = np.linalg.solve(normals, np.sum(normals * meet, axis=1) + gap_m)
+            if np.hypot(*(crossing - turn)) <= FAR * gap_m:  # not far beyond a sharp tooth
+                turn = crossing
         a, b = self.at[first], self.at[second]
         legs = [_towards(turn, end, self.radius_m) for end in (a, b)]
-        share = np.linspace(0.0, 1.0, POINTS)[:, None]
-        bend = (1 - share) ** 2 * legs[0] + 2 * share * (1 - share) * turn + share**2 * legs[1]
+        (bend,) = bezier(legs[0][None], turn[None], legs[1][None], np.linspace(0.0, 1.0, POINTS)[None])
         return np.concatenate([_towards(a, turn, self.radius_m)[None], bend, _towards(b, turn, self.radius_m)[None]])
+
+
+def bezier(
+    a: Float[np.ndarray, "e 2"],
+    turn: Float[np.ndarray, "e 2"],
+    b: Float[np.ndarray, "e 2"],
+    share: Float[np.ndarray, "e p"],
+) -> Float[np.ndarray, "e p 2"]:
+    """Return points of curves from `a` to `b` that are drawn towards `turn`."""
+    t = share[..., None]
+    return (1.0 - t) ** 2 * a[:, None] + 2.0 * t * (1.0 - t) * turn[:, None] + t**2 * b[:, None]
 
 
 def beside_m(radius_m: float) -> float:
@@ -98,7 +109,9 @@ def _towards(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], most_m:
     return start + way * (min(most_m, 0.5 * length) / max(length, 1e-9))
 
 
-def heads(tips: Float[np.ndarray, "e 2"], before: Float[np.ndarray, "e 2"], size_m: float) -> Float[np.ndarray, "e 3 2"]:
+def heads(
+    tips: Float[np.ndarray, "e 2"], before: Float[np.ndarray, "e 2"], size_m: float
+) -> Float[np.ndarray, "e 3 2"]:
     """Return arrow heads, triangles, at the ends of curves, given each end and the point before it."""
     way = tips - before
     along = size_m * way / np.maximum(np.hypot(*way.T), 1e-9)[:, None]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from textwrap import wrap
 
 import networkx as nx
 import numpy as np
@@ -32,6 +33,9 @@ HEAD_POINTS = 5.5
 LONGER_INCH = 8.5
 """The longer side of the map; that of a large one is larger, so that its circles have room."""
 LARGEST_INCH = 20.0
+EDGE_INCH = 0.15
+LETTER_INCH = 0.072
+"""Mean width of a letter of the subtitle."""
 WALLS = 60
 """A map of more walls is a large one."""
 
@@ -58,8 +62,8 @@ class GraphPicture:
 class _Edges:
     """Of a graph, as rows of the walls that are drawn."""
 
-    corners: dict[tuple[int, int], Float[np.ndarray, "2"]]
-    """The corner of each pair of neighbours, each pair once."""
+    neighbours: Int[np.ndarray, "n 2"]
+    """Each pair once; the second follows the first in its chain."""
     mutual: Int[np.ndarray, "m 2"]
     """Each was seen from the other."""
     single: Int[np.ndarray, "s 2"]
@@ -74,11 +78,15 @@ def draw_graph(picture: GraphPicture) -> Figure:
     longer = min(LONGER_INCH * max(1.0, (walls / WALLS) ** 0.5), LARGEST_INCH)
     inch_per_m = longer / float(size.max())
     width, height = np.maximum(size * inch_per_m, (5.0, 2.0)).tolist()
-    figure = Figure(figsize=(width + 0.3, height + 1.25), dpi=150, facecolor=palette.PAGE)
+    words = wrap(picture.subtitle, int(width / LETTER_INCH))
+    whole = np.array([width + 2.0 * EDGE_INCH, height + 0.8 + 0.17 * len(words)])
+    figure = Figure(figsize=tuple(whole), dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.15 / (width + 0.3), 0.45 / (height + 1.25), width / (width + 0.3), height / (height + 1.25)))
-    figure.text(0.15 / (width + 0.3), 1.0 - 0.33 / (height + 1.25), literal(picture.title), size=12, weight="bold")
-    figure.text(0.15 / (width + 0.3), 1.0 - 0.57 / (height + 1.25), literal(picture.subtitle), size=8.5, color="#5A5A5A")
+    axes = figure.add_axes((EDGE_INCH / whole[0], 0.4 / whole[1], width / whole[0], height / whole[1]))
+    left, above = EDGE_INCH / whole[0], 1.0 - 0.33 / whole[1]
+    figure.text(left, above, literal(picture.title), size=12, weight="bold")
+    below = above - 0.08 / whole[1]
+    figure.text(left, below, literal("\n".join(words)), size=8.5, color="#5A5A5A", va="top", linespacing=1.2)
     handles = paint_graph(axes, picture, low, high, inch_per_m)
     figure.legend(
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8,
@@ -120,16 +128,13 @@ def paint_graph(
 
 
 def _edges(picture: GraphPicture, rows: Mapping[int, int]) -> _Edges:
-    corners: dict[tuple[int, int], Float[np.ndarray, "2"]] = {}
-    for chain in picture.chains:
-        for (a, b), corner in zip(neighbours(chain), chain.corners_world, strict=False):
-            if a in rows and b in rows:
-                corners[rows[a], rows[b]] = corner
-    kinds = {(a, b): kind for a, b, kind in picture.graph.edges(data="kind") if a in rows and b in rows}
-    sights = {pair for pair, kind in kinds.items() if kind != NEIGHBOUR}
+    met = [(a, b) for chain in picture.chains for a, b in neighbours(chain) if a in rows and b in rows]
+    edges = ((a, b) for a, b, edge in picture.graph.edges(data=True) if edge["kind"] != NEIGHBOUR)
+    sights = {(a, b) for a, b in edges if a in rows and b in rows}
+    next_to = [(rows[a], rows[b]) for a, b in met]
     mutual = sorted((rows[a], rows[b]) for a, b in sights if (b, a) in sights and a < b)
     single = sorted((rows[a], rows[b]) for a, b in sights if (b, a) not in sights)
-    return _Edges(corners, np.array(mutual, dtype=int).reshape(-1, 2), np.array(single, dtype=int).reshape(-1, 2))
+    return _Edges(*(np.array(found, dtype=int).reshape(-1, 2) for found in (next_to, mutual, single)))
 
 
 def _paint_floor(axes: Axes, picture: GraphPicture, nodes: Nodes, route: Sequence[int]) -> None:
@@ -155,13 +160,15 @@ def _paint_sights(axes: Axes, nodes: Nodes, edges: _Edges, head_m: float, crowd:
     if not curves:
         return []
     axes.add_collection(LineCollection(curves, colors=palette.SIGHT, linewidths=0.9 * max(crowd, 0.4), zorder=3.5))
-    axes.add_collection(PolyCollection(list(np.concatenate(tips)), facecolors=palette.NEIGHBOUR, linewidths=0, zorder=3.6))
+    axes.add_collection(
+        PolyCollection(list(np.concatenate(tips)), facecolors=palette.NEIGHBOUR, linewidths=0, zorder=3.6)
+    )
     words = "seen from there" if not len(edges.mutual) else "seen from there (two heads: both ways)"
     return [Line2D([], [], color=palette.NEIGHBOUR, linewidth=0.9, marker=">", markersize=4, markevery=[], label=words)]
 
 
 def _paint_neighbours(axes: Axes, nodes: Nodes, edges: _Edges, crowd: float) -> list[Line2D]:
-    ways = [nodes.round_corner(a, b, corner) for (a, b), corner in edges.corners.items()]
+    ways = [nodes.round_corner(a, b) for a, b in edges.neighbours.tolist()]
     if not ways:
         return []
     width = 2.0 * max(crowd, 0.5)
@@ -170,13 +177,13 @@ def _paint_neighbours(axes: Axes, nodes: Nodes, edges: _Edges, crowd: float) -> 
 
 
 def _paint_route(axes: Axes, nodes: Nodes, edges: _Edges, route: Sequence[int], head_m: float) -> list[Line2D]:
+    met = {tuple(pair) for pair in edges.neighbours.tolist()}
     ways = []
     for a, b in pairwise(route):
-        corner, back = edges.corners.get((a, b)), edges.corners.get((b, a))
-        if corner is not None:
-            ways.append(nodes.round_corner(a, b, corner))
-        elif back is not None:
-            ways.append(nodes.round_corner(b, a, back)[::-1])
+        if (a, b) in met:
+            ways.append(nodes.round_corner(a, b))
+        elif (b, a) in met:
+            ways.append(nodes.round_corner(b, a)[::-1])
         else:
             ways.append(nodes.sights(np.array([[a, b]]))[0])
     if not ways:
@@ -184,7 +191,9 @@ def _paint_route(axes: Axes, nodes: Nodes, edges: _Edges, route: Sequence[int], 
     axes.add_collection(LineCollection(ways, colors=palette.ALARM, linewidths=3.2, capstyle="butt", zorder=5))
     tips, before = np.array([way[-1] for way in ways]), np.array([way[-2] for way in ways])
     axes.add_collection(
-        PolyCollection(list(heads(tips, before, head_m)), facecolors=palette.ALARM, edgecolors=palette.ALARM, zorder=5.1)
+        PolyCollection(
+            list(heads(tips, before, head_m)), facecolors=palette.ALARM, edgecolors=palette.ALARM, zorder=5.1
+        )
     )
     return [Line2D([], [], color=palette.ALARM, linewidth=3.2, label="planned route")]
 
@@ -197,7 +206,8 @@ def _paint_nodes(axes: Axes, nodes: Nodes, names: Sequence[str], route: Sequence
             linewidths=[2.0 if row in route else 1.1 for row in range(len(names))], zorder=6,
         )
     )  # fmt: skip
-    for at, name, colour, row in zip(nodes.at, names, colours, range(len(names)), strict=True):
-        size = radius_points * (1.15 if len(name) < 3 else 0.85)
-        weight = "bold" if row in route else "normal"
-        axes.text(*at, literal(name), size=size, ha="center", va="center_baseline", color=palette.INK, weight=weight, zorder=7)
+    for row, (at, name) in enumerate(zip(nodes.at, names, strict=True)):
+        axes.text(
+            at[0], at[1], literal(name), size=radius_points * (1.15 if len(name) < 3 else 0.85), ha="center",
+            va="center_baseline", color=palette.INK, weight="bold" if row in route else "normal", zorder=7,
+        )  # fmt: skip

@@ -1,8 +1,9 @@
-"""The picture of a run's map: the estimate, and the truth moved by the initial pose error under it."""
+"""The pictures of a run's map and of its visibility graph, the truth moved by the initial pose error under both."""
 
 from collections.abc import Mapping
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import shapely
 from jaxtyping import Float
@@ -15,35 +16,53 @@ from slam.geometry.poses import compose, inverse, to_world
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 from viz.figures.maps import Picture, draw_map, png
+from viz.figures.visibility import GraphPicture, draw_graph
 
 from ...scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ...scoring.corners import corners
 from ...scoring.coverage import own_alignment
-from ...scoring.records import Log
+from ...scoring.records import Log, Route
 from ...scoring.summary import odometry_poses
 from ...trial import TrialResult
+from .visibility import graph_words
 
 
 def picture_of(result: TrialResult) -> bytes:
     """Return the PNG of a trial's map; raises ValueError where there was no step to draw."""
+    return png(draw_map(map_picture(result)))
+
+
+def map_picture(result: TrialResult) -> Picture:
+    """Return what the picture of a trial's map shows; raises ValueError where there was no step to draw."""
     if result.log is None or result.last is None:
         raise ValueError("expected a run of at least one step, found none: there is no map to draw")
     log, last, scenario = result.log, result.last, result.scenario
     if result.recorded is not None:
-        return png(draw_map(_alone(result, log, last, result.recorded)))
+        return _alone(result, log, last, result.recorded)
     known = [
         (corner.position_world, cov)
         for corner in corners(last.map, last.chains)
         if result.joint is not None and (cov := corner.cov(result.joint)) is not None
     ]
-    return png(
-        draw_map(
-            over_truth(
-                scenario.world, scenario.config, result.summary, last.map, last.chains, last.set_aside, known,
-                log.estimated_world, log.true_world, scenario.start_estimate,
-            )
-        )
+    return over_truth(
+        scenario.world, scenario.config, result.summary, last.map, last.chains, last.set_aside, known,
+        log.estimated_world, log.true_world, scenario.start_estimate,
     )  # fmt: skip
+
+
+def graph_png(result: TrialResult) -> bytes:
+    """Return the PNG of a trial's map with its visibility graph; raises ValueError where there was no step to draw."""
+    shown = map_picture(result)
+    assert result.log is not None
+    assert result.last is not None
+    return png(draw_graph(graph_picture(shown, result.last.graph, result.log.longest_route)))
+
+
+def graph_picture(shown: Picture, graph: "nx.DiGraph[int]", route: Route) -> GraphPicture:
+    """Return the picture of a graph over the map of another picture."""
+    walls = route.walls if len(route.walls) > 1 else ()
+    title, words = f"{shown.title}: visibility graph", graph_words(graph, route)
+    return GraphPicture(shown.map, shown.chains, graph, title, words, route=walls, true_floor=shown.true_floor)
 
 
 def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> Picture:

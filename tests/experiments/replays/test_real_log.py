@@ -20,7 +20,14 @@ ROOM = (6.0, 4.0)
 STRAIGHTNESS = "mission.mapper.walls.reliability.straightness"
 MADE = {
     *("config.json", "summary.json", "log.npz", "map.npz", "map.geojson", "map.svg", "map.dxf", "map.png", "steps.csv"),
-    *("map.pgm", "map.yaml", "trajectory_estimated.tum", "trajectory_odometry.tum"),
+    *(
+        "visibility.json",
+        "visibility.png",
+        "map.pgm",
+        "map.yaml",
+        "trajectory_estimated.tum",
+        "trajectory_odometry.tum",
+    ),
 }
 
 

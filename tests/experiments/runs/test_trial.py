@@ -13,7 +13,7 @@ from experiments.usage import UsageError
 
 FILES = (
     "config.json summary.json steps.csv log.npz map.npz map.geojson map.svg map.dxf map.png"
-    " trajectory_true.tum trajectory_estimated.tum"
+    " visibility.json visibility.png trajectory_true.tum trajectory_estimated.tum"
 )
 
 

@@ -26,8 +26,9 @@ def runs(tmp_path_factory):
 def test_the_map_drawn_from_files_is_the_picture_beside_them(runs, tmp_path, monkeypatch, steps):
     monkeypatch.setattr(sys, "argv", ["pictures", str(runs / steps), "--out", str(tmp_path), "--kinds", "png", "pdf"])
     assert draw() == 0
-    assert (tmp_path / "map.png").read_bytes() == (runs / steps / "map.png").read_bytes()
-    names = {"map", "paths", "nees", "model", "traversals"}
+    for name in ("map.png", "visibility.png"):
+        assert (tmp_path / name).read_bytes() == (runs / steps / name).read_bytes()
+    names = {"map", "visibility", "paths", "nees", "model", "traversals"}
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
 
 

@@ -26,9 +26,11 @@ def test_a_run_is_told_on_one_page_that_fetches_nothing(run):
     assert main(["report", str(run), "--latex"]) == 0
     page, summary = (run / "report.html").read_text(), json.loads((run / "summary.json").read_text())
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
-    assert page.count("<img") == 6
+    assert page.count("<img") == 7
     assert f"{100 * summary['coverage']:.3g} % of the reachable contour mapped" in page
     assert "graph: stopped after" in page
+    graph = json.loads((run / "visibility.json").read_text())["graph"]
+    assert f"Visibility graph by graph: {len(graph['nodes'])} walls, " in page
     assert "chainslam explore paper-fig4 --backend graph --strategy nearest-robot --seed 1" in page
     assert "pose ANEES" in (run / "tables.tex").read_text()
 
@@ -40,7 +42,7 @@ def test_back_ends_stand_side_by_side(run, tmp_path):
     page = (out / "report.html").read_text()
     assert "block-ekf: stopped" in page
     assert "full-ekf: stopped" in page
-    assert page.count("<img") == 7
+    assert page.count("<img") == 9
     assert 'data-name="block-ekf"' in page
 
 

@@ -1,0 +1,65 @@
+"""A run's visibility graph (paper, section 3.2): `visibility.json` written, read again, and told in words."""
+
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from jaxtyping import Int
+
+from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
+from explore.step import Step
+
+from ...scoring.records import Log, Route
+from ..formats import stamp
+from ..reading import UnfitError, Word, read_json, told
+
+VISIBILITY = "visibility.json"
+REMEDY = "run it anew with this version"
+SHAPE = {
+    "graph": {
+        "nodes": [{"id": int}],
+        "edges": [{"source": int, "target": int, "kind": Word(NEIGHBOUR, SIGHT)}],
+    },
+    "route": {"step": int, "walls": [int]},
+}
+
+
+def visibility_record(last: Step, log: Log) -> dict[str, Any]:
+    """Return the graph of the last step, as networkx's node-link data, with the longest route that was planned."""
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(sorted(last.graph))
+    graph.add_edges_from(sorted(last.graph.edges(data=True), key=lambda edge: edge[:2]))
+    route = {"step": log.longest_route.step, "walls": log.longest_route.walls}
+    return {**stamp(VISIBILITY), "graph": nx.node_link_data(graph, edges="edges"), "route": route}
+
+
+def read_visibility(folder: Path, ids: Int[np.ndarray, " n"]) -> tuple["nx.DiGraph[int]", Route]:
+    """Return the graph in a run's folder and the longest route that was planned; raises UsageError for anything else.
+
+    `ids` are those of the map. Walls of a route may have gone since.
+    """
+    path = folder / VISIBILITY
+    said = read_json(path, SHAPE, REMEDY)
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(node["id"] for node in said["graph"]["nodes"])
+    with told(path, REMEDY):
+        for edge in said["graph"]["edges"]:
+            if not {edge["source"], edge["target"]} <= set(graph):
+                raise UnfitError("an edge of walls that are no nodes")
+            graph.add_edge(edge["source"], edge["target"], kind=edge["kind"])
+        if not set(graph) <= set(ids.tolist()):
+            raise UnfitError("walls that are not in map.npz")
+    return graph, Route(said["route"]["step"], tuple(said["route"]["walls"]))
+
+
+def graph_words(graph: "nx.DiGraph[int]", route: Route) -> str:
+    """Return how large a graph is, and the longest route that was planned, in words."""
+    kinds = [str(edge["kind"]) for *_, edge in graph.edges(data=True)]
+    pairs, sights = kinds.count(NEIGHBOUR) // 2, kinds.count(SIGHT)
+    words = f"{len(graph)} walls, {pairs} pairs of neighbours, {sights} sights"
+    if len(route.walls) < 2:
+        return f"{words}; no route of several walls was planned"
+    gone = [wall for wall in route.walls if wall not in graph]
+    lost = f" (of which {', '.join(map(str, gone))} went since)" if gone else ""
+    return f"{words}; longest planned route, at step {route.step}: walls {', '.join(map(str, route.walls))}{lost}"
