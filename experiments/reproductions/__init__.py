@@ -1,10 +1,11 @@
 """The paper's figures, one file each, and one line in the registry."""
 
-from . import eq4, fig5, fig6, fig8, fig9, fig10, fig11, table1
+from . import eq4, fig4, fig5, fig6, fig8, fig9, fig10, fig11, table1
 from .reproduction import Entry, Reproduction
 
 _FIGURES = (
     (table1, "distances between the corners of figure 8, by hand and in the map"),
+    (fig4, "a partial visibility graph, and a route of walls planned by it and driven"),
     (fig5, "how often each stretch is driven, nearest open end from the robot"),
     (fig6, "how often each stretch is driven, nearest open end from the start"),
     (fig8, "the map of the cyclic environment of 7 m x 7 m"),

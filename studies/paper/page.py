@@ -32,6 +32,9 @@ in place of the median. Of what is either so or not, a cell holds the share of t
 """
 NOTES = {
     "table1": "Lengths are in metres, as measured between mapped corners.",
+    "fig4": "After its exploration the robot goes to wall 8, and from there to wall 16, wall after wall of the route"
+    " that the graph plans. Walls have the paper's numbers; one that has none there stands in brackets. What it finds"
+    " open on the way is explored first.",
     "fig5": "In the paper motion and perception are without error. Here they have noise, a drive for each seed."
     " Sigmas are of each back end on the same observations, with the true association.",
     "fig6": "As figure 5. The ratio is that of two drives with one seed.",

@@ -16,7 +16,7 @@ from ..runner.rows import Row, rows_of
 from .page import PAGE, ROWS, write_page
 
 NAMES = ("figure", "seed")
-TOGETHER = (("table1", "fig8"), ("fig9",), ("fig10", "fig11"), ("fig5", "fig6"), ("eq4",))
+TOGETHER = (("table1", "fig8"), ("fig9",), ("fig10", "fig11"), ("fig5", "fig6"), ("eq4",), ("fig4",))
 """Figures of one drive, which is made once for all of them."""
 
 

@@ -74,7 +74,7 @@ def test_steps_are_a_table_with_pandas_and_arrays_without(run, monkeypatch):
     assert plain["reason"][0] == frame["reason"][0]
 
 
-@pytest.mark.parametrize("picture", ["map", "paths", "nees", "model", "traversals"])
+@pytest.mark.parametrize("picture", ["map", "visibility", "paths", "nees", "model", "traversals"])
 def test_pictures_are_figures(run, picture):
     assert run.plot(picture).axes
 

@@ -102,9 +102,17 @@ def extent_of(picture: GraphPicture) -> tuple[Float[np.ndarray, "2"], Float[np.n
 
 
 def paint_graph(
-    axes: Axes, picture: GraphPicture, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"], inch_per_m: float
+    axes: Axes,
+    picture: GraphPicture,
+    low: Float[np.ndarray, "2"],
+    high: Float[np.ndarray, "2"],
+    inch_per_m: float,
+    largest_points: float = RADIUS_POINTS,
 ) -> list[Line2D]:
-    """Paint map and graph, and return what the legend tells; `inch_per_m` is the scale of the axes."""
+    """Paint map and graph, and return what the legend tells.
+
+    `inch_per_m` is the scale of the axes, `largest_points` the radius of a circle in a map of few walls.
+    """
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
@@ -114,7 +122,7 @@ def paint_graph(
     rows = {int(wall): row for row, wall in enumerate(ids[kept])}
     points_per_m = 72.0 * inch_per_m
     crowd = min(1.0, (WALLS / max(len(kept), 1)) ** 0.5)
-    radius_points = max(RADIUS_POINTS * crowd, LEAST_POINTS)
+    radius_points = max(largest_points * crowd, LEAST_POINTS)
     nodes = nodes_of(picture.map.ends_world[kept], radius_points / points_per_m)
     head_m = HEAD_POINTS * max(crowd, 0.5) / points_per_m
     edges = _edges(picture, rows)

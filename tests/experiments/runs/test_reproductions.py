@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from experiments import reproductions
 from experiments.commands.cli import main
-from experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig8, table1
+from experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig4, fig8, table1
 from experiments.reproductions.runs import maps
 from experiments.reproductions.runs.traversals import passes
 from viz.figures.panels import panels
 
-PAPER_NAMES = ["table1", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "eq4"]
+PAPER_NAMES = ["table1", "fig4", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "eq4"]
 few = settings(max_examples=15, deadline=None, derandomize=True)
 
 
@@ -67,6 +67,21 @@ def test_passes_counts_the_beginning_and_each_return():
     path = np.stack([np.tile(out_and_back, 3), np.zeros(300), np.zeros(300)], axis=-1)
     assert passes(path) == 4
     assert passes(path[:50]) == 1
+
+
+@pytest.mark.usefixtures("_unchecked")
+def test_figure_4_is_planned_and_driven_as_in_the_text():
+    made = fig4.reproduce(1)
+    ours = made.ours["block-ekf"]
+    for quantity, said in made.paper.items():
+        assert ours[quantity] == said
+    assert ours["wall 16 was reached"] is True
+    assert ours["walls nearest to the robot on this way"] == fig4.SAID[fig4.PLANNED]
+    place, graph = made.figure.axes
+    assert sorted(int(text.get_text()) for text in graph.texts) == list(range(1, 17))
+    assert [line.get_label() for line in place.lines if not line.get_label().startswith("_")] == [
+        "exploration", "to wall 8", "from wall 8 to wall 16", "start",
+    ]  # fmt: skip
 
 
 def test_table_1_and_figure_8_are_made_from_one_drive(monkeypatch):

@@ -1,0 +1,131 @@
+"""A robot that explores, then goes from one wall to another along the walls that the visibility graph plans."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+
+import numpy as np
+
+from explore.planning.visibility_graph import followed_wall
+from explore.planning.wall_routes import route
+from explore.step import Step
+from explore.strategies import Choice, Place, Situation, Strategy
+from explore.survey.viewpoints import lane
+from slam.geometry.poses import to_world
+from slam.map.stochastic_map import StochasticMap
+
+from ...scenario import Scenario, TrialConfig
+from ...scoring.coverage import alignment
+from ...trial import TrialResult, default_mission, run_trial
+
+ARRIVED_M = 1.0
+NEAR_M = 0.5
+"""The middle of a mapped wall is this near to that of the wall in the plan."""
+Named = Callable[[StochasticMap], Mapping[str, int]]
+"""From a map to the ids of the walls that have names in the plan."""
+
+
+@dataclass
+class AlongRoute:
+    """A strategy that explores like another one, and leaves nothing to explore until it has driven a route of walls."""
+
+    explores: Strategy
+    named: Named
+    ends: tuple[str, str]
+    """Names of the first and the last wall."""
+    plan: tuple[int, ...] = ()
+    """Ids of the walls to be followed, once they are planned."""
+    names: dict[int, str] = field(default_factory=dict)
+    """Of the walls, by their ids at that time."""
+    _done: int = 0
+    """So many of them."""
+
+    def choose(self, situation: Situation) -> Choice | None:
+        """Return where to explore; then the first wall, and from there each wall of the plan in turn; then None."""
+        if situation.open_ends:
+            return self.explores.choose(situation)
+        if self._done == 0:
+            ids = self.named(situation.map)
+            if not set(self.ends) <= ids.keys():
+                return None
+            self.plan, self._done = (ids[self.ends[0]], ids[self.ends[1]]), 1
+            return self._to(self.plan[0], situation, "to begin with")
+        if self._done == 1:
+            self.names = {wall: name for name, wall in self.named(situation.map).items()}
+            self.plan = route(situation.graph, self.plan[0], self.plan[-1])
+        if self._done >= len(self.plan):
+            return None
+        self._done += 1
+        words = f"number {self._done} of {len(self.plan)} walls that lead to wall {self.plan[-1]}"
+        return self._to(self.plan[self._done - 1], situation, words)
+
+    @property
+    def taken(self) -> int:
+        """How many walls of the plan are taken or under way: 0 while there is something to explore."""
+        return self._done
+
+    def _to(self, wall: int, situation: Situation, why: str) -> Choice | None:
+        if wall not in situation.map.ids:
+            return None
+        beside = lane(wall, situation.map, situation.following.viewpoints.standoff_m)
+        return Choice(Place(beside, f"wall {wall} is followed", "wall"), why)
+
+
+@dataclass(frozen=True)
+class RouteDrive:
+    """An exploration with a route of walls driven after it."""
+
+    made: TrialResult
+    names: dict[int, str]
+    """Of the walls that have any, in the last map and in that of the plan."""
+    plan: tuple[int, ...]
+    """Ids of the walls that the graph led along, the first one and the goal included; empty where a wall is missing."""
+    steps: tuple[int, int, int]
+    """At which the exploration ended, the first wall was reached, and the last one."""
+    followed: tuple[int, ...]
+    """Ids of the walls that the robot was nearest to on the way, in order."""
+    has_arrived: bool
+    """Whether the robot ends within `ARRIVED_M` of the goal."""
+
+
+def drive_route(config: TrialConfig, ends: tuple[str, str]) -> RouteDrive:
+    """Explore a world whose walls are named, then drive from one wall to another; raises UsageError for bad names."""
+    found: list[AlongRoute] = []
+    taken: list[int] = []
+    followed: list[int | None] = []
+
+    def watch(step: Step) -> None:
+        taken.append(found[0].taken)
+        if taken[-1] > 1:
+            followed.append(followed_wall(step.map))
+
+    def mission(scenario: Scenario) -> Iterator[Step]:
+        assert scenario.strategy is not None, "expected a strategy to explore by"
+        found.append(AlongRoute(scenario.strategy, _named(scenario), ends))
+        return default_mission(replace(scenario, strategy=found[0]))
+
+    made = run_trial(config, watch, mission=mission)
+    assert made.last is not None
+    names = found[0].names | {wall: name for name, wall in _named(made.scenario)(made.last.map).items()}
+    along = tuple(wall for wall, _ in groupby(followed) if wall is not None)
+    walls = made.last.map
+    goals = [row for row, wall in enumerate(walls.ids.tolist()) if found[0].plan and names.get(wall) == ends[1]]
+    has_arrived = any(walls.distances_m[row] <= ARRIVED_M for row in goals)
+    explored, began = (sum(count <= most for count in taken) for most in (0, 1))
+    end = len(taken) - 1
+    return RouteDrive(made, names, found[0].plan, (min(explored, end), min(began, end), end), along, has_arrived)
+
+
+def _named(scenario: Scenario) -> Named:
+    """Return who names the walls of a map by the labels of the plan, which stand at the middles of its walls."""
+    labels = scenario.world.labels
+    to_true = alignment(scenario.start_estimate, scenario.world.start)
+
+    def named(walls: StochasticMap) -> dict[str, int]:
+        rows = np.flatnonzero(~walls.tentative)
+        middles = to_world(walls.ends_world[rows].mean(axis=1), to_true)
+        metres = {name: np.hypot(*(middles - np.array(at)).T) for name, at in labels.items()}
+        nearest = {name: int(np.argmin(gaps)) for name, gaps in metres.items()} if len(rows) else {}
+        return {name: int(walls.ids[rows[k]]) for name, k in nearest.items() if metres[name][k] <= NEAR_M}
+
+    return named
