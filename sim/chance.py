@@ -33,6 +33,8 @@ class Channel(IntEnum):
     BUMPS = 7
     MOVING = 8
     """Which scans are taken while the robot still drives."""
+    PEOPLE = 9
+    """Where people stand at first, and where they turn to."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Only `sim/` reads these. Each has a channel of chance of its own, so that one fault shifts no draw of another.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -12,7 +12,9 @@ from slam.geometry.poses import inverse, to_world
 
 from .chance import Chance, Channel
 from .drive import Slip
+from .people import PeopleConfig
 
+NEVER = 2**31
 MOMENTS = 32
 """The beams of a scan in motion are taken from so many places on its way."""
 
@@ -23,6 +25,8 @@ class FaultsConfig:
 
     dropout: float = 0.0
     """Share of the beams that come back empty (+inf), whatever stands there."""
+    clump: int = 1
+    """They are lost in runs of so many neighbours."""
     mixed: float = 0.0
     """Share of the beams at an edge that return something between the surface before it and the one behind it."""
     edge_m: float = 0.2
@@ -41,6 +45,27 @@ class FaultsConfig:
     """How much farther to the left m."""
     scanner_turned_rad: float = 0.0
     """By how much more than stated it is turned rad, counter-clockwise."""
+    range_bias_m: float = 0.0
+    """How much too long each range is m."""
+    range_scale: float = 1.0
+    """How many times too long each range is."""
+    resolution_m: float = 0.0
+    """Ranges come in multiples of this m; 0 for any."""
+    mirrored: bool = False
+    """The beams come in the opposite order: what is on the left seems to be on the right."""
+    frozen_from: int = NEVER
+    """From this scan on the scanner repeats the one before."""
+    late: int = 0
+    """Each scan is the one that was taken so many steps before."""
+    stuck_from: int = NEVER
+    """From this drive on the wheels turn, and report it, while the robot stands."""
+    posts: int = 0
+    """So many posts of the robot's own body stand around the scanner, evenly ..."""
+    post_m: float = 0.15
+    """... so far from it m ..."""
+    post_rad: float = float(np.deg2rad(8.0))
+    """... and hide so much of its view rad each."""
+    people: PeopleConfig = field(default_factory=PeopleConfig)
 
 
 def with_mixed_pixels(
@@ -65,10 +90,37 @@ def with_mixed_pixels(
 def with_dropouts(
     ranges: Float[np.ndarray, " k"], config: FaultsConfig, chance: Chance, step: int
 ) -> Float[np.ndarray, " k"]:
-    """Return measured ranges (k,) m, +inf at the beams that were lost."""
+    """Return measured ranges (k,) m, +inf at the beams that were lost, one by one or in runs of `clump`.
+
+    Runs begin anywhere and may overlap; a beam is lost with probability `dropout` whatever the length of a run.
+    """
     if config.dropout <= 0.0:
         return ranges
-    return np.where(chance.uniforms(Channel.DROPOUTS, step, len(ranges)) < config.dropout, np.inf, ranges)
+    begins = 1.0 - (1.0 - config.dropout) ** (1.0 / config.clump)
+    lost = chance.uniforms(Channel.DROPOUTS, step, len(ranges)) < begins
+    lost = np.any([np.roll(lost, k) for k in range(config.clump)], axis=0)
+    return np.where(lost, np.inf, ranges)
+
+
+def with_posts(
+    ranges: Float[np.ndarray, " k"], bearings_rad: Float[np.ndarray, " k"], config: FaultsConfig
+) -> Float[np.ndarray, " k"]:
+    """Return exact ranges (k,) m with those at the robot's own posts cut short; the first straight ahead."""
+    if config.posts <= 0:
+        return ranges
+    apart = 2.0 * np.pi / config.posts
+    off = np.abs((bearings_rad + 0.5 * apart) % apart - 0.5 * apart)
+    return np.where(off <= 0.5 * config.post_rad, np.minimum(ranges, config.post_m), ranges)
+
+
+def misread(ranges: Float[np.ndarray, " k"], config: FaultsConfig, range_max_m: float) -> Float[np.ndarray, " k"]:
+    """Return measured ranges (k,) m as a scanner with a bias, a scale and a resolution tells them."""
+    if config.range_scale == 1.0 and config.range_bias_m == config.resolution_m == 0.0:
+        return ranges
+    told = config.range_scale * ranges + config.range_bias_m
+    if config.resolution_m > 0.0:
+        told = config.resolution_m * np.round(told / config.resolution_m)
+    return np.where(told > range_max_m, np.inf, np.where(told > 0.0, told, np.nan))
 
 
 def slipped(slip: Slip, config: FaultsConfig) -> Slip:

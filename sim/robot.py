@@ -13,15 +13,19 @@ from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 from .chance import Chance, Channel, world_key
 from .drive import clamp, draw_slip, odometry, seconds, true_motion
 from .faults import (
+    NEVER,
     FaultsConfig,
     bump_rad,
     is_moving,
+    misread,
     places_of_beams,
     slipped,
     with_dropouts,
     with_mixed_pixels,
+    with_posts,
 )
 from .lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
+from .people import People, hidden_by
 
 _CELL_M = 0.5
 """Side of the grid cells that share one list of faces within a step's reach."""
@@ -103,6 +107,9 @@ class SimulatedRobot:
         self._faces = np.asarray(world.faces, dtype=np.float64)
         self._near: dict[tuple[int, int], Float[np.ndarray, "m 2 2"]] = {}
         self._pose = np.array(world.start, dtype=np.float64)
+        self._people = People(self.config.faults.people, self._faces, self._chance, self.config.radius_m)
+        self._people.enter(self._pose[:2], self.config.lidar.range_max_m)
+        self._told: list[tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]] = []
         self._time_s, self._drives = 0.0, 0
         self._way, self._drive_s = np.zeros((0, 3)), 0.0
 
@@ -124,10 +131,11 @@ class SimulatedRobot:
         if not self._errorless:
             draws = self._chance.standard_normals(Channel.LASER, step, len(ranges))
             ranges = noisy(ranges, beam_sigmas(ranges, lidar), draws, lidar.range_max_m)
+        ranges = misread(ranges, faults, lidar.range_max_m)
         ranges = with_dropouts(ranges, faults, self._chance, step)
+        ranges, faces = self._as_told(ranges, np.where(np.isfinite(ranges) & ~mixed, faces, -1), step)
         self._record.poses_world.append(self._pose.copy())
-        told = np.where(np.isfinite(ranges) & ~mixed, faces, -1)
-        self._record.faces_of_beams.append(told.astype(np.min_scalar_type(-len(self._faces) - 1)))
+        self._record.faces_of_beams.append(faces.astype(np.min_scalar_type(-len(self._faces) - 1)))
         start_s, self._time_s = self._time_s, self._time_s + self.config.scan_s
         return Scan(
             self._finder.bearings_rad,
@@ -139,17 +147,42 @@ class SimulatedRobot:
             start_s,
         )
 
+    def _as_told(
+        self, ranges: Float[np.ndarray, " k"], faces: Int[np.ndarray, " k"], step: int
+    ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+        """Return the ranges that the scanner tells in place of these, late, frozen or mirrored, and their faces."""
+        faults = self.config.faults
+        if faults.late or faults.frozen_from != NEVER:
+            self._told.append((ranges, faces))
+            ranges, faces = self._told[max(min(step, faults.frozen_from - 1) - faults.late, 0)]
+        if not faults.mirrored:
+            return ranges, faces
+        # On a full turn bearing -pi has no counterpart at +pi: it stays where it is.
+        back = -np.arange(len(ranges)) if self.config.lidar.is_full_turn else -1 - np.arange(len(ranges))
+        return ranges[back], faces[back]
+
     def _cast(self, moving: bool) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
         """Return exact ranges m and faces of the beams, of a scan in motion each from where the robot was then."""
         scanner = self.config.true_scanner
         if not moving:
             at = self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot)
-            return self._finder.cast(at)
+            return self._seen_from(at)
         places = places_of_beams(self._way, self._drive_s, self.config.scan_s)
-        casts = [self._finder.cast(compose(compose(self._pose, place), scanner.pose_robot)) for place in places]
+        casts = [self._seen_from(compose(compose(self._pose, place), scanner.pose_robot)) for place in places]
         taken = np.arange(self.config.lidar.beams) * len(casts) // self.config.lidar.beams
         beams = np.arange(self.config.lidar.beams)
         return np.array([each[0] for each in casts])[taken, beams], np.array([each[1] for each in casts])[taken, beams]
+
+    def _seen_from(
+        self, scanner_world: Float[np.ndarray, "3"]
+    ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+        """Return exact ranges m and faces of the beams; where a person or a post of the robot is first, no face."""
+        ranges, faces = self._finder.cast(scanner_world)
+        faults, bearings = self.config.faults, self._finder.bearings_rad
+        people = self._people.places_at(self._time_s)
+        seen = hidden_by(ranges, bearings + scanner_world[2], scanner_world[:2], people, faults.people.radius_m)
+        seen = with_posts(seen, bearings, faults)
+        return seen, np.where(seen < ranges, -1, faces)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command, shortened to the longest step (`clamp`), and return what the wheels report.
@@ -170,23 +203,29 @@ class SimulatedRobot:
             self._record.collisions += 1
             share = float(shares[free - 1]) if free else 0.0
             command = MotionCommand(share * command.forward_m, share * command.turn_rad)
-        if free:
+        is_stuck = self._drives >= self.config.faults.stuck_from
+        if free and not is_stuck:
             self._pose = compose(self._pose, motions[free - 1])
             self._record.path_length_m += float(np.hypot(*motions[free - 1, :2]))
         self._pose[2] += bump_rad(self.config.faults, self._chance, self._drives)
         self._drives += 1
         duration = seconds(command, drive, self.config.wheel_speed_m_s)
         self._time_s += duration
-        self._way, self._drive_s = motions[:free], duration
+        self._people.walk(duration + self.config.scan_s, self._pose[:2])
+        self._way, self._drive_s = np.zeros((0, 3)) if is_stuck else motions[:free], duration
         self._record.drive_time_s += duration
         return replace(odometry(command, drive), touched=touched)
 
     def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:
-        """Return how many places, from the first on, keep the body clear of every face."""
-        near = self._faces_near(places_world[0])
-        if not len(near):
-            return len(places_world)
-        touched = distance_to_segments(places_world, near).min(axis=1) < self.config.radius_m
+        """Return how many places, from the first on, keep the body clear of every face and everybody."""
+        near, people = self._faces_near(places_world[0]), self._people.places_at(self._time_s)
+        gaps = np.full(len(places_world), np.inf)
+        if len(near):
+            gaps = distance_to_segments(places_world, near).min(axis=1)
+        if len(people):
+            to_people = np.hypot(*np.moveaxis(places_world[:, None] - people, -1, 0)).min(axis=1)
+            gaps = np.minimum(gaps, to_people - self.config.faults.people.radius_m)
+        touched = gaps < self.config.radius_m
         return int(np.argmax(touched)) if touched.any() else len(places_world)
 
     def _faces_near(self, place_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "m 2 2"]:

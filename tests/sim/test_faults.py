@@ -7,7 +7,16 @@ import pytest
 
 from sim.chance import Chance
 from sim.drive import Slip, seconds
-from sim.faults import FaultsConfig, bump_rad, is_moving, slipped, with_dropouts, with_mixed_pixels
+from sim.faults import (
+    FaultsConfig,
+    bump_rad,
+    is_moving,
+    misread,
+    slipped,
+    with_dropouts,
+    with_mixed_pixels,
+    with_posts,
+)
 from sim.lidar import RangeFinder
 from sim.robot import RobotConfig, SimulatedRobot
 from slam.geometry.poses import arc, compose
@@ -117,3 +126,56 @@ def test_as_many_scans_as_asked_are_in_motion_and_no_other_draw_is_shifted():
     np.testing.assert_array_equal(right[0][0].ranges_m, moving[0][0].ranges_m)
     assert all(np.any(a.ranges_m != b.ranges_m) for a, b in zip(right[0][1:], moving[0][1:], strict=True))
     assert 0.4 < np.mean([is_moving(FaultsConfig(moving=0.5), CHANCE, step) for step in range(400)]) < 0.6
+
+
+def test_beams_are_lost_in_runs_of_the_stated_length_and_share():
+    config = FaultsConfig(dropout=0.05, clump=8)
+    lost = np.array([np.isinf(with_dropouts(np.ones(720), config, CHANCE, step)) for step in range(200)])
+    assert lost.mean() == pytest.approx(0.05, abs=0.01)
+    ends = np.diff(np.concatenate([lost, lost[:, :1]], axis=1).astype(int), axis=1)
+    assert lost.sum() / np.count_nonzero(ends == 1) >= 8.0
+
+
+def test_a_misread_range_is_that_of_its_bias_scale_and_resolution():
+    ranges = np.array([0.5, 2.0, 3.99, np.inf, np.nan])
+    assert misread(ranges, FaultsConfig(), 4.0) is ranges
+    told = misread(ranges, FaultsConfig(range_bias_m=0.03, range_scale=1.01), 4.0)
+    np.testing.assert_allclose(told, [0.535, 2.05, np.inf, np.inf, np.nan])
+    steps = misread(np.linspace(0.1, 3.9, 200), FaultsConfig(resolution_m=0.025), 4.0) / 0.025
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+
+
+def test_a_mirrored_scan_shows_left_on_the_right():
+    right, mirrored = driven(FaultsConfig()), driven(FaultsConfig(mirrored=True))
+    for plain, told in zip(right[0], mirrored[0], strict=True):
+        back = np.argmin(np.abs(np.exp(1j * plain.bearings_rad)[:, None] - np.exp(-1j * plain.bearings_rad)), axis=1)
+        np.testing.assert_array_equal(told.ranges_m, plain.ranges_m[back])
+
+
+def test_a_late_scan_is_that_of_steps_ago_and_a_frozen_one_stays():
+    right, late, frozen = (
+        driven(faults) for faults in (FaultsConfig(), FaultsConfig(late=2), FaultsConfig(frozen_from=4))
+    )
+    for k in range(len(right[0])):
+        np.testing.assert_array_equal(late[0][k].ranges_m, right[0][max(k - 2, 0)].ranges_m)
+        np.testing.assert_array_equal(frozen[0][k].ranges_m, right[0][min(k, 3)].ranges_m)
+        np.testing.assert_array_equal(frozen[3][k], right[3][min(k, 3)])
+        assert late[0][k].time_s == right[0][k].time_s
+
+
+def test_a_stuck_robot_stands_while_its_wheels_report():
+    right, stuck = driven(FaultsConfig()), driven(FaultsConfig(stuck_from=3))
+    for before, after in zip(right[1], stuck[1], strict=True):
+        np.testing.assert_array_equal(before.motion, after.motion)
+    np.testing.assert_array_equal(stuck[2][4:], np.broadcast_to(stuck[2][3], stuck[2][4:].shape))
+    assert np.hypot(*(right[2][-1] - stuck[2][-1])[:2]) > 0.1
+
+
+def test_posts_stand_evenly_around_the_scanner_at_their_distance():
+    bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    seen = with_posts(np.full(360, 3.0), bearings, FaultsConfig(posts=4, post_rad=0.2))
+    hidden = seen < 3.0
+    np.testing.assert_array_equal(seen[hidden], 0.15)
+    assert hidden.sum() == pytest.approx(360 * 4 * 0.2 / (2 * np.pi), abs=4)
+    at = np.sort(np.angle(np.exp(4j * bearings[hidden])))
+    assert np.abs(at).max() <= 0.4 + 1e-9
