@@ -8,8 +8,10 @@ class Outcome(StrEnum):
 
     ALL_CLOSED = "all-closed"
     """Every chain of the map is closed."""
-    ENDS_LEFT = "ends-left"
+    NONE_REACHABLE = "none-reachable"
     """No open end that is left can be reached or closed; each has its reason."""
+    ENDS_LEFT = "ends-left"
+    """The same, but something moved: what stood in the way may be gone, and the map is not said to be complete."""
     NO_WALL = "no-wall"
     """Nothing was found that could be explored."""
     RECORDING_ENDED = "recording-ended"
@@ -25,6 +27,6 @@ class Outcome(StrEnum):
     @property
     def status(self) -> str:
         """`complete`: no reachable open end is left; `stopped`: somebody or a limit ended it; or `failed`."""
-        if self in (Outcome.ALL_CLOSED, Outcome.ENDS_LEFT, Outcome.NO_WALL, Outcome.RECORDING_ENDED):
+        if self in (Outcome.ALL_CLOSED, Outcome.NONE_REACHABLE, Outcome.NO_WALL, Outcome.RECORDING_ENDED):
             return "complete"
         return "failed" if self is Outcome.FAILED else "stopped"

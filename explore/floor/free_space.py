@@ -73,6 +73,10 @@ class FreeSpace:
         if not np.any(np.all(self._too_tight == place_world, axis=1)):
             self._too_tight = np.vstack([self._too_tight, place_world])
 
+    def forget_too_tight(self) -> None:
+        """Forget where the body did not get through: something stood there that moves."""
+        self._too_tight = np.zeros((0, 2))
+
     def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
         """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit.
 

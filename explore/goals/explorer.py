@@ -18,6 +18,7 @@ from ..outcome import Outcome
 from ..planning.wall_routes import route
 from ..strategies import Choice, Place, Situation, Strategy, Watchful
 from ..survey.frontiers import known_floor
+from ..survey.moving_things import moving_returns
 from ..survey.round_things import RoundConfig, is_round
 from .decider import Decision
 from .ledger import Event, Key, Ledger
@@ -45,6 +46,12 @@ class ExplorerConfig:
     """Ends on these are set aside without a look of their own."""
     patience_m: float = 60.0
     """A goal that takes more steps than so long a way is set aside."""
+    wait_s: float = 10.0
+    """Where something moved, what was given up is tried again so long after the last of it was, ..."""
+    again: int = 3
+    """... at most so often in a run, ..."""
+    moving_scans: int = 3
+    """... and something moved if so many scans show it."""
     second_looks: int = 4
     """Before it ends, the robot turns on the spot this often while there are tentative walls."""
     sweep: bool = True
@@ -86,7 +93,7 @@ class Explorer:
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
         self.strategy = strategy
         self._start, self._config = start_world, config
-        self._step = -1
+        self._step, self._moving_scans = -1, 0
         self.start_over()
 
     def start_over(self) -> None:
@@ -95,6 +102,7 @@ class Explorer:
         self._ledger = Ledger(self._config.near_m)
         self._sweep = Sweep(self._config.sweeping, self._ledger, self._config.sweep)
         self._looked_again = 0
+        self._gave_up_s, self._tried_again = -np.inf, 0
 
     @property
     def strategy(self) -> Strategy:
@@ -112,6 +120,8 @@ class Explorer:
         self._step += 1
         if self._watchful is not None:
             self._watchful.watch(around)
+        moving = moving_returns(around.scan, around.free_space, around.walls, self._config.robot.scanner)
+        self._moving_scans += bool(len(moving))
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._revive(ends)
         self._keep_within(around, ends)
@@ -124,10 +134,18 @@ class Explorer:
             led = task.errand.walls_to_follow
             walls = task.walls_to_follow if led is None else led
             return Decision(command, task.doing, task.goal, walls, given_up, task.errand.behaviour)
-        left = len(given_up.keys & ends.keys())
+        left, unseen = len(given_up.keys & ends.keys()), sum(bool(place.trouble) for place in given_up.places)
         words = "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
-        outcome = Outcome.ENDS_LEFT if left else Outcome.ALL_CLOSED
+        outcome = Outcome.NONE_REACHABLE if left else Outcome.ALL_CLOSED
+        if self._has_seen_moving and (left or unseen):
+            outcome = Outcome.ENDS_LEFT
+            words = f"ends-left: {left} open ends and {unseen} borders of unseen floor are blocked by something that"
+            words += f" moves or that is no wall, after {self._tried_again + 1} tries"
         return Decision(None, words, given_up=given_up, outcome=outcome)
+
+    @property
+    def _has_seen_moving(self) -> bool:
+        return self._moving_scans >= self._config.moving_scans
 
     def _command(
         self, around: Surroundings, chains: tuple[Chain, ...], ends: dict[Key, OpenEnd], graph: nx.DiGraph[int]
@@ -145,7 +163,20 @@ class Explorer:
                 self._looked_again = 0
                 return command
             self._task = self._give_up(task, around, ends)
+            self._gave_up_s = around.scan.time_s
+        if self._may_try_again(ends):
+            if around.scan.time_s >= self._gave_up_s + self._config.wait_s:
+                self._tried_again += 1
+                self._ledger.take_up_all()
+                around.free_space.forget_too_tight()
+            return MotionCommand(0.0, self._config.robot.turn_rad)
         return self._look_again(around, len(self._ledger.set_aside) > known)
+
+    def _may_try_again(self, ends: dict[Key, OpenEnd]) -> bool:
+        """Return whether what was given up is worth another try: something moved, and may no longer be in the way."""
+        given_up = self._ledger.given_up
+        is_left = bool(given_up.keys & ends.keys()) or any(place.trouble for place in given_up.places)
+        return self._has_seen_moving and is_left and self._tried_again < self._config.again
 
     def interrupt(self, around: Surroundings) -> None:
         """Look for another way to the present goal: something stands in this one."""

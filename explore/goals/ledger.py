@@ -87,6 +87,11 @@ class Ledger:
         """Let an end be tried again at which no look was possible: now one may be."""
         self._ends[key] = replace(self.end(key), set_aside=None, known_cells=None)
 
+    def take_up_all(self) -> None:
+        """Let every end and every place be tried again, as if none had been: what stood in the way may be gone."""
+        self._ends = {}
+        self._places = []
+
     def note_walk(self, key: Key) -> None:
         """Take note that the robot is sent along the wall of an end."""
         self._ends[key] = replace(self.end(key), was_walked=True)

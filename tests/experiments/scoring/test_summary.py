@@ -35,7 +35,8 @@ def test_a_summary_says_which_run_it_was(run):
     ("outcome", "status", "code"),
     [
         (Outcome.ALL_CLOSED, "complete", 0),
-        (Outcome.ENDS_LEFT, "complete", 0),
+        (Outcome.NONE_REACHABLE, "complete", 0),
+        (Outcome.ENDS_LEFT, "stopped", 0),
         (Outcome.STEP_LIMIT, "stopped", 0),
         (Outcome.INTERRUPTED, "stopped", 130),
         (Outcome.FAILED, "failed", 1),

@@ -40,7 +40,7 @@ class Idle:
     started_over: int = 0
 
     def decide(self, around, chains, graph):
-        return Decision(None, "nothing is left", outcome=Outcome.ENDS_LEFT)
+        return Decision(None, "nothing is left", outcome=Outcome.NONE_REACHABLE)
 
     def interrupt(self, around):
         pass
@@ -101,7 +101,7 @@ def test_what_the_robot_drove_through_is_passable_whatever_is_drawn_over_it(driv
     shut(grid, pose, forget=False)
     assert way_back(grid, pose) is not None
     decision = retreat.decide(around, (), nx.DiGraph())
-    assert (decision.command, decision.outcome) == (None, Outcome.ENDS_LEFT)
+    assert (decision.command, decision.outcome) == (None, Outcome.NONE_REACHABLE)
     grid._driven[:] = False
     assert way_back(grid, pose) is None
 

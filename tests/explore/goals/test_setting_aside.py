@@ -89,6 +89,6 @@ def test_the_end_says_how_many_ends_cannot_be_closed(scripted, scene, aside):
     if aside:
         assert decisions[0].command == MotionCommand(0.0, NO_SWEEP.robot.turn_rad)
     assert decisions[0].words == ("" if aside else "every chain is closed")
-    assert decisions[-1].outcome is (Outcome.ENDS_LEFT if aside else Outcome.ALL_CLOSED)
+    assert decisions[-1].outcome is (Outcome.NONE_REACHABLE if aside else Outcome.ALL_CLOSED)
     words = "no reachable open end is left; 2 cannot be closed" if aside else "every chain is closed"
     assert decisions[-1].words == words
