@@ -7,14 +7,15 @@ from viz.figures.curves import SmallMap
 from viz.figures.panels import map_panels
 
 from ..scenario import TrialConfig
-from ..trial import TrialResult, run_trial
 from .reproduction import Numbers, Reproduction, Said
-from .runs.drives import PAPER, drive_by_walls, last_map, log_of, small_map
+from .runs.doubles import Double, first_double, watched
+from .runs.drives import PAPER, drive_by_walls, last_map, log_of, mark_double, small_map
 from .runs.maps import compared, map_numbers, map_words, mark
 
 STAGES_M = (4.0, 12.0)
 """Path driven at the pictures before the obstacle's chain is closed."""
 
+TRIED = "seeds tried until a wall stands twice"
 SAID: Said = {
     "first chain closed after, m": "16 (around the obstacle)",
     "contours closed": "the obstacle's; open ends left elsewhere",
@@ -29,35 +30,43 @@ def numbers(seed: int) -> Numbers:
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9, show the map as it grows, and map its scans with each back end."""
-    config = drive_by_walls("paper-fig9", seed=seed)
+    """Explore the world of figure 9 until a wall stands twice, show the map as it grows, and by each back end."""
+    search = first_double(drive_by_walls("paper-fig9", seed=seed))
+    config, double = search.config, search.double
     results = compared(config)
-    maps = _stages(config, results[PAPER])
+    stages = _stages(config, double)
+    maps = [small for small, _ in stages]
     maps += [last_map(result, f"{name}: {map_words(result)}") for name, result in results.items()]
-    figure, axes = map_panels(f"Figure 9, seed {seed}: {PAPER} explores; its scans through four back ends", maps, 4)
-    mark(axes[len(maps) - len(results)], results[PAPER])
+    title = f"Figure 9, seed {config.seed} ({search.tried} tried): {PAPER} explores; its scans through four back ends"
+    figure, axes = map_panels(title, maps, 4)
+    mark(axes[len(stages)], results[PAPER])
+    for one, (small, step) in zip(axes, stages, strict=False):
+        if double is not None and step.index == double.standing[-1]:
+            mark_double(one, small, step.map.belief.rows(double.ids), "W")
+    ours = {name: map_numbers(result) for name, result in results.items()}
+    ours[PAPER][TRIED] = search.tried
     return Reproduction(
         "Figure 9: 12 m x 9 m around a big obstacle",
         SAID,
-        numbers(seed),
+        ours,
         figure,
-        (f"One drive by {PAPER}, nearest-robot; the others map its scans with their own gate.",),
+        (
+            f"One drive by --preset paper-method, nearest-robot: {search.words}.",
+            "The other back ends map its scans by the same mapper, each with its own gate.",
+        ),
     )
 
 
-def _stages(config: TrialConfig, result: TrialResult) -> list[SmallMap]:
-    """Return the map at some places of the path and where the first chain was closed; the drive is made once more."""
-    log = log_of(result)
-    closed = np.flatnonzero(log.closed_chains > 0)
-    wanted = {int(np.searchsorted(log.path_length_m, at)) for at in STAGES_M if at < log.path_length_m[-1]}
-    wanted |= set(closed[:1].tolist())
-    maps = []
-
-    def watch(step: Step) -> None:
-        if step.index in wanted:
-            words = ", the first chain is closed" if step.index in closed[:1] else ""
-            title = f"{PAPER} after {step.path_length_m:.1f} m{words}"
-            maps.append(small_map(result, title, step.map, step.chains, step.index + 1))
-
-    run_trial(config, watch, result.scenario.world)
-    return maps
+def _stages(config: TrialConfig, double: Double | None) -> list[tuple[SmallMap, Step]]:
+    """Return the map at some places of the path, where the first chain was closed, and where a wall stands twice."""
+    drive = watched(config)
+    log = log_of(drive.made)
+    wanted = {int(np.searchsorted(log.path_length_m, at)): "" for at in STAGES_M if at < log.path_length_m[-1]}
+    wanted |= dict.fromkeys(np.flatnonzero(log.closed_chains > 0)[:1].tolist(), ", the first chain is closed")
+    wanted |= {} if double is None else {double.standing[-1]: ", wall W stands twice"}
+    found = []
+    for index, words in sorted(wanted.items()):
+        step = drive.steps[index]
+        title = f"{PAPER} after {step.path_length_m:.1f} m{words}"
+        found.append((small_map(drive.made, title, step.map, step.chains, index + 1), step))
+    return found

@@ -1,34 +1,31 @@
-"""Walls that a map holds twice, and how it saw them in model space when the second entry was made."""
+"""Walls that a map held twice, and how it saw them in model space when the second entry was made (paper, figure 10)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from explore.step import Step
-from slam.geometry.lines import directions
+from slam.geometry.lines import normals
+from slam.geometry.poses import wrap
+from slam.map.stochastic_map import StochasticMap
 from viz.shapes import hessian_cov
 
 from ...replays.recordings import recorded
 from ...replays.replay import replay
 from ...scenario import TrialConfig
-from ...scoring.association import Votes, duplicate_pairs
-from ...trial import TrialResult
-from .drives import driven
+from ...scoring.association import duplicate_pairs
+from ...trial import TrialResult, run_trial
+from .drives import PAPER, driven
 
-NONE = -1
-
-
-@dataclass(frozen=True)
-class Double:
-    """The paper's A and A*."""
-
-    ids: tuple[int, int]
-    """The wall, and its second entry."""
-    wall: int
-    """The true wall."""
-    step: int
-    """At which the second entry was made."""
+SIGMAS = 3.0
+"""Ellipses are drawn at so many."""
+LASTING = 30
+"""A wall that stands twice for so many steps, some three metres, is no passing doubt of the filter's."""
+STANDS = f"a wall stands twice for {LASTING} steps or more, A* entered outside A's ellipse"
+SEEDS = 40
+"""So many drives are searched for a wall that stands in the map twice."""
 
 
 @dataclass(frozen=True)
@@ -40,52 +37,124 @@ class ModelSpace:
     covs: Float[np.ndarray, "n 2 2"]
     ends_world: Float[np.ndarray, "n 2 2"]
 
+    def about(self, point_world: Float[np.ndarray, "2"]) -> "ModelSpace":
+        """Return the same lines with r measured from a point, as if the world's origin were there."""
+        alpha, away = self.lines_world[:, 0], np.broadcast_to(-point_world, (len(self.ids), 2))
+        lines = self.lines_world + np.stack([0.0 * alpha, np.sum(normals(alpha) * away, axis=1)], axis=-1)
+        return replace(self, lines_world=lines, covs=hessian_cov(alpha, away, self.covs))
 
-def double_entry(result: TrialResult) -> tuple[int, int] | None:
-    """Return the ids (older, younger) of the first wall that the last map of a trial holds twice, or None."""
-    assert result.last is not None
-    walls = result.last.map
-    pairs = duplicate_pairs(walls, result.votes.walls_of(walls.ids), ~walls.tentative)
-    return pairs[0] if pairs else None
+    def rows(self, ids: tuple[int, int]) -> tuple[int, int]:
+        """Return the rows of two lines."""
+        first, second = np.searchsorted(self.ids, ids)
+        return int(first), int(second)
+
+    def sigmas_away(self, ids: tuple[int, int]) -> float:
+        """Return how far the second of two lines is from the first one, in standard deviations of the first."""
+        first, second = self.rows(ids)
+        off = self.lines_world[second] - self.lines_world[first]
+        off[0] = wrap(off[0])
+        return float(np.sqrt(off @ np.linalg.solve(self.covs[first], off)))
 
 
-def entered(config: TrialConfig, backend: str, pair: tuple[int, int]) -> Double:
-    """Return when a back end entered a wall anew; its replay is made once more, to look at every step."""
-    steps: list[int] = []
+@dataclass(frozen=True)
+class Double:
+    """The paper's A and A*."""
+
+    ids: tuple[int, int]
+    """The wall, and its second entry."""
+    wall: int
+    """The true wall."""
+    entered: int
+    """The step at which the second entry was made."""
+    standing: tuple[int, ...]
+    """The steps at which both overlap, and neither is tentative."""
+    space: ModelSpace
+    """The map at the step when it was entered."""
+
+    @property
+    def sigmas_away(self) -> float:
+        """How far A* was from A then, in standard deviations of A alone."""
+        return self.space.sigmas_away(self.ids)
+
+
+@dataclass(frozen=True)
+class WatchedDrive:
+    """A drive with all walls that its map ever held twice."""
+
+    made: TrialResult
+    steps: tuple[Step, ...]
+    """Their beliefs answer for no joint covariance any more."""
+    doubles: tuple[Double, ...]
+    """In the order in which they show: both overlap, and neither is tentative."""
+
+
+@lru_cache(maxsize=8)
+def watched(config: TrialConfig, backend: str = PAPER) -> WatchedDrive:
+    """Return what a back end makes of a trial's scans, with all walls that its map ever held twice.
+
+    Raises UsageError for bad names.
+    """
+    steps: list[Step] = []
+    spaces: dict[int, tuple[int, ModelSpace]] = {}
 
     def watch(step: Step) -> None:
-        if not steps and pair[1] in step.map.ids:
-            steps.append(step.index)
+        steps.append(step)
+        new = [wall for wall in step.map.ids.tolist() if wall not in spaces]
+        spaces.update(dict.fromkeys(new, (step.index, _space(step.map))) if new else {})
 
-    made = driven(config)
-    result = replay(recorded(made), backend, watch=watch, world=made.scenario.world)
-    return Double(pair, int(result.votes.walls_of(np.array(pair[:1]))[0]), steps[0])
-
-
-def model_space(config: TrialConfig, backend: str, at_step: int) -> tuple[ModelSpace, Votes]:
-    """Return the lines of a back end's map at one step, and which true wall each is of."""
-    found: list[ModelSpace] = []
-
-    def watch(step: Step) -> None:
-        if step.index != at_step:
-            return
-        belief = step.map.belief
-        count = len(belief.ids)
-        cov = belief.joint(belief.ids).cov[3:, 3:].reshape(count, 2, count, 2)
-        covs = hessian_cov(belief.means[:, 0], belief.anchors, cov[np.arange(count), :, np.arange(count)])
-        found.append(ModelSpace(belief.ids.copy(), belief.lines_world, covs, step.map.ends_world))
-
-    made = driven(config)
-    result = replay(recorded(made), backend, watch=watch, world=made.scenario.world)
-    return found[0], result.votes
+    if backend == config.backend:
+        made = run_trial(config, watch)
+    else:
+        drive = driven(config)
+        made = replay(recorded(drive), backend, watch=watch, world=drive.scenario.world)
+    maps = [step.map for step in steps]
+    pairs = [duplicate_pairs(walls, made.votes.walls_of(walls.ids), ~walls.tentative) for walls in maps]
+    found = []
+    for pair in dict.fromkeys(pair for each in pairs for pair in each):
+        entered, space = spaces[pair[1]]
+        wall = int(made.votes.walls_of(np.array(pair[:1]))[0])
+        standing = tuple(index for index, each in enumerate(pairs) if pair in each)
+        found.append(Double(pair, wall, entered, standing, space))
+    return WatchedDrive(made, tuple(steps), tuple(found))
 
 
-def row_of_wall(space: ModelSpace, votes: Votes, wall: int, like: Float[np.ndarray, "2 2"]) -> int:
-    """Return the row of the line of a true wall that shares most of its length with a piece, `NONE` where none is."""
-    rows = np.flatnonzero(votes.walls_of(space.ids) == wall)
-    if not len(rows):
-        return NONE
-    along = directions(space.lines_world[rows[0], 0])
-    spans, span = np.sort(space.ends_world[rows] @ along, axis=1), np.sort(like @ along)
-    shared = np.minimum(spans[:, 1], span[1]) - np.maximum(spans[:, 0], span[0])
-    return int(rows[np.argmax(shared)])
+@dataclass(frozen=True)
+class Search:
+    """Drives with one seed after the other, until a wall stands in the map twice, A* outside A's ellipse."""
+
+    config: TrialConfig
+    """Of the drive that has one; of the first drive, where none has."""
+    tried: int
+    """How many seeds that took, or how many were tried in vain."""
+    double: Double | None
+
+    @property
+    def words(self) -> str:
+        """What the search came to."""
+        first = self.config.seed
+        if self.double is None:
+            return f"in none of {self.tried} drives, seeds {first} and on, {STANDS}"
+        return f"seed {first}, number {self.tried} of those tried, is the first in which {STANDS}"
+
+
+@lru_cache(maxsize=8)
+def first_double(config: TrialConfig, most: int = SEEDS) -> Search:
+    """Drive with the seed of a trial, the next one and so on, `most` of them, until a wall stands twice.
+
+    It does so for `LASTING` steps or more, and A* is outside the 3 sigma ellipse of A when it is entered.
+    """
+    for tried in range(most):
+        own = replace(config, seed=config.seed + tried)
+        for double in watched(own).doubles:
+            if len(double.standing) >= LASTING and double.sigmas_away > SIGMAS:
+                return Search(own, tried + 1, double)
+    return Search(config, most, None)
+
+
+def _space(walls: StochasticMap) -> ModelSpace:
+    """Return the lines of a map in model space, while its back end has not moved on."""
+    belief = walls.belief
+    count = len(belief.ids)
+    cov = belief.joint(belief.ids).cov[3:, 3:].reshape(count, 2, count, 2)
+    covs = hessian_cov(belief.means[:, 0], belief.anchors, cov[np.arange(count), :, np.arange(count)])
+    return ModelSpace(belief.ids.copy(), belief.lines_world, covs, walls.ends_world)

@@ -5,14 +5,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
+from matplotlib.axes import Axes
 
 from slam.geometry.poses import to_world
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
+from viz import palette
 from viz.figures.curves import SmallMap
 
-from ...artifacts.presets import preset_of
+from ...artifacts.presets import METHODS, preset_of
 from ...artifacts.settings import trial_of
 from ...replays.recordings import recorded
 from ...replays.replay import replay
@@ -22,7 +24,7 @@ from ...scoring.records import Log
 from ...trial import TrialResult, run_trial
 from ...views.timelines import true_rings
 
-PAPER = "block-ekf"
+PAPER = METHODS["paper-method"].backend
 """The paper's estimator, which drives."""
 BESIDE = (PAPER, "full-ekf", "invariant-ekf", "graph")
 """The estimators that are shown beside each other."""
@@ -87,3 +89,14 @@ def trace_over_start(result: TrialResult) -> Float[np.ndarray, " s"]:
     """Return the trace of the pose covariance (m^2 and rad^2 added, as the paper does) over that of the start."""
     start = result.scenario.start_cov
     return np.asarray(np.trace(log_of(result).estimated_cov, axis1=1, axis2=2) / np.trace(start))
+
+
+def mark_double(axes: Axes, small: SmallMap, rows: Int[np.ndarray, " 2"], letter: str) -> None:
+    """Name a wall and its second entry, with a star, in a picture of a map, as the paper's figure 10 does."""
+    for row, name, colour in zip(rows, (letter, f"{letter}*"), (palette.ALARM, palette.REFUSED), strict=True):
+        ends = small.ends_world[row]
+        axes.plot(*ends.T, color=colour, linewidth=2.6, linestyle="-" if name == letter else (0, (1.5, 1.0)), zorder=5)
+        offset = (-12, 6) if name == letter else (8, -10)
+        axes.annotate(
+            name, ends.mean(axis=0), xytext=offset, textcoords="offset points", size=10, weight="bold", color=colour
+        )

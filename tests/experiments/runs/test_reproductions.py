@@ -69,7 +69,7 @@ def test_passes_counts_the_beginning_and_each_return():
     assert passes(path[:50]) == 1
 
 
-@pytest.mark.usefixtures("_unchecked")
+@pytest.mark.long
 def test_figure_4_is_planned_and_driven_as_in_the_text():
     made = fig4.reproduce(1)
     ours = made.ours["block-ekf"]
