@@ -1,96 +1,70 @@
 """A robot that streams, made into one that steps: scans come by the clock, motion goes on until it is stopped."""
 
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 
-from ..geometry.poses import inverse, wrap
-from .messages import MotionCommand, Odometry, Scan, without_near
+from .deskew import de_skewed
+from .errand import Errand, Gains
+from .messages import MotionCommand, Odometry, Scan
+from .scan_stream import ScanStream
 from .spec import RobotError
+from .timed import StreamingRobot, TimedScan, Twist
 
-KNOTS = 9
-"""Times during a scan at which the odometry is asked; between them the motion is even."""
-AT_REST = 1e-5
-"""A scanner that moves by less, m and rad, while it turns, stands still."""
-NEAREST_STEPS = 1.5
-"""A direction in which no beam was taken within so many beam steps is not known."""
-ONE_FACE = 0.2
-"""Neighbouring returns whose ranges differ by less than this share of the nearer are of one face."""
+__all__ = ["SteppedRobot", "StreamingRobot", "TimedScan", "Twist", "de_skewed"]
+
 SHARE_MOVED, TRIES = 0.1, 3
 """A robot that goes less than this share of its commands, so many times in turn, does not move."""
-
-
-@dataclass(frozen=True)
-class TimedScan:
-    """One turn of the range finder as its driver gives it: beams one after another, while the robot may move."""
-
-    bearings_rad: Float[np.ndarray, " k"]
-    """In the order in which the beams were taken, evenly spaced, ascending or descending."""
-    ranges_m: Float[np.ndarray, " k"]
-    """As in `Scan`: +inf where nothing came back, NaN where the beam tells nothing."""
-    sigma_m: float
-    range_max_m: float
-    start_s: float
-    """When the first beam was taken, on the robot's clock."""
-    end_s: float
-    """When the last one was."""
-    range_min_m: float = 0.0
-    """Returns below this tell nothing."""
-    sigma_share: float = 0.0
-    """As in `Scan`: standard deviation as a share of the range, beside `sigma_m`."""
-
-
-@dataclass(frozen=True)
-class Twist:
-    """What the motors are to do until told otherwise."""
-
-    speed_m_s: float
-    turn_rad_s: float
-
-
-@runtime_checkable
-class StreamingRobot(Protocol):
-    """A robot whose scans, odometry and motors go on by themselves."""
-
-    def scan(self) -> TimedScan:
-        """Wait for the next scan and return it."""
-        ...
-
-    def odometry(self, from_s: float, to_s: float) -> Odometry:
-        """Return the motion between two times, in the robot's frame at the first."""
-        ...
-
-    def send(self, twist: Twist) -> None:
-        """Drive like this from now on."""
-        ...
-
-    def stop(self) -> None:
-        """Stand still."""
-        ...
+STROKES, ENOUGH = 3, 0.08
+"""A command is gone on with after a stop, so many times at most, where more than this share of it is left."""
+OVERDUE = 4.0
+"""Where no scan has come for so many periods, what drives halts."""
+OBEYED = 0.2
+"""It is not where less than this share of what was sent was seen to be driven: the odometry may have died."""
+STILL_S, STILL_M, STILL_RAD = 0.3, 0.003, 0.005
+"""A robot that moves by no more in so many seconds stands."""
+SEEN, LATE_S = 0.8, 1.0
+"""Odometry that shows less than this share of what was sent may be late; it is waited for so long."""
+ROUNDING_S = 1e-6
+"""Times that differ by less are one."""
+STOPPING_S = 3.0
+"""A robot that moves on so long after a stop cannot be stopped."""
 
 
 class SteppedRobot:
     """Makes `sense` and `drive` of a streaming robot (`Robot`); it stands still between two steps.
 
-    A command takes whole turns of the scanner. Whatever goes wrong, the robot is stopped first. Raises RobotError once
-    it was told to go and did not move, three times in turn.
+    A command ends where the odometry says that it was driven, or where all of it was sent, whichever comes first. While
+    it waits it sends the twist again. Whatever goes wrong, the robot is stopped first. Raises RobotError where scans or
+    odometry stay away for `wait_s`, where the robot drives 1.3 times as far as it was told or cannot be stopped, and
+    once it was told to go and did not move, three times in turn. `clock` tells the robot's seconds, as a simulator's
+    that is not in real time.
     """
 
-    def __init__(self, robot: StreamingRobot, speed_m_s: float = 0.2, turn_rad_s: float = 0.6) -> None:
-        self._robot = robot
+    def __init__(
+        self,
+        robot: StreamingRobot,
+        speed_m_s: float = 0.2,
+        turn_rad_s: float = 0.6,
+        wait_s: float = 3.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        for name, value in {"speed_m_s": speed_m_s, "turn_rad_s": turn_rad_s, "wait_s": wait_s}.items():
+            if not 0.0 < value < np.inf:
+                raise RobotError(f"expected a {name} above 0 and finite, found {value:g}: correct it")
+        self._robot, self._stream, self._clock = robot, ScanStream(robot, wait_s), clock
         self._speed_m_s, self._turn_rad_s = speed_m_s, turn_rad_s
         self._at: TimedScan | None = None
         self._stuck = 0
+        self._gains: Gains = {}
 
     def sense(self) -> Scan:
         """Return the scan at the present place, as if all its beams had been taken at its end."""
         try:
             if self._at is None:
-                self._at = self._robot.scan()
-            return de_skewed(self._at, self._robot.odometry)
+                self._at = self._stream.after_pause()
+            return de_skewed(self._at, self._stream.odometry)
         except BaseException:
             self._robot.stop()
             raise
@@ -98,25 +72,64 @@ class SteppedRobot:
     def drive(self, command: MotionCommand) -> Odometry:
         """Carry out one command; return the odometry from the end of the last scan to that of the next."""
         try:
-            before = self._at or self._robot.scan()
-            self._at = self._driven(command, before)
-            odometry = self._robot.odometry(before.end_s, self._at.end_s)
+            before = self._at or self._stream.after_pause()
+            errand = Errand(command, self._speed_m_s, self._turn_rad_s, self._gains)
+            self._at = self._driven(errand)
+            odometry = self._stream.odometry(before.end_s, self._at.end_s)
             self._watch(command, odometry)
             return odometry
         except BaseException:
             self._robot.stop()
             raise
 
-    def _driven(self, command: MotionCommand, before: TimedScan) -> TimedScan:
-        seconds = max(abs(command.forward_m) / self._speed_m_s, abs(command.turn_rad) / self._turn_rad_s)
-        turn_s = max(before.end_s - before.start_s, 1e-3)
-        turns = max(int(np.ceil(seconds / turn_s)), 1)
-        if seconds > 0.0:
-            self._robot.send(Twist(command.forward_m / (turns * turn_s), command.turn_rad / (turns * turn_s)))
-        for _ in range(turns):
-            self._robot.scan()
+    def _driven(self, errand: Errand) -> TimedScan:
+        """Drive an errand and return the first scan that was taken at rest after it."""
+        start = self._stream.after_pause()
+        while not self._stream.knows_period:
+            start = self._stream.next(self._stop)
+        for _ in range(STROKES if errand.seconds > 0.0 else 0):
+            done, sent = errand.done, errand.sent
+            self._stroke(errand, start)
+            at = self._at_rest(errand, start)
+            errand.begin()
+            if errand.left < ENOUGH or errand.done - done < OBEYED * (errand.sent - sent):
+                return at
+        return self._at_rest(errand, start)
+
+    def _stroke(self, errand: Errand, start: TimedScan) -> None:
+        """Drive until nothing is left of the errand."""
+        errand.begin()
+        at = start if errand.sent == 0.0 else self._stream.next(self._stop)
+        while (rate := errand.rate(self._stream.period_s)) > 0.0:
+            motion = _Motion(self._robot, errand.twist(rate), errand.left / rate, self._stream.period_s, self._clock)
+            after = self._stream.next(motion.keep)
+            odometry = self._stream.odometry(start.end_s, after.end_s, motion.keep)
+            errand.add(rate * motion.driven_s(float(after.end_s - at.end_s)), odometry)
+            at = after
+
+    def _at_rest(self, errand: Errand, start: TimedScan) -> TimedScan:
+        """Stop; return a scan during which the robot stood. Raises RobotError where it does not come to rest."""
         self._robot.stop()
-        return self._robot.scan()
+        first = self._stream.next(self._stop)
+        while True:
+            at = self._stream.next(self._stop)
+            errand.add(0.0, self._stream.odometry(start.end_s, at.end_s, self._stop))
+            since_s, still_s = at.end_s - first.end_s, max(STILL_S, at.end_s - at.start_s)
+            if since_s < still_s - ROUNDING_S:
+                continue
+            moved = self._stream.odometry(at.end_s - still_s, at.end_s, self._stop).motion
+            is_seen = errand.done >= SEEN * errand.sent or since_s >= LATE_S
+            if is_seen and np.hypot(*moved[:2]) <= STILL_M and abs(moved[2]) <= STILL_RAD:
+                return at
+            if since_s > STOPPING_S + still_s:
+                raise RobotError(
+                    f"expected a robot that stands after a stop, found {np.hypot(*moved[:2]):.3f} m and"
+                    f" {np.rad2deg(abs(moved[2])):.1f} degrees in the last {still_s:.1f} s, {since_s:.1f} s after it:"
+                    " check its motors and its odometry"
+                )
+
+    def _stop(self, _: int) -> None:
+        self._robot.stop()
 
     def _watch(self, command: MotionCommand, odometry: Odometry) -> None:
         """Raise RobotError for a robot that stands still again and again though it was told to go."""
@@ -131,58 +144,26 @@ class SteppedRobot:
             )
 
 
-def de_skewed(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> Scan:
-    """Return the scan as it would be had all beams been taken at its end, from where the robot was then.
+class _Motion:
+    """A twist that is sent again while it lasts; then the robot is stopped, whether scans come or not."""
 
-    Each return is carried along with the motion from its own time to the end; a range between two of one face lies on
-    the chord between them. Raises RobotError for what no scan is.
-    """
-    scan = replace(scan, ranges_m=without_near(scan.ranges_m, scan.range_min_m))
-    taken = (scan.sigma_m, scan.range_max_m, scan.end_s, scan.sigma_share, scan.start_s)
-    as_taken = Scan.ordered(scan.bearings_rad, scan.ranges_m, *taken)
-    places = _places(scan, odometry)
-    if np.abs(places).max() < AT_REST:
-        return as_taken
-    heading = scan.bearings_rad + places[:, 2]
-    reach = np.where(np.isposinf(scan.ranges_m), scan.range_max_m, scan.ranges_m)
-    points = places[:, :2] + reach[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    known = ~np.isnan(scan.ranges_m)
-    ranges = np.full(len(as_taken.bearings_rad), np.nan)
-    if known.any():
-        ranges = _seen_from_the_end(points[known], np.isposinf(scan.ranges_m[known]), as_taken)
-    return Scan(as_taken.bearings_rad, ranges, *taken)
+    def __init__(
+        self, robot: StreamingRobot, twist: Twist, seconds: float, period_s: float, clock: Callable[[], float]
+    ) -> None:
+        self._robot, self._twist, self._clock = robot, twist, clock
+        self._seconds, self._periods = seconds, min(seconds / period_s, OVERDUE)
+        self._since_s, self._is_over = clock(), False
+        robot.send(twist)
 
+    def keep(self, stale: int) -> None:
+        """Send the twist again; or a stop, once it has lasted long enough or so many scans have stayed away."""
+        over = self._clock() - self._since_s >= self._seconds or stale > max(self._periods - 1.0, 0.0)
+        self._is_over = self._is_over or over
+        if self._is_over:
+            self._robot.stop()
+        else:
+            self._robot.send(self._twist)
 
-def _places(scan: TimedScan, odometry: Callable[[float, float], Odometry]) -> Float[np.ndarray, "k 3"]:
-    """Return where the robot was when each beam was taken, in its frame at the end of the scan."""
-    times = np.linspace(scan.start_s, scan.end_s, KNOTS)
-    knots = np.array([inverse(odometry(float(t), scan.end_s).motion) for t in times[:-1]] + [np.zeros(3)])
-    knots[:, 2] = np.unwrap(knots[:, 2])
-    knots[:, 2] -= knots[-1, 2]
-    beams = np.linspace(scan.start_s, scan.end_s, len(scan.bearings_rad))
-    return np.column_stack([np.interp(beams, times, column) for column in knots.T])
-
-
-def _seen_from_the_end(points: Float[np.ndarray, "n 2"], is_free: np.ndarray, beams: Scan) -> Float[np.ndarray, " k"]:
-    """Return the range along each beam from the origin to points around it; NaN where none is near its direction."""
-    bearing, reach = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
-    order = np.argsort(bearing)
-    bearing, reach, points, is_free = bearing[order], reach[order], points[order], is_free[order]
-    wanted = wrap(beams.bearings_rad)
-    after = np.searchsorted(bearing, wanted) % len(bearing)
-    before = after - 1
-    off_before, off_after = np.abs(wrap(wanted - bearing[before])), np.abs(wrap(bearing[after] - wanted))
-    nearest = np.where(off_before <= off_after, before, after)
-    near = np.minimum(off_before, off_after) <= NEAREST_STEPS * beams.step_rad
-    ranges = np.where(is_free[nearest], np.inf, reach[nearest])
-    apart = np.abs(reach[after] - reach[before])
-    one_face = apart < ONE_FACE * np.minimum(reach[before], reach[after])
-    one_face &= ~is_free[before] & ~is_free[after] & (off_before + off_after <= 2 * NEAREST_STEPS * beams.step_rad)
-    along = points[after] - points[before]
-    u = np.stack([np.cos(wanted), np.sin(wanted)], axis=-1)
-    cross = u[:, 0] * along[:, 1] - u[:, 1] * along[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chord = (points[before, 0] * along[:, 1] - points[before, 1] * along[:, 0]) / cross
-    ranges = np.where(one_face & np.isfinite(chord) & (chord > 0.0), chord, ranges)
-    beyond = np.isfinite(ranges) & (ranges >= beams.range_max_m)
-    return np.where(near, np.where(beyond, np.inf, ranges), np.nan)
+    def driven_s(self, seconds: float) -> float:
+        """Return how long it lasted, given the time between the scans before and after: the longer by two clocks."""
+        return min(max(seconds, self._clock() - self._since_s), self._seconds if self._is_over else np.inf)
