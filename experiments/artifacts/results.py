@@ -179,6 +179,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
         "time_s": log.time_s,
         "scan_start_s": log.scan_start_s,
         "bearings_rad": log.bearings_rad,
+        **({} if log.fans is None else {"fans": log.fans}),
         "ranges_m": log.ranges_m,
         "sigma_m": log.sigma_m,
         "sigma_share": log.sigma_share,

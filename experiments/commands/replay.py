@@ -61,6 +61,10 @@ class Replay:
     range_noise: float | None = None
     """Of a real robot's log, the standard deviation of a range in metres; by default 0.02 for all logs, since they do
     not state it and real walls scatter more than scanners do."""
+    scan_topic: str | None = None
+    """Of a ROS bag with several topics of scans, the one to read; by default the one that looks around the farthest."""
+    odom_topic: str | None = None
+    """Of a ROS bag with several topics of odometry, the one to read; by default the first by name."""
     relations: Path | None = None
     """Relations between poses that others measured, `t1 t2 x y z roll pitch yaw` on each line: how far is the path
     from them?"""
@@ -128,6 +132,10 @@ class Replay:
         is_own = is_own_log(self.log)
         if is_own and self.every != 1:
             raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
+        if is_own and (self.scan_topic or self.odom_topic):
+            raise UsageError(
+                f"expected a ROS bag for --scan-topic and --odom-topic, found {self.log.name}: leave them out"
+            )
         if is_own and knows_truth(self.log):
             if self.range_noise is not None:
                 raise UsageError(
@@ -142,8 +150,11 @@ class Replay:
                 f" --perfect-odometry, found {self.log.name}: leave them out"
             )
         read = read_own_run if is_own else read_real_run
-        told = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise)
+        topics = self.scan_topic, self.odom_topic
+        told = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise, *topics)
         real = RealLog(read(self.log, told, self.config, self.set, robot))
+        for note in real.run.log.notes:
+            say(f"chainslam: {self.log.name}: {note}", stderr=True)
         if real.run.log.trouble:
             say(
                 f"chainslam: {self.log.name}, {real.run.log.trouble}: {len(real.run.log.scan_time_s)} scans before it"

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from explore.mission import ride_mission
 from explore.step import Step
+from sim.logs.bag_topics import TopicsWanted
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, recording_of
@@ -24,6 +25,7 @@ from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
 from .looked_again import looked_again
+from .motion_of_scans import motion_of_scans
 from .replay import OPEN_TO_REPLAYS
 from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
@@ -49,6 +51,10 @@ class RealOptions:
     """Whether all segments are associated anew once the drive has ended; a back end that smooths has it anyway."""
     range_noise: float | None = None
     """Standard deviation of a range, where the scanner's is known; None for what is assumed of all logs."""
+    scan_topic: str | None = None
+    """The scans of a bag that holds several; None for those that look around the farthest."""
+    odom_topic: str | None = None
+    """The odometry of a bag that holds several; None for the first by name."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +84,8 @@ def read_real_run(
     if options.every < 1:
         raise UsageError(f"expected each keyframe or one of so many, found --every {options.every}: give 1 or more")
     try:
-        log = read_recorded_log(path, _keyframes(options))
+        wanted = TopicsWanted(options.scan_topic, options.odom_topic)
+        log = read_recorded_log(path, _keyframes(options), wanted, motion_of_scans)
     except RecordingError as error:
         raise UsageError(str(error)) from error
     options = replace(options, odometry=options.odometry or "scans")

@@ -28,6 +28,7 @@ def recorded(made: TrialResult) -> RecordedRun:
         log.touched,
         log.sigma_share,
         log.scan_start_s,
+        log.fans,
     )
     return RecordedRun(
         scenario.config, recording, scenario.start_estimate, scenario.start_cov, log.true_world, log.face_of_beam

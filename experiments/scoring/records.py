@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from explore.step import Step
+from sim.logs.recorded_robot import differing, fan_of
 from slam.estimation.backend import Joint
 
 from ..scenario import WitnessedRobot
@@ -38,7 +39,9 @@ class Log:
     scan_start_s: Float[np.ndarray, " s"]
     """When the first beam of each scan was taken; NaN where nobody told."""
     bearings_rad: Float[np.ndarray, " k"]
+    """Of the scan with the most beams."""
     ranges_m: Float[np.ndarray, "s k"]
+    """NaN after the last beam of a scan that has fewer."""
     sigma_m: Float[np.ndarray, " k"]
     sigma_share: float
     range_max_m: float
@@ -83,6 +86,8 @@ class Log:
     reasons: tuple[str, ...]
     longest_route: Route = Route()
     """The first one of the most walls."""
+    fans: Float[np.ndarray, "s 3"] | None = None
+    """As `Recording.fans`: the beams of each scan, where they differ."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -116,8 +121,13 @@ class Columns:
         if not self._count:
             kinds = [(name, (first := np.asarray(value)).dtype, first.shape) for name, value in row.items()]
             self._row = np.zeros((), dtype=kinds)
+        self._widen(row)
         for name, value in row.items():
-            self._row[name] = value
+            cell, count = self._row[name], np.size(value)
+            if cell.ndim == 1 and count < cell.size:
+                cell[:count], cell[count:] = value, _nothing(cell.dtype)
+            else:
+                self._row[name] = value
         content = self._row.tobytes()
         try:
             whole = self._rows.write(content) == len(content)
@@ -130,6 +140,32 @@ class Columns:
             self._rows.write(kept + content)
         self._count += 1
 
+    def _widen(self, row: Mapping[str, Any]) -> None:
+        """Make room in all rows for longer ones: a scanner may give a reading more in one turn than in the next."""
+        kinds = self._row.dtype
+        names = kinds.names or ()
+        longer = {
+            name: np.size(row[name])
+            for name in names
+            if kinds[name].shape and np.size(row[name]) > kinds[name].shape[0]
+        }
+        longer = {name: size for name, size in longer.items() if len(kinds[name].shape) == 1}
+        if not longer:
+            return
+        wide = np.dtype([(n, kinds[n].base, (longer[n],) if n in longer else kinds[n].shape) for n in names])
+        old = np.frombuffer(self._content(), dtype=kinds)
+        new = np.zeros(len(old), dtype=wide)
+        for name in names:
+            if name in longer:
+                new[name] = _nothing(kinds[name].base)
+                new[name][:, : kinds[name].shape[0]] = old[name]
+            else:
+                new[name] = old[name]
+        self._row = np.zeros((), dtype=wide)
+        self._rows.seek(0)
+        self._rows.truncate()
+        self._rows.write(new.tobytes())
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return each column, in rows' order."""
         rows = np.frombuffer(self._content(), dtype=self._row.dtype)
@@ -140,6 +176,11 @@ class Columns:
         content = b"".join(iter(lambda: self._rows.read(1 << 24), b""))
         self._rows.seek(0, 2)
         return content[: self._count * self._row.dtype.itemsize]
+
+
+def _nothing(kind: np.dtype) -> float | int:
+    """Return what fills up a row: NaN, or -1 where the kind has none."""
+    return float("nan") if kind.kind == "f" else -1
 
 
 @dataclass
@@ -186,6 +227,7 @@ class Recorder:
             {
                 "time_s": step.time_s,
                 "scan_start_s": step.scan.start_s,
+                "fan": fan_of(step.scan.bearings_rad),
                 "ranges_m": step.scan.ranges_m,
                 "odometry": step.odometry.reported.motion,
                 "odometry_cov": step.odometry.reported.cov,
@@ -229,10 +271,14 @@ class Recorder:
             raise ValueError("expected at least one step, found none: the run failed before its first scan was mapped")
         scan = self.last.scan
         columns = self._columns.arrays()
+        fans = columns.pop("fan")
+        count, first, pitch = fans[np.argmax(fans[:, 0])]
+        is_like = len(scan.bearings_rad) == count
         columns["face_of_beam"] = columns["face_of_beam"].astype(np.int64)
         return Log(
-            bearings_rad=scan.bearings_rad,
-            sigma_m=np.broadcast_to(np.asarray(scan.sigma_m, dtype=np.float64), scan.bearings_rad.shape),
+            bearings_rad=scan.bearings_rad if is_like else first + pitch * np.arange(int(count)),
+            sigma_m=np.resize(np.asarray(scan.sigma_m, dtype=np.float64), int(count)),
+            fans=differing(fans),
             sigma_share=scan.sigma_share,
             range_max_m=float(scan.range_max_m),
             reasons=tuple(self._reasons),

@@ -11,7 +11,7 @@ from slam.geometry.poses import compose, inverse, wrap
 
 from .archive import LIMIT_BYTES
 from .raw_scan import LogError, RawScan, scanner_on_robot
-from .recorded_robot import Recording
+from .recorded_robot import Recording, differing, fan_of, padded
 
 FIRST_M, FIRST_SCANS = 2.0, 300
 """The scanner's place on the robot is read from the first scans: as many, or as many metres."""
@@ -57,6 +57,8 @@ class RecordedLog:
     """The scanner's pose on the robot, m m rad."""
     trouble: str = ""
     """Why the log ends before its end, in words with the place."""
+    notes: tuple[str, ...] = ()
+    """What was assumed of the log, in words."""
 
     def poses_of_scans(self, keyframes_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "n 3"]:
         """Return where all scans were taken, given where the keyframes were; `s` may be less where a run ended early.
@@ -128,15 +130,15 @@ class _Gathered:
         last, self._last = self._last, scan
         if last is not None and scan.time_s < last.time_s:
             raise LogError(f"{scan.place}: expected time to go on from {last.time_s:.6f} s, found {scan.time_s:.6f} s")
-        if last is not None and len(scan.ranges_m) != len(last.ranges_m):
-            raise LogError(f"{scan.place}: expected {len(last.ranges_m)} beams as before, found {len(scan.ranges_m)}")
+        if scan.robot_odom is None:
+            raise LogError(f"{scan.place}: expected odometry, found none: take one that holds it, or let scans tell it")
         if len(self.keyframes) * scan.ranges_m.nbytes > LIMIT_BYTES:
             raise LogError(f"{scan.place}: expected scans of {LIMIT_BYTES >> 20} MiB at most, found more")
         if self._head is None:
             self._take(scan)
             return
         self._head.append(scan)
-        way = np.hypot(*(scan.robot_odom - self._head[0].robot_odom)[:2])
+        way = np.hypot(*(scan.robot_odom - _odom(self._head[0]))[:2])
         if way > FIRST_M or len(self._head) >= FIRST_SCANS:
             self.place_scanner()
 
@@ -149,7 +151,7 @@ class _Gathered:
                 self._take(scan)
 
     def _take(self, scan: RawScan) -> None:
-        pose = compose(scan.robot_odom, self._on_robot)
+        pose = compose(_odom(scan), self._on_robot)
         if self._is_far(pose):
             self._moved = pose
             self._until_next -= 1
@@ -174,22 +176,30 @@ class _Gathered:
     def log(self, trouble: str) -> RecordedLog:
         """Return what was taken in."""
         first, c = self.keyframes[0], self.config
+        fans = np.array([fan_of(scan.bearings_rad) for scan in self.keyframes])
+        widest = self.keyframes[int(np.argmax(fans[:, 0]))]
         motions = [compose(inverse(a), b) for a, b in pairwise(self._poses)]
         odometry = np.array([np.zeros(3), *motions])
         recording = Recording(
             np.array([scan.time_s for scan in self.keyframes]) - first.time_s,
-            first.bearings_rad,
-            np.array([scan.ranges_m for scan in self.keyframes]),
-            np.full(len(first.bearings_rad), c.sigma_m),
+            widest.bearings_rad,
+            padded([scan.ranges_m for scan in self.keyframes]),
+            np.full(len(widest.bearings_rad), c.sigma_m),
             first.range_max_m,
             odometry,
             wheels_cov(odometry, c),
+            fans=differing(fans),
         )
         of = np.array(self._of_scan)
         return RecordedLog(
             recording, np.array(self._times), of, np.array(self._since), _shares(np.array(self._ways), of),
             self._on_robot, trouble,
         )  # fmt: skip
+
+
+def _odom(scan: RawScan) -> Float[np.ndarray, "3"]:
+    assert scan.robot_odom is not None
+    return scan.robot_odom
 
 
 def _shares(ways: Float[np.ndarray, " n"], of: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -27,8 +27,8 @@ class RawScan:
     ranges_m: Float[np.ndarray, " k"]
     """+inf where nothing came back, NaN where a beam tells nothing."""
     range_max_m: float
-    robot_odom: Float[np.ndarray, "3"]
-    """The robot by its wheels alone, m m rad."""
+    robot_odom: Float[np.ndarray, "3"] | None
+    """The robot by its wheels alone, m m rad; None where the log tells no motion."""
     scanner_odom: Float[np.ndarray, "3"] | None = None
     """The scanner, as far as the log tells it beside the robot; corrected logs tell another path here."""
     place: str = ""
@@ -46,10 +46,10 @@ def scanner_on_robot(scans: list[RawScan]) -> Float[np.ndarray, "3"]:
 
     A log that was corrected tells the scanner's corrected pose: that one does not stay at one place of the robot.
     """
-    told = [scan for scan in scans if scan.scanner_odom is not None]
+    told = [(s.robot_odom, s.scanner_odom) for s in scans if s.robot_odom is not None and s.scanner_odom is not None]
     if not told or len(told) < len(scans):
         return np.zeros(3)
-    places = np.array([compose(inverse(s.robot_odom), s.scanner_odom) for s in told if s.scanner_odom is not None])
+    places = np.array([compose(inverse(robot), scanner) for robot, scanner in told])
     off = places - places[0]
     fixed = np.all(np.abs(off[:, :2]) < SAME_M) and np.all(np.abs(wrap(off[:, 2])) < SAME_RAD)
     return places[0] if fixed and np.hypot(*places[0, :2]) <= FARTHEST_M else np.zeros(3)

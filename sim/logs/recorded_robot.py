@@ -31,10 +31,14 @@ TRUTH = {
     "true_face_of_beam": "int s k",
 }
 """What a simulated run tells besides."""
-LATER = {"touched": "bool s", "sigma_share": "float", "scan_start_s": "float s"}
+LATER = {"touched": "bool s", "sigma_share": "float", "scan_start_s": "float s", "fans": "float s 3"}
 """What older logs do not hold."""
 MOST_M = 1e6
 """Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
+
+
+SAME_RAD = 1e-4
+"""Bearings that differ by less are the same."""
 
 
 class RecordingError(ValueError):
@@ -47,8 +51,9 @@ class Recording:
 
     time_s: Float[np.ndarray, " s"]
     bearings_rad: Float[np.ndarray, " k"]
+    """Of all scans, or of the one with the most beams where they differ (`fans`)."""
     ranges_m: Float[np.ndarray, "s k"]
-    """+inf where nothing came back, NaN where a beam tells nothing."""
+    """+inf where nothing came back, NaN where a beam tells nothing and after the last beam of a scan that has fewer."""
     sigma_m: Float[np.ndarray, " k"]
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
@@ -61,16 +66,42 @@ class Recording:
     scan_start_s: Float[np.ndarray, " s"] | None = None
     """When the first beam of each scan was taken, NaN or None where nobody tells; it ended at `time_s`."""
 
+    fans: Float[np.ndarray, "s 3"] | None = None
+    """How many beams each scan has, the first one's bearing and the step to the next, rad; None where all are alike."""
+
     def __len__(self) -> int:
         return len(self.time_s)
 
     def scan(self, index: int) -> Scan:
         """Return one of its scans."""
         start_s = np.nan if self.scan_start_s is None else float(self.scan_start_s[index])
+        bearings, beams = self.bearings_rad, len(self.bearings_rad)
+        if self.fans is not None:
+            beams = int(self.fans[index, 0])
+            bearings = self.fans[index, 1] + self.fans[index, 2] * np.arange(beams)
         return Scan(
-            self.bearings_rad, self.ranges_m[index], self.sigma_m, self.range_max_m, float(self.time_s[index]),
+            bearings, self.ranges_m[index, :beams], self.sigma_m[:beams], self.range_max_m, float(self.time_s[index]),
             self.sigma_share, start_s,
         )  # fmt: skip
+
+
+def fan_of(bearings_rad: Float[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
+    """Return how many beams there are, the first one's bearing and the mean step to the next, rad."""
+    count = len(bearings_rad)
+    return np.array([count, bearings_rad[0], (bearings_rad[-1] - bearings_rad[0]) / max(count - 1, 1)])
+
+
+def differing(fans: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"] | None:
+    """Return the beams of each scan, or None where they differ by less than rounding."""
+    return None if np.all(np.ptp(fans, axis=0) <= [0.0, SAME_RAD, SAME_RAD / fans[:, 0].max()]) else fans
+
+
+def padded(rows: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, "s k"]:
+    """Return rows of ranges as long as the longest of them, filled up with NaN."""
+    found = np.full((len(rows), max(map(len, rows))), np.nan)
+    for row, ranges in zip(found, rows, strict=True):
+        row[: len(ranges)] = ranges
+    return found
 
 
 class RecordedRobot:
@@ -133,7 +164,7 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
     recording = Recording(
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], arrays["sigma_m"],
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
-        float(arrays.get("sigma_share", 0.0)), arrays.get("scan_start_s"),
+        float(arrays.get("sigma_share", 0.0)), arrays.get("scan_start_s"), arrays.get("fans"),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:
@@ -152,6 +183,10 @@ def _faults(r: Recording) -> Iterator[tuple[bool, str]]:
     yield bool(np.any(np.diff(r.time_s) < 0)), "times that run backwards"
     late = r.scan_start_s is not None and bool(np.any(r.scan_start_s > r.time_s))
     yield late, "scans that end before they begin"
+    if r.fans is not None:
+        count, first, step = r.fans.T
+        within_turn = np.all((step > 0) & (step * (count - 1) < 2 * np.pi) & np.isfinite(first))
+        yield not (np.all((count >= 2) & (count <= len(r.bearings_rad))) and within_turn), "fans that are no beams"
     steps = np.diff(r.bearings_rad)
     even = np.allclose(steps, steps.mean(), rtol=1e-3, atol=1e-6)
     yield not even or not 0 < steps.sum() < 2 * np.pi, "bearings that are not evenly spread over a turn at most"

@@ -38,8 +38,8 @@ class ScanMatcher:
         """Take in the first scan, to which no motion led."""
         self._keep(returns_within(scan, self._config.reach_m))
 
-    def match(self, scan: Scan, wheels: Odometry) -> Odometry:
-        """Return the motion that led to a scan, with its covariance.
+    def match(self, scan: Scan, wheels: Odometry, keep: bool = True) -> Odometry:
+        """Return the motion that led to a scan, with its covariance; from the last scan that was kept.
 
         Wheels and scan are fused by their covariances, so that along a bare corridor, where scans tell nothing, the
         wheels have their say. What is stated is less sure than that: only a share of the points counts, since their
@@ -52,8 +52,9 @@ class ScanMatcher:
         odometry = wheels
         if self._points and len(points) >= c.least_points:
             odometry = self._matched(points, guess, wheels)
-        self._pose = compose(self._pose, odometry.motion)
-        self._keep(returns)
+        if keep:
+            self._pose = compose(self._pose, odometry.motion)
+            self._keep(returns)
         return odometry
 
     def _keep(self, returns: Float[np.ndarray, "n 2"]) -> None:

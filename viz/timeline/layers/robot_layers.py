@@ -105,10 +105,11 @@ class ScanLayer:
         self._out.points(self._why, moments, counts[when], places, labels=[f"refused: {words[k]}" for k in refused])
 
     def _scan(self, block: Block) -> None:
-        bearings = block.rows[0].scan.bearings_rad
-        ranges = np.array([row.scan.ranges_m for row in block.rows])
-        seen = np.isfinite(ranges)
-        row, beam = np.nonzero(seen)
+        found = [np.flatnonzero(np.isfinite(row.scan.ranges_m)) for row in block.rows]
+        counts = np.array([len(beams) for beams in found])
+        scans = [row.scan for row in block.rows]
+        ranges = np.concatenate([scan.ranges_m[beams] for scan, beams in zip(scans, found, strict=True)])
+        bearings = np.concatenate([scan.bearings_rad[beams] for scan, beams in zip(scans, found, strict=True)])
         along = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-        points = to_world(ranges[row, beam, None] * along[beam], block.rows[0].robot.scanner.pose_robot)
-        self._out.points(f"{self._entity}/scan", block.moments, seen.sum(axis=1), points)
+        points = to_world(ranges[:, None] * along, block.rows[0].robot.scanner.pose_robot)
+        self._out.points(f"{self._entity}/scan", block.moments, counts, points)
