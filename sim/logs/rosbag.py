@@ -134,7 +134,7 @@ def _frames(reader: Any, topics: BagTopics, notes: list[str]) -> Frames:
         frames.take(reader.deserialize(raw, connection.msgtype))
         if frames.body and frames.tells(frame):
             return frames
-    if not frames.tells(frame):
+    if topics.tells_motion and not frames.tells(frame):
         body = frames.body or "the body"
         notes.append(
             f"expected a transform from {body} to {frame or 'the scanner'}, found none: the scanner is taken to sit"

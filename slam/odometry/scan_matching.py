@@ -15,6 +15,8 @@ from .search_kernels import Window, correlate, refine
 from .surface_kernels import NEAREST, NOTHING_SIGMAS, sorted_into_buckets
 
 DEFAULTS = ScanMatchingConfig()
+NOTHING_SCORE = 0.25
+"""A scan whose points score less wherever they lie has nothing in common with those before it: the wheels say."""
 
 
 def returns_within(scan: Scan, reach_m: float) -> Float[np.ndarray, "n 2"]:
@@ -84,6 +86,8 @@ class ScanMatcher:
                 pose, score = found, better
                 wheels_cov = slipped
                 self.slips += 1
+        if score < NOTHING_SCORE:
+            return wheels
         prior = np.linalg.inv(wheels_cov)
         normals, known = surface_normals(points, c.surface_m)
         earlier = sorted_into_buckets(before, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)
