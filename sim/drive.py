@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import arc
 from slam.robot import MotionCommand, Odometry, RobotSpec, WheelSpec
 
 
@@ -35,32 +34,14 @@ def clamp(command: MotionCommand, robot: RobotSpec) -> MotionCommand:
     return MotionCommand(share * command.forward_m, share * command.turn_rad)
 
 
-def wheels(command: MotionCommand, config: WheelSpec) -> tuple[float, float]:
-    """Return the ways m of the left and the right wheel."""
-    half = 0.5 * config.base_m * command.turn_rad
-    return command.forward_m - half, command.forward_m + half
-
-
 def seconds(command: MotionCommand, config: WheelSpec, speed_m_s: float) -> float:
     """Return how long the command takes, s, if the faster wheel goes at this speed."""
-    return max(abs(way) for way in wheels(command, config)) / speed_m_s
-
-
-def _slip_variances(command: MotionCommand, config: WheelSpec) -> Float[np.ndarray, "3"]:
-    """Return the variances m^2 of the left, right and lateral slip."""
-    left, right = (abs(way) for way in wheels(command, config))
-    return np.array(
-        [
-            config.slip**2 * left,
-            config.slip**2 * right,
-            config.lateral_slip**2 * 0.5 * (left + right),
-        ]
-    )
+    return max(abs(way) for way in config.ways(command.forward_m, command.turn_rad)) / speed_m_s
 
 
 def draw_slip(command: MotionCommand, config: WheelSpec, standard_normals: Float[np.ndarray, "3"]) -> Slip:
     """Return the slip of one step from three standard normal draws."""
-    left, right, lateral = np.sqrt(_slip_variances(command, config)) * standard_normals
+    left, right, lateral = np.sqrt(config.slip_variances(command.forward_m, command.turn_rad)) * standard_normals
     return Slip(float(left), float(right), float(lateral))
 
 
@@ -80,16 +61,4 @@ def true_motion(
 
 def odometry(command: MotionCommand, config: WheelSpec) -> Odometry:
     """Return what the wheels report: the commanded arc and its first-order covariance, robot frame before it."""
-    half = 0.5 * command.turn_rad
-    along, across = np.array([np.cos(half), np.sin(half)]), np.array([-np.sin(half), np.cos(half)])
-    sinc = np.sinc(half / np.pi)
-    # d sinc(h)/dh = (cos h - sinc h)/h loses its digits near zero, where -h/3 is exact to h^3/30.
-    slope = (np.cos(half) - sinc) / half if abs(half) > 1e-3 else -half / 3.0
-    by_forward = sinc * along
-    by_turn = 0.5 * command.forward_m * (slope * along + sinc * across)
-    to_arc = np.array([[0.5, 0.5, 0.0], [-1.0 / config.base_m, 1.0 / config.base_m, 0.0], [0.0, 0.0, 1.0]])
-    by_slip = np.zeros((3, 3))
-    by_slip[:2] = np.stack([by_forward, by_turn, across], axis=-1) @ to_arc
-    by_slip[2] = to_arc[1]
-    cov = (by_slip * _slip_variances(command, config)) @ by_slip.T + config.floor**2 * np.eye(3)
-    return Odometry(arc(command.forward_m, command.turn_rad), 0.5 * (cov + cov.T))
+    return config.over_arc(command.forward_m, command.turn_rad)

@@ -1,7 +1,9 @@
 """The robot as this software sees it: what it states of itself, and what passes between the two."""
 
+from .errors import RobotError
 from .messages import MotionCommand, Odometry, Robot, Scan
-from .spec import NANO, STATED, RobotError, RobotSpec, ScannerSpec, WheelSpec, fitted, of_outline, of_robot
+from .spec import NANO, STATED, RobotSpec, ScannerSpec, fitted, of_outline, of_robot
+from .wheels import WheelSpec
 
 __all__ = [
     "NANO",

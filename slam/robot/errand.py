@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
+from .errors import RobotError
 from .messages import MotionCommand, Odometry
-from .spec import RobotError
 from .timed import Twist
 
 OVER = 1.3

@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from .spec import RobotError
+from .errors import RobotError
 
 FEW_BEAMS, FEW_SHARE = 3, 0.1
 """More returns at exactly the maximum range than both of these are none."""

@@ -10,8 +10,8 @@ from typing import TypeVar
 import numpy as np
 
 from .deadline import Watched
+from .errors import RobotError
 from .messages import Odometry
-from .spec import RobotError
 from .timed import StreamingRobot, TimedScan
 
 REPEAT_S = 0.05

@@ -6,14 +6,13 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from .errors import RobotError
+from .wheels import WheelSpec
+
 NANO = 9
 """Sums of what a robot states are rounded to so many digits after the point: 0.2 m and 0.1 m are 0.3 m."""
 TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
 """A way among walls turns by so much at most, rad/m: robots of slow turns need more steps for it."""
-
-
-class RobotError(ValueError):
-    """What no robot is or reports, told in one line: what was expected, what was found, what to do."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +40,6 @@ class ScannerSpec:
     def off_m(self) -> float:
         """How far it sits from the middle of the axle."""
         return float(np.hypot(self.x_m, self.y_m))
-
-
-@dataclass(frozen=True)
-class WheelSpec:
-    """Two driven wheels and how far they slip; the defaults lose 4 degrees of heading per square root of a metre."""
-
-    base_m: float = 0.4
-    """Distance m between the wheels."""
-    slip: float = 0.02
-    """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
-    lateral_slip: float = 0.006
-    """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
-    floor: float = 1e-6
-    """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
 
 
 @dataclass(frozen=True)

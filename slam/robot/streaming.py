@@ -7,9 +7,9 @@ import numpy as np
 
 from .deskew import de_skewed
 from .errand import Errand, Gains
+from .errors import RobotError
 from .messages import MotionCommand, Odometry, Scan
 from .scan_stream import ScanStream
-from .spec import RobotError
 from .timed import StreamingRobot, TimedScan, Twist
 
 __all__ = ["SteppedRobot", "StreamingRobot", "TimedScan", "Twist", "de_skewed"]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from sim.chance import Chance, Channel
-from sim.drive import Slip, clamp, draw_slip, odometry, true_motion, wheels
+from sim.drive import Slip, clamp, draw_slip, odometry, true_motion
 from slam.geometry.poses import arc
 from slam.robot import MotionCommand, RobotSpec
 
@@ -73,7 +73,7 @@ def test_a_command_that_is_not_finite_is_refused():
 
 
 def test_turning_in_place_moves_the_wheels_against_each_other():
-    left, right = wheels(MotionCommand(0.0, 0.1), CONFIG)
+    left, right = CONFIG.ways(0.0, 0.1)
     assert left == -right
     assert right == pytest.approx(0.02)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..spec import RobotError
+from ..errors import RobotError
 from ..timed import TimedScan
 from .transforms import seconds
 

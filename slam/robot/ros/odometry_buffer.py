@@ -52,3 +52,9 @@ class OdometryBuffer:
     def motion(self, from_s: float, to_s: float) -> Float[np.ndarray, "3"]:
         """Return the motion between two times, in the robot's frame at the first."""
         return compose(inverse(self.pose(from_s)), self.pose(to_s))
+
+    def poses(self, from_s: float, to_s: float) -> Float[np.ndarray, "n 3"]:
+        """Return the poses from one time to another: at both, and at all times between that are known."""
+        low, high = bisect_right(self._times, from_s), bisect_left(self._times, to_s)
+        between = [self._poses[time] for time in self._times[low:high]]
+        return np.array([self.pose(from_s), *between, self.pose(to_s)])

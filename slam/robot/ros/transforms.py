@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...geometry.poses import compose
-from ..spec import RobotError
+from ..errors import RobotError
 
 
 def seconds(stamp: Any) -> float:
