@@ -31,16 +31,22 @@ Answer = TypeVar("Answer")
 class ScanStream:
     """Scans and odometry of a robot, with a deadline for each."""
 
-    def __init__(self, robot: StreamingRobot, wait_s: float) -> None:
-        self._robot, self._wait_s = robot, wait_s
+    def __init__(self, robot: StreamingRobot, wait_s: float, clock: Callable[[], float]) -> None:
+        self._robot, self._wait_s, self._clock = robot, wait_s, clock
         self._watched = Watched()
-        self._last_s = -np.inf
+        self._last_s, self._came_s = -np.inf, 0.0
         self._gaps: deque[float] = deque(maxlen=GAPS)
+        self._slow: deque[float] = deque(maxlen=GAPS)
 
     @property
     def period_s(self) -> float:
         """From one scan to the next, as they have come of late."""
         return max(self._gaps, default=FIRST_PERIOD_S)
+
+    @property
+    def slowness(self) -> float:
+        """How many seconds go by for one of the robot's; above 1 for a simulation that is slower than real time."""
+        return max(float(np.median(self._slow)), 1.0) if self._slow else 1.0
 
     @property
     def knows_period(self) -> bool:
@@ -56,10 +62,11 @@ class ScanStream:
 
         `meanwhile` is called again and again until then, with how often the driver had nothing newer.
         """
-        before_s = self._last_s
+        before_s, came_s = self._last_s, self._came_s
         scan = self._newer(meanwhile)
         if np.isfinite(before_s):
-            self._gaps.append(float(scan.end_s) - before_s)
+            self._gaps.append(self._last_s - before_s)
+            self._slow.append((self._came_s - came_s) / self._gaps[-1])
         return scan
 
     def odometry(self, from_s: float, to_s: float, meanwhile: Callable[[int], None] | None = None) -> Odometry:
@@ -79,7 +86,7 @@ class ScanStream:
             with suppress(TimeoutError, Empty):
                 scan = self._call(self._robot.scan, left_s, meanwhile, stale)
                 if scan is not None and self._is_newer(scan):
-                    self._last_s = float(scan.end_s)
+                    self._last_s, self._came_s = float(scan.end_s), self._clock()
                     return scan
                 told = "none" if scan is None else f"the one of {scan.end_s:.3f} s again"
             stale += 1

@@ -53,7 +53,7 @@ class SteppedRobot:
         for name, value in {"speed_m_s": speed_m_s, "turn_rad_s": turn_rad_s, "wait_s": wait_s}.items():
             if not 0.0 < value < np.inf:
                 raise RobotError(f"expected a {name} above 0 and finite, found {value:g}: correct it")
-        self._robot, self._stream, self._clock = robot, ScanStream(robot, wait_s), clock
+        self._robot, self._stream, self._clock = robot, ScanStream(robot, wait_s, clock), clock
         self._speed_m_s, self._turn_rad_s = speed_m_s, turn_rad_s
         self._at: TimedScan | None = None
         self._stuck = 0
@@ -101,10 +101,13 @@ class SteppedRobot:
         errand.begin()
         at = start if errand.sent == 0.0 else self._stream.next(self._stop)
         while (rate := errand.rate(self._stream.period_s)) > 0.0:
-            motion = _Motion(self._robot, errand.twist(rate), errand.left / rate, self._stream.period_s, self._clock)
+            motion = _Motion(self._robot, errand.twist(rate), errand.left / rate, self._stream, self._clock)
             after = self._stream.next(motion.keep)
+            came_s = self._clock()
             odometry = self._stream.odometry(start.end_s, after.end_s, motion.keep)
-            errand.add(rate * motion.driven_s(float(after.end_s - at.end_s)), odometry)
+            # While it waited for odometry the robot drove, too: scans may have queued up meanwhile.
+            waited_s = (self._clock() - came_s) / self._stream.slowness
+            errand.add(rate * motion.driven_s(max(float(after.end_s - at.end_s), waited_s)), odometry)
             at = after
 
     def _at_rest(self, errand: Errand, start: TimedScan) -> TimedScan:
@@ -148,16 +151,17 @@ class _Motion:
     """A twist that is sent again while it lasts; then the robot is stopped, whether scans come or not."""
 
     def __init__(
-        self, robot: StreamingRobot, twist: Twist, seconds: float, period_s: float, clock: Callable[[], float]
+        self, robot: StreamingRobot, twist: Twist, seconds: float, stream: ScanStream, clock: Callable[[], float]
     ) -> None:
         self._robot, self._twist, self._clock = robot, twist, clock
-        self._seconds, self._periods = seconds, min(seconds / period_s, OVERDUE)
+        self._seconds, self._most_s = seconds, seconds * stream.slowness
+        self._periods = min(seconds / stream.period_s, OVERDUE)
         self._since_s, self._is_over = clock(), False
         robot.send(twist)
 
     def keep(self, stale: int) -> None:
         """Send the twist again; or a stop, once it has lasted long enough or so many scans have stayed away."""
-        over = self._clock() - self._since_s >= self._seconds or stale > max(self._periods - 1.0, 0.0)
+        over = self._clock() - self._since_s >= self._most_s or stale > max(self._periods - 1.0, 0.0)
         self._is_over = self._is_over or over
         if self._is_over:
             self._robot.stop()
@@ -165,5 +169,5 @@ class _Motion:
             self._robot.send(self._twist)
 
     def driven_s(self, seconds: float) -> float:
-        """Return how long it lasted, given the time between the scans before and after: the longer by two clocks."""
-        return min(max(seconds, self._clock() - self._since_s), self._seconds if self._is_over else np.inf)
+        """Return how long it lasted of the time between two scans."""
+        return min(seconds, self._seconds) if self._is_over else seconds

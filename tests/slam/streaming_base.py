@@ -45,7 +45,7 @@ class StreamingBase:
         self.pose, self.told = np.array([1.5, 1.0, 0.0]), np.zeros(3)
         self.track, self.samples = [(0.0, self.pose)], [(0.0, self.told)]
         self.orders, self.twist, self.heard_s, self.moves = deque(), REST, 0.0, np.zeros(2)
-        self.coasting_s, self.forgot_s, self.sends, self.stops = 0.0, 0.0, 0, 0
+        self.coasting_s, self.sends, self.stops = 0.0, 0, 0
         self.rng = np.random.default_rng(seed)
         self.bearings = np.deg2rad(degrees) * ((np.arange(beams) + 0.5) / beams - 0.5)
         self.last = None
@@ -121,10 +121,7 @@ class StreamingBase:
             if self.twist == REST and before != REST:
                 self.coasting_s, self._coast = self.now_s + self.coasts_s, self.moves
         wanted = np.array([self.twist.speed_m_s, self.twist.turn_rad_s]) * self.gain
-        if self.now_s - self.heard_s > self.timeout_s:
-            self.forgot_s += TICK_S * (self.twist != REST)
-            wanted = np.zeros(2)
-        if np.abs(wanted).max() < self.least_m_s:
+        if self.now_s - self.heard_s > self.timeout_s or np.abs(wanted).max() < self.least_m_s:
             wanted = np.zeros(2)
         if self.twist == REST and self.now_s < self.coasting_s:
             wanted = self._coast
