@@ -10,45 +10,10 @@ from sim.logs.bag_topics import TopicsWanted
 from sim.logs.recorded_log import read_recorded_log
 from sim.logs.recorded_robot import RecordingError, recording_of
 from slam.geometry.poses import compose, inverse
-from tests.sim.logs.written_bag import Bag
+from tests.sim.logs.written_bag import PLACE, Bag, pose_at, room_bag
 from tests.slam.streaming_base import ranges_from
 
 KINDS = ("ros1", "mcap", pytest.param("sqlite", marks=pytest.mark.long))
-PLACE = np.array([0.1, -0.05, 0.4])
-LAST_S = 3.0
-
-
-def pose_at(time_s):
-    """Return where the robot is: it drives an arc at 0.35 m/s and 0.5 rad/s."""
-    turn = 0.5 * time_s
-    return np.array([1.3 + 0.7 * np.sin(turn), 0.7 + 0.7 * (1.0 - np.cos(turn)), turn])
-
-
-def room_bag(
-    path, kind="mcap", count=lambda k: 180, beam_s=0.0, late_s=0.0, place=PLACE, odometry=True, mounting="first",
-    clockwise=False, noise_m=0.0, depth=False,
-):  # fmt: skip
-    """Write a scan each 0.1 s and odometry each 0.02 s, as they would be recorded."""
-    rng, events = np.random.default_rng(1), []
-    for k in range(int(LAST_S / 0.1)):
-        time_s, beams = 1.0 + 0.1 * k, count(k)
-        step = (-1.0 if clockwise else 1.0) * 2.0 * np.pi / beams
-        low = np.pi if clockwise else -np.pi
-        times = time_s + beam_s * np.arange(beams)
-        poses = np.array([compose(pose_at(t - 1.0), place) for t in times])
-        ranges = ranges_from(poses, low + step * np.arange(beams)) + noise_m * rng.standard_normal(beams)
-        scan = {"ranges": ranges, "low": low, "step": step, "beam_s": beam_s, "late_s": late_s}
-        events.append((time_s + late_s, "scan", (time_s,), scan))
-        if depth:
-            events.append((time_s, "scan", (time_s, ranges[80:100], -0.3, step), {"topic": "/depth"}))
-    events += [(t, "odometry", (t, pose_at(t - 1.0)), {}) for t in np.arange(0.99, 1.3 + LAST_S, 0.02) if odometry]
-    mounted = {"first": [(0.5, "transform", (0.5, "base", "laser", place), {"topic": "/tf_static"})]}
-    mounted["late"] = [(3.0, *mounted["first"][0][1:])]
-    events += mounted.get(mounting, [])
-    with Bag(path, kind) as bag:
-        for _, what, values, options in sorted(events, key=lambda event: event[0]):
-            getattr(bag, what)(*values, **options)
-    return path
 
 
 def true_motions(log, lag_s=0.0, place=PLACE):
