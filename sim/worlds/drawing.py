@@ -32,12 +32,16 @@ class Drawing:
     """Start pose (x m, y m, heading rad) where the drawing names one."""
     labels: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Named points."""
+    openings: tuple[shapely.Polygon, ...] = ()
+    """Doors: what is solid there opens, unless the building would open to its outside."""
     sheet: shapely.Polygon | None = None
     """The border of a picture: nothing is known beyond it, so it bounds the free space."""
     simplify_m: float = 0.012
     """Deviations from straight below this are not drawn on purpose."""
     understood: str = ""
     """What was taken for what, in words."""
+    notes: tuple[str, ...] = ()
+    """What was left out or not understood, each in words."""
     scale: str = ""
     """What a unit is, and who said so, in words."""
 

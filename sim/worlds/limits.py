@@ -41,7 +41,7 @@ def check_size(lines: Sequence[shapely.LineString], polygons: Sequence[shapely.P
     if not all(np.all(np.abs(path) <= FARTHEST_M) for path in paths):
         raise WorldError(
             f"expected walls at most {FARTHEST_M:g} m from the origin, found farther ones: move the drawing, or correct"
-            " its scale (--scale METRES for a picture or an SVG)"
+            " its scale (--scale METRES)"
         )
     check_extent(np.concatenate(paths))
     pieces = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
@@ -65,7 +65,7 @@ def check_extent(points: Float[np.ndarray, "n 2"]) -> None:
     if not SMALLEST_M <= extent <= LARGEST_M:
         raise WorldError(
             f"expected a building of {SMALLEST_M:g} to {LARGEST_M:g} m, found {extent:.3g} m:"
-            " correct the scale (--scale METRES for a picture or an SVG)"
+            " correct the scale (--scale METRES)"
         )
 
 
@@ -86,7 +86,7 @@ def check_apart(shapes: Sequence[BaseGeometry], distance_m: float) -> None:
         if close > CLOSE_MAX:
             raise WorldError(
                 f"expected walls apart from each other, found more than {CLOSE_MAX} pairs nearer than {distance_m:g} m:"
-                " correct the scale (--scale METRES for a picture or an SVG), or simplify the drawing"
+                " correct the scale (--scale METRES), or simplify the drawing"
             )
 
 

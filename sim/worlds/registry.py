@@ -10,6 +10,7 @@ import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
+from .options import DrawingOptions
 from .readers.files import read_bytes, read_json_map
 from .solid import build
 from .world import World
@@ -58,17 +59,18 @@ FAMILIES: dict[str, Family] = {
     ),
 }
 
-_read_svg = _lazily("readers.svg", "read_svg")
-READERS: dict[str, Callable[[Path, float | None], Drawing]] = {
-    **dict.fromkeys((".json", ".geojson"), lambda path, scale: read_json_map(read_bytes(path), scale)),
-    ".svg": lambda path, scale: _read_svg(read_bytes(path), scale),
+_read_svg = _lazily("readers.svg.reader", "read_svg")
+READERS: dict[str, Callable[[Path, DrawingOptions], Drawing]] = {
+    **dict.fromkeys((".json", ".geojson"), lambda path, options: read_json_map(read_bytes(path), options)),
+    **dict.fromkeys((".svg", ".svgz"), lambda path, options: _read_svg(read_bytes(path), options)),
+    ".dxf": _lazily("readers.dxf", "read_dxf"),
     **dict.fromkeys(
         (".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"),
         _lazily("readers.raster", "read_image"),
     ),
     **dict.fromkeys((".yaml", ".yml"), _lazily("readers.ros_map", "read_ros_map")),
 }
-"""Reader by file name extension; each takes the path and the scale that the caller states, or None."""
+"""Reader by file name extension; each takes the path and what the caller says of the drawing."""
 BUILT_IN = frozenset(READERS)
 """What comes along; other readers are a user's own, of which the processes of a campaign are told."""
 
@@ -82,32 +84,40 @@ def listing() -> dict[str, str]:
 def load(
     name_or_path: str | Path,
     start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
-    scale: float | None = None,
+    options: DrawingOptions = DrawingOptions(),
 ) -> World:
     """Return a bundled world, one of a family, or one drawn in a file.
 
-    `start` (x m, y m, heading rad; heading may be left out) overrides the drawing's own. `scale` is metres per pixel
-    of a bare image (0.05 where not given) or metres per user unit of an SVG file. Raises WorldError, in one line.
+    `start` (x m, y m, heading rad; heading may be left out) overrides the drawing's own. `options` say what the file
+    leaves open. Raises WorldError, in one line.
     """
     pose = None if start is None else as_pose(numbers(list(start), (2, 3), "start", "(x, y, heading)"))
     # Degenerate shapes raise flags of floating point inside GEOS on the way to a sound result.
     with np.errstate(all="ignore"):
         try:
-            name, drawing = _read(str(name_or_path), scale)
-            return build(name, drawing, pose)
+            name, drawing = _read(str(name_or_path), options)
         except shapely.errors.GEOSException as error:
-            raise WorldError(
-                f"expected outlines that can be mended, found {shorten(str(error))}: redraw them"
-            ) from None
+            raise _unmended(error) from None
+        try:
+            return build(name, drawing, pose)
+        except WorldError as error:
+            # What was not understood is most often why.
+            raise WorldError(f"{error} (the file: {'; '.join(drawing.notes)})" if drawing.notes else str(error)) from None
+        except shapely.errors.GEOSException as error:
+            raise _unmended(error) from None
 
 
-def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
-    if scale is not None and not 0 < scale < np.inf:
-        raise WorldError(f"expected a scale above 0 metres per unit, found --scale {scale}: correct it")
+def _unmended(error: Exception) -> WorldError:
+    return WorldError(f"expected outlines that can be mended, found {shorten(str(error))}: redraw them")
+
+
+def _read(text: str, options: DrawingOptions) -> tuple[str, Drawing]:
     if text in WORLDS:
-        return text, _read_svg((HERE / WORLDS[text].file).read_bytes())
+        options.check_only(("layers", "ids", "without"), "a bundled world")
+        return text, _read_svg((HERE / WORLDS[text].file).read_bytes(), options)
     family, colon, which = text.partition(":")
     if colon and family in FAMILIES:
+        options.check_only((), "a world by chance")
         return text, FAMILIES[family].read(which)
     if not text.isprintable():
         # Results name their world in many files, which are to be read again.
@@ -119,4 +129,4 @@ def _read(text: str, scale: float | None) -> tuple[str, Drawing]:
             f"expected one of {', '.join(listing())} or a file ending in {', '.join(READERS)}, found {shorten(text)}:"
             " choose one of these"
         )
-    return path.stem, reader(path, scale)
+    return path.stem, reader(path, options)

@@ -22,7 +22,7 @@ OUTSIDE_RATIO = 8.0
 
 def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = None) -> World:
     """Return the world of a drawing, `start` overriding its own; raise WorldError where no robot could drive in it."""
-    solid = solid_of(drawing)
+    solid = _with_doors(solid_of(drawing), drawing.openings)
     check_extent(np.reshape(solid.bounds, (2, 2)))
     enclosed, open_parts = _free_parts(solid, drawing.sheet)
     wanted = start if start is not None else drawing.start
@@ -34,7 +34,7 @@ def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = No
         said = "given" if start is not None else "as the file says"
     free = orient(_straighten(part, drawing.simplify_m), 1.0)
     _check_clearance(free, pose)
-    reading = Reading(drawing.understood, drawing.scale, said)
+    reading = Reading(drawing.understood, drawing.scale, said, drawing.notes)
     return World(name_of(name), free, pose, dict(drawing.labels), reading)
 
 
@@ -48,6 +48,17 @@ def solid_of(drawing: Drawing) -> BaseGeometry:
     thick = merged.buffer(0.5 * WALL_M, cap_style="square", join_style="mitre", mitre_limit=MITRE)
     mended = [shapely.make_valid(polygon) for polygon in solids]
     return shapely.union_all([thick, *(part for shape in mended for part in areas(shape))])
+
+
+def _with_doors(solid: BaseGeometry, openings: tuple[shapely.Polygon, ...]) -> BaseGeometry:
+    """Return what is solid once the doors are open, but for those from which a robot could leave the building."""
+    if not openings:
+        return solid
+    page = shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
+    roomy = [piece for part in areas(page.difference(solid)) for piece in _opened(part, 2 * ROBOT_RADIUS_M)]
+    outside = shapely.union_all([piece for piece in roomy if shapely.distance(piece, page.exterior) < 1e-6])
+    inner = [opening for opening in openings if outside.intersection(opening).area < 1e-6]
+    return solid.difference(shapely.union_all(inner))
 
 
 def _on_grid(shapes: tuple[shapely.LineString, ...] | tuple[shapely.Polygon, ...]) -> NDArray[np.object_]:
@@ -103,7 +114,7 @@ def _choose(
     if drivable_m2 == 0:
         raise WorldError(
             "expected a free space that walls enclose and that a robot of 0.2 m radius fits into, found none:"
-            " draw a closed wall around the building, or correct the scale (--scale METRES for a picture or an SVG)"
+            " draw a closed wall around the building, or correct the scale (--scale METRES)"
         )
     middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(part, tolerance=0.02))[0]
     return part, np.array([round(middle[0], 3), round(middle[1], 3), 0.0])

@@ -23,6 +23,8 @@ class Reading:
     understood: str
     scale: str
     start: str
+    notes: tuple[str, ...] = ()
+    """What was left out or not understood, each in words."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from ..drawing import Drawing, WorldError, shorten
-from .geojson import from_geojson
+from ..options import DrawingOptions
+from .geojson.reader import from_geojson
 from .plan_json import from_json
 
 FILE_MAX = 64 * 2**20
@@ -25,15 +26,13 @@ def read_bytes(path: Path) -> bytes:
         raise WorldError(f"expected a readable file, found {shorten(str(error))}: check the path") from None
 
 
-def read_json_map(data: bytes, scale: float | None = None) -> Drawing:
+def read_json_map(data: bytes, options: DrawingOptions = DrawingOptions()) -> Drawing:
     """Return the drawing in a JSON file's bytes, told by its content: GeoJSON has a "type", a plan has "walls"."""
-    if scale is not None:
-        raise WorldError("expected no scale for JSON, which is in metres, found one: leave --scale out")
     document = _parse(data)
     if isinstance(document, dict) and "walls" in document:
-        return from_json(document)
+        return from_json(document, options)
     if isinstance(document, dict) and isinstance(document.get("type"), str):
-        return from_geojson(document)
+        return from_geojson(document, options)
     raise WorldError(
         f'expected a plan with "walls" or GeoJSON with a "type", found {shorten(document)}: see docs on world files'
     )

@@ -18,6 +18,7 @@ from PIL import Image, UnidentifiedImageError
 from skimage.measure import find_contours, label
 
 from ..drawing import Drawing, WorldError, shorten
+from ..options import DrawingOptions
 from ..solid import drop_collinear
 from .files import read_bytes
 
@@ -38,8 +39,9 @@ STRIP_PIXELS = 4_000_000
 """Pictures are converted in strips of rows of about this size, to hold one copy of a large one and not four."""
 
 
-def read_image(path: Path, scale: float | None = None) -> Drawing:
+def read_image(path: Path, options: DrawingOptions = DrawingOptions()) -> Drawing:
     """Return the drawing in a bare picture, `scale` metres per pixel (0.05 where None), origin at its lower left."""
+    scale = options.scale
     grey = read_grey(path)
     mapped = np.mean(grey == UNKNOWN_GREY) > UNKNOWN_SHARE and np.mean(grey >= FREE_GREY) > UNKNOWN_SHARE
     said = "given" if scale else "assumed (--scale METRES says another)"

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from ..drawing import Drawing, WorldError, numbers, shorten
+from ..options import DrawingOptions
 from ..text import printable
 from .files import read_bytes
 from .plain_yaml import plain_mapping
 from .raster import UNKNOWN_GREY, outlines, read_grey
 
 
-def read_ros_map(path: Path, scale: float | None = None) -> Drawing:
+def read_ros_map(path: Path, options: DrawingOptions = DrawingOptions()) -> Drawing:
     """Return the drawing of a ROS map: a YAML file that names an image next to it, in the map's frame."""
-    if scale is not None:
-        raise WorldError("expected no scale for a ROS map, whose resolution says it, found one: leave --scale out")
+    options.check_only((), "a ROS map, whose YAML says it")
     document = plain_mapping(read_bytes(path))
     image = _image_beside(path, document.get("image"))
     resolution = numbers([document.get("resolution")], (1,), "resolution", "0.05")[0]

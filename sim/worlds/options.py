@@ -1,0 +1,78 @@
+"""What a caller says of a drawing that its file leaves open: its scale, and which of its parts are walls."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from fnmatch import fnmatchcase
+
+from .drawing import WorldError, shorten
+
+
+@dataclass(frozen=True)
+class DrawingOptions:
+    """How to read a drawing; what is not said is as the file says, or as it is assumed where the file is silent."""
+
+    scale: float | None = None
+    """Metres per unit of the drawing, or per pixel."""
+    layers: tuple[str, ...] = ()
+    """Only these layers are drawn: names of layers, groups or classes; * stands for any letters."""
+    ids: tuple[str, ...] = ()
+    """Only the shapes and groups of these ids are drawn, beside those of `layers`."""
+    without: tuple[str, ...] = ()
+    """Layers, groups, classes and ids that are left out."""
+    level: str | None = None
+    """The storey, of a file with several."""
+    threshold: float | None = None
+    """In a picture, lightness below which a pixel is a wall, 0 to 1."""
+    negate: bool = False
+    """In a picture, light is wall and dark is free."""
+
+    def __post_init__(self) -> None:
+        """Refuse what means nothing; raises WorldError."""
+        if self.scale is not None and not 0 < self.scale < float("inf"):
+            raise WorldError(f"expected a scale above 0 metres per unit, found --scale {self.scale}: correct it")
+        if self.threshold is not None and not 0 < self.threshold <= 1:
+            raise WorldError(f"expected a threshold above 0 and up to 1, found --threshold {self.threshold}: correct it")
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The names of what is said."""
+        plain = DrawingOptions() if self != DrawingOptions() else self
+        return tuple(each.name for each in fields(self) if getattr(self, each.name) != getattr(plain, each.name))
+
+    def check_only(self, allowed: Iterable[str], what: str) -> None:
+        """Raise WorldError where anything else is said than means something for a kind of drawing."""
+        for name in self.given:
+            if name not in allowed:
+                said = getattr(self, name)
+                words = " ".join(said) if isinstance(said, tuple) else "" if said is True else said
+                raise WorldError(f"expected no --{name} for {what}, found {shorten(words)}: leave --{name} out")
+
+    def shows(self, layers: Iterable[str], ids: Iterable[str]) -> bool:
+        """Return whether something on these layers with these ids (its own and those around it) is drawn."""
+        layers, ids = tuple(layers), tuple(ids)
+        if matches(self.without, (*layers, *ids)):
+            return False
+        return not (self.layers or self.ids) or matches(self.layers, layers) or matches(self.ids, ids)
+
+    @property
+    def chooses(self) -> bool:
+        """Whether some of the layers or ids are left out."""
+        return bool(self.layers or self.ids or self.without)
+
+    def check_names(self, layers: Iterable[str], ids: Iterable[str]) -> None:
+        """Raise WorldError for a name that no part of the drawing has."""
+        known, numbered = sorted(set(layers)), set(ids)
+        for option, wanted, there in (
+            ("layers", self.layers, known), ("ids", self.ids, numbered), ("without", self.without, {*known, *numbered}),
+        ):  # fmt: skip
+            for name in wanted:
+                if not matches((name,), there):
+                    few = ", ".join(shorten(each) for each in sorted(there)[:8]) or "none"
+                    more = f" and {len(there) - 8} more" if len(there) > 8 else ""
+                    raise WorldError(f"expected --{option} of the drawing ({few}{more}), found {shorten(name)}")
+
+
+def matches(wanted: Iterable[str], names: Iterable[str]) -> bool:
+    """Return whether a name is wanted, capitals aside; * in what is wanted stands for any letters."""
+    lowered = [name.lower() for name in names]
+    return any(fnmatchcase(name, each.lower()) for each in wanted for name in lowered)

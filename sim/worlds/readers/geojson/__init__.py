@@ -1,0 +1,1 @@
+"""GeoJSON: what its features are, where they lie in metres, and on which storey."""
