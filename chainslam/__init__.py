@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from experiments.usage import UsageError
     from explore.step import Step
     from explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
-    from sim.worlds import World
+    from sim.worlds import DrawingOptions, World
     from sim.worlds.registry import READERS, WORLDS
     from slam.backends import BACKENDS, BackendEntry
     from slam.estimation.backend import Backend, Belief, Joint, Observations
@@ -33,7 +33,7 @@ _PLACES = {
     "experiments.usage": ("UsageError",),
     "explore.step": ("Step",),
     "explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
-    "sim.worlds": ("World",),
+    "sim.worlds": ("DrawingOptions", "World"),
     "sim.worlds.registry": ("READERS", "WORLDS"),
     "slam.backends": ("BACKENDS", "BackendEntry"),
     "slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations"),
@@ -55,10 +55,10 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 __version__ = version("chainslam")
 __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
-    "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError", "RobotSpec", "Run", "Scan",
-    "ScannerSpec", "Situation",
-    "Step", "SteppedRobot", "Strategy", "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError",
-    "WheelSpec", "World", "__version__", "compare", "explore", "load", "replay",
+    "DrawingOptions", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
+    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "Step", "SteppedRobot", "Strategy", "StrategyEntry",
+    "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__", "compare", "explore",
+    "load", "replay",
 ]  # fmt: skip
 
 

@@ -17,10 +17,10 @@ ROOM = """0 0 6 0
 """
 
 
-def read_walls(path: Path, scale: float | None) -> Drawing:
+def read_walls(path: Path, options: chainslam.DrawingOptions) -> Drawing:
     """Return the walls in a file; raises WorldError, in one line, for any other file."""
     try:
-        ends = np.loadtxt(path, ndmin=2).reshape(-1, 2, 2) * (scale or 1.0)
+        ends = np.loadtxt(path, ndmin=2).reshape(-1, 2, 2) * (options.scale or 1.0)
     except (ValueError, OSError) as error:
         raise WorldError(f"expected `x1 y1 x2 y2` in every line, found {path.name} ({error}): correct it") from error
     return Drawing(lines=tuple(map(shapely.LineString, ends)), start=np.array([1.5, 1.0, 0.0]))

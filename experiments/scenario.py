@@ -13,7 +13,7 @@ from explore.mission import MissionConfig
 from explore.strategies import STRATEGIES, Strategy, make_strategy
 from sim.chance import SEED_MAX, Chance, Channel
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord, chance_in
-from sim.worlds import World, WorldError, listing, load
+from sim.worlds import AS_DRAWN, DrawingOptions, World, WorldError, listing, load
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
@@ -65,8 +65,8 @@ class TrialConfig:
     max_steps: int = 100_000
     start: tuple[float, ...] | None = None
     """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
-    scale: float | None = None
-    """Metres per pixel or drawing unit, for files that do not state it."""
+    drawing: DrawingOptions = field(default_factory=DrawingOptions)
+    """What the world's file leaves open: its scale, its storey, and which of its parts are walls."""
     max_path_m: float | None = None
     time_limit_s: float | None = None
     """On the robot's own clock."""
@@ -112,10 +112,10 @@ class Scenario:
     start_cov: Float[np.ndarray, "3 3"]
 
 
-def load_world(name: str, start: tuple[float, ...] | None = None, scale: float | None = None) -> World:
+def load_world(name: str, start: tuple[float, ...] | None = None, drawing: DrawingOptions = AS_DRAWN) -> World:
     """Return a bundled world or one from a file; raises UsageError, in one line, for anything unusable."""
     try:
-        return load(name, start, scale)
+        return load(name, start, drawing)
     except WorldError as error:
         is_name = not Path(name).suffix and name not in listing()
         raise UsageError(f"{error}{did_you_mean(name, listing()) if is_name else ''}") from error
@@ -155,7 +155,7 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
     """Build a scenario; `world` saves loading it again. Raises UsageError for bad names and unusable worlds."""
     check(config)
     strategy = strategy_of(config.strategy)
-    world = world or load_world(config.world, config.start, config.scale)
+    world = world or load_world(config.world, config.start, config.drawing)
     chance = None if config.errorless else chance_in(world, config.seed)
     start, cov = drawn_start(chance, world.start, config.p0)
     world = fenced(world, config)

@@ -13,7 +13,7 @@ from slam.robot import NANO, RobotError, RobotSpec
 CONFIG = "config.json"
 RECORD = "trials/*.npz"
 FORMATS = {
-    CONFIG: 15,
+    CONFIG: 16,
     "summary.json": 2,
     "log.npz": recorded_robot.FORMAT,
     "log.arrow": 2,
@@ -35,7 +35,8 @@ format 5 the body and the step stood at several places (`MOVED`), until format 6
 Until format 10 some settings said what another says (`DROPPED`), and `mission.mapper.vertices` was a group.
 Until format 11 no scan told a drive's motion (`odometry`). Until format 12 a place in the whole map was sought by
 pairs of walls (`DROPPED`), until format 13 walls and lines of few beams were believed and forgotten by rules of their
-own (`DROPPED`), until format 14 no wall was followed to and fro (`mission.explorer.following.method`).
+own (`DROPPED`), until format 14 no wall was followed to and fro (`mission.explorer.following.method`), until
+format 15 the scale stood alone (`scale`).
 Format 1 of `summary.json` had no `coverage_curve`."""
 
 
@@ -57,6 +58,7 @@ def fault(said: Any, name: str, older: bool = True) -> str:
 
 
 RENAMED: dict[str, str | None] = {
+    "scale": "drawing.scale",
     "mission.mapper.walls.pieces.sure_gap_m": "mission.mapper.shared.door_m",
     "mission.mapper.walls.pieces.corner_leap_m": "mission.mapper.shared.within_m",
     "mission.max_steps": None,

@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from sim.worlds import WorldError
 from slam.robot import STATED, RobotError
 
 from ..scenario import TrialConfig
@@ -21,6 +22,8 @@ from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
+DRAWING = {name: f"drawing.{name}" for name in ("scale", "layers", "ids", "without", "level", "threshold", "negate")}
+"""Options that say how a world's file is read, and their keys."""
 SEE = "config.json of any run names all"
 Record = dict[str, Any]
 
@@ -124,7 +127,7 @@ def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
         trial: TrialConfig = fit(TrialConfig, record)
     except UnfitError as error:
         raise UsageError(f"expected settings of a trial, found {error}: {SEE}") from error
-    except RobotError as error:
+    except (RobotError, WorldError) as error:
         raise UsageError(str(error)) from error
     return trial
 

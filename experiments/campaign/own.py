@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from explore import strategies
 from explore.strategies import STRATEGIES, StrategyEntry
-from sim.worlds import registry
+from sim.worlds import DrawingOptions, registry
 from sim.worlds.drawing import Drawing
 from sim.worlds.registry import READERS
 from slam import backends
@@ -24,7 +24,7 @@ class OwnEntries:
 
     backends: dict[str, BackendEntry]
     strategies: dict[str, StrategyEntry]
-    readers: dict[str, Callable[[Path, float | None], Drawing]]
+    readers: dict[str, Callable[[Path, DrawingOptions], Drawing]]
 
 
 def own_entries() -> OwnEntries:

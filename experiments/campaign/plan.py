@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from explore.strategies import STRATEGIES
-from sim.worlds import WORLDS
+from sim.worlds import WORLDS, DrawingOptions
 from slam.backends import BACKENDS
 
 from ..artifacts.presets import METHODS, backend_of, mapping_of
@@ -83,7 +83,7 @@ class Trial:
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
 
-DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start", "scale")
+DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start")
 """Settings of a trial that the campaign itself decides, or that would make its statistics none."""
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -146,6 +146,11 @@ def config_of(campaign: Campaign, trial: Trial) -> TrialConfig:
         "max_steps": campaign.max_steps,
     }
     return trial_of(mapping_of(trial.backend), nested(campaign.settings), decided)
+
+
+def drawing_of(campaign: Campaign) -> DrawingOptions:
+    """Return how the files of a campaign's worlds are read."""
+    return trial_of(nested(campaign.settings)).drawing
 
 
 def is_errorless(campaign: Campaign) -> bool:

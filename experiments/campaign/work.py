@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from sim.logs.archive import read_archive
 from sim.logs.recorded_robot import read_log
-from sim.worlds import World
+from sim.worlds import DrawingOptions, World
 from slam.extraction.config import ExtractionConfig
 from slam.extraction.extract import NO_VERTICES, extract
 from slam.extraction.segments import Segments
@@ -168,8 +168,8 @@ def _names(trial: Trial) -> dict[str, str]:
 
 
 @lru_cache(maxsize=2)
-def _world(name: str) -> World:
-    return load_world(name)
+def _world(name: str, drawing: DrawingOptions) -> World:
+    return load_world(name, drawing=drawing)
 
 
 @lru_cache(maxsize=2)
@@ -206,7 +206,7 @@ def remembered(log: bytes) -> Extractor:
 
 
 def _drive(job: Job) -> tuple[TrialScores, bytes | None]:
-    scenario = build(job.config, _world(job.config.world))
+    scenario = build(job.config, _world(job.config.world, job.config.drawing))
     walls = truth_of(scenario.world, job.config.robot).walls
     observer = Observer(walls, lambda index: scenario.robot.record.faces_of_beams[index])
     result = run_scenario(scenario, observer, default_mission)
@@ -218,7 +218,7 @@ def _drive(job: Job) -> tuple[TrialScores, bytes | None]:
 def _replay(job: Job) -> TrialScores:
     assert job.log is not None, "expected a recording to replay"
     run = _recording(job.log, job.config)
-    world = _world(job.config.world)
+    world = _world(job.config.world, job.config.drawing)
     association = job.trial.association
     assert association is not None, "expected the arm of a replay"
     observer = Observer(truth_of(world, job.config.robot).walls, lambda index: run.true_face_of_beam[index])

@@ -28,7 +28,7 @@ def echo_world(world: World) -> None:
 
 
 def world_lines(world: World) -> tuple[str, ...]:
-    """Return a world in two lines: size and understanding; start and scale with who said so."""
+    """Return a world in lines: size and understanding; start and scale with who said so; what was not read."""
     x0, y0, x1, y1 = world.free.bounds
     size = f"{x1 - x0:.1f} x {y1 - y0:.1f} m, {world.free.area:.1f} m2 of floor, {len(world.faces)} walls"
     x, y, heading = world.start
@@ -41,6 +41,7 @@ def world_lines(world: World) -> tuple[str, ...]:
     return (
         f"world {world.name}: {size}{understood}",
         f"start {start}, {world.reading.start}; scale {world.reading.scale}",
+        *(f"note: {words}" for words in world.reading.notes),
     )
 
 

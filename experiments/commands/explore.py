@@ -17,7 +17,7 @@ from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
-from ..artifacts.settings import FOLLOWING, NAVIGATION, nested, parse_setting, read_settings, trial_of
+from ..artifacts.settings import DRAWING, FOLLOWING, NAVIGATION, nested, parse_setting, read_settings, trial_of
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -30,7 +30,8 @@ from .echo import echo_world, expected_steps, run_line
 MAX_STEPS = TrialConfig.max_steps
 KEYS = {
     **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
-    **{name: name for name in ("scale", "odometry")},
+    "odometry": "odometry",
+    **DRAWING,
     "max_path": "max_path_m",
     "time_limit": "time_limit_s",
     "sweep": "mission.explorer.sweep",
@@ -51,7 +52,7 @@ SETTLED = (
     "following",
     "odometry",
     "start",
-    "scale",
+    *DRAWING,
     "fence",
     "preset",
     "robot",
@@ -103,6 +104,18 @@ class Explore:
     is not explored: an outdoor or unbounded world ends there."""
     scale: float | None = None
     """Metres per pixel or drawing unit, for files that do not say."""
+    layers: tuple[str, ...] = ()
+    """Layers, groups or classes of an SVG or DXF file that are drawn, and no others; * stands for any letters."""
+    ids: tuple[str, ...] = ()
+    """Shapes and groups of an SVG file that are drawn, by their id, beside those of --layers."""
+    without: tuple[str, ...] = ()
+    """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
+    level: str | None = None
+    """The storey, of a GeoJSON file with several."""
+    threshold: float | None = None
+    """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
+    negate: bool = False
+    """In a bare picture, light is wall and dark is free."""
     out: Path | None = None
     """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. One that holds anything but the same run
     is refused."""
@@ -176,7 +189,7 @@ class Explore:
             return self._go_on(self.resume)
         trial = self.trial
         check(trial)
-        world = load_world(trial.world, trial.start, trial.scale)
+        world = load_world(trial.world, trial.start, trial.drawing)
         folder = self.out or default_folder(world.name, trial, self.preset)
         prepare(folder)
         with held(folder):
@@ -197,7 +210,7 @@ class Explore:
         with held(folder):
             saved = read_saved(source)
             trial = self.continued(saved.trial)
-            world = load_world(trial.world, trial.start, trial.scale)
+            world = load_world(trial.world, trial.start, trial.drawing)
             in_place = folder.samefile(source)
             if in_place and saved.is_finished(trial):
                 print(f"the run in {source} is finished ({_why(saved)}): nothing done")

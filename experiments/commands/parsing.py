@@ -20,7 +20,7 @@ FOLDERS = ("out", "resume", "merge", "against")
 """Options whose path is a folder's."""
 WORDS = {int: "N", float: "NUMBER", str: "NAME", Path: "FILE"}
 """What stands in the help for a value of each type."""
-NAMED = {"robot": "ROBOT", "start": "X Y [HEADING]", "scale": "METRES", "dask": "ADDRESS"}
+NAMED = {"robot": "ROBOT", "start": "X Y [HEADING]", "scale": "METRES", "threshold": "LIGHTNESS", "dask": "ADDRESS"}
 """The same, for options that want more than their type tells."""
 NO_NUMBER = re.compile(
     r"Error parsing (\S+): (?:no type matching \{None\}\|)?(INT|FLOAT|invalid literal for int|could not convert string)"

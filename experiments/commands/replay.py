@@ -143,7 +143,7 @@ class Replay:
                 )
             run = retuned(read_run(self.log), self.config, self.set, robot)
             options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry, self.odometry)
-            return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.scale))
+            return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.drawing))
         if self.association != "own" or self.perfect_extraction or self.perfect_odometry:
             raise UsageError(
                 "expected a log that knows the truth for --association true, --perfect-extraction and"

@@ -111,7 +111,7 @@ def _record(runs: list[RecordedRun], options: ReplayOptions, target: Path) -> li
     """Replay each run's log as it was made, all in one recording; return what went wrong."""
     run = runs[0]
     trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
-    world = load_world(trial.world, trial.start, trial.scale)
+    world = load_world(trial.world, trial.start, trial.drawing)
     title = f"{world.name}: {', '.join(backends)}, seed {trial.seed}, from the log, {options.association} association"
     recording = TimelineOutput(title, backends, world, trial.errorless, target)
     for backend in backends:

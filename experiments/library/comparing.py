@@ -16,7 +16,7 @@ from ..artifacts.settings import options_of
 from ..campaign.cluster import on_dask
 from ..campaign.comparison.story import story_of
 from ..campaign.comparison.tables import write_tables
-from ..campaign.plan import check_campaign, trials
+from ..campaign.plan import check_campaign, drawing_of, trials
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened, read_campaigns
 from ..commands.compare import Compare
@@ -79,6 +79,13 @@ def compare(
     max_steps: int | None = None,
     navigation: Navigation = "floor",
     following: Following = "viewpoints",
+    scale: float | None = None,
+    layers: Sequence[str] = (),
+    ids: Sequence[str] = (),
+    without: Sequence[str] = (),
+    level: str | None = None,
+    threshold: float | None = None,
+    negate: bool = False,
     robot: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     jobs: int | None = None,
@@ -87,8 +94,9 @@ def compare(
 ) -> Comparison:
     """Run many trials and return their comparison; `chainslam compare` as a function.
 
-    `jobs` processes run them, one a core by default, or the workers of the Dask scheduler at the address `dask`. The
-    same call with the same `out` goes on where it was stopped.
+    `scale` to `negate` say what the worlds' files leave open. `jobs` processes run them, one a core by default, or
+    the workers of the Dask scheduler at the address `dask`. The same call with the same `out` goes on where it was
+    stopped.
     Raises UsageError, in one line, for bad input.
     """
     home: Home | None = None
@@ -98,13 +106,15 @@ def compare(
     command = Compare(
         out=Path(out), worlds=tuple(map(str, worlds)), backends=tuple(backends), strategies=tuple(strategies),
         trials=trials, first_seed=first_seed, modes=tuple(modes), association=tuple(association), driver=driver, p0=p0,
-        max_steps=max_steps, navigation=navigation, following=following, robot=None if robot is None else str(robot),
+        max_steps=max_steps, navigation=navigation, following=following,
+        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
+        threshold=threshold, negate=negate, robot=None if robot is None else str(robot),
         set=tuple(options_of((settings or {}).items())[1::2]), jobs=jobs,
     )  # fmt: skip
     campaign = command.campaign
     check_campaign(campaign)
     for world in campaign.worlds:
-        load_world(world)
+        load_world(world, drawing=drawing_of(campaign))
     with opened(command.out, campaign) as store:
         run_campaign(store, on_cores(jobs) if dask is None else on_dask(dask))
         write_tables(command.out, campaign, _trials(campaign), store.record)

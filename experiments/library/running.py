@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from functools import partial
 from pathlib import Path
@@ -49,6 +49,12 @@ def explore(
     return_to_start: bool = False,
     start: tuple[float, ...] | None = None,
     scale: float | None = None,
+    layers: Sequence[str] = (),
+    ids: Sequence[str] = (),
+    without: Sequence[str] = (),
+    level: str | None = None,
+    threshold: float | None = None,
+    negate: bool = False,
     fence: str | None = None,
     robot: str | Path | RobotSpec | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -60,8 +66,9 @@ def explore(
 
     `world` is a bundled name, a file, or a `Robot`. Of a robot of one's own nobody knows the truth: its scores are
     None, and the map's frame is its first pose. `robot` is what it states of itself: a bundled name, a YAML file or a
-    `RobotSpec`. `settings` are those of --set: keys of config.json and their values. `watch` sees every step. Without
-    `out` the files go with the returned object. Raises UsageError, in one line, for bad input.
+    `RobotSpec`. `scale` to `negate` say what a file leaves open, as the options of the command. `settings` are those
+    of --set: keys of config.json and their values. `watch` sees every step. Without `out` the files go with the
+    returned object. Raises UsageError, in one line, for bad input.
     """
     own = None if isinstance(world, str | Path) else world
     name = str(world) if own is None else type(own).__name__
@@ -69,7 +76,9 @@ def explore(
     options = Explore(
         world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
         following=following, sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path,
-        time_limit=time_limit, return_to_start=return_to_start, start=start, scale=scale, fence=fence,
+        time_limit=time_limit, return_to_start=return_to_start, start=start,
+        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
+        threshold=threshold, negate=negate, fence=fence,
         robot=None if robot is None or spec is not None else str(robot),
         set=tuple(_words(settings or {})),
     )  # fmt: skip
@@ -79,7 +88,7 @@ def explore(
         trial = replace(trial, robot=replace(trial.robot, **stated))
     check(trial)
     if own is None:
-        drawn = load_world(trial.world, trial.start, trial.scale)
+        drawn = load_world(trial.world, trial.start, trial.drawing)
         return _kept(*_folder(out), trial, force, lambda: run_scenario(build(trial, drawn), watch, default_mission))
     scenario = unwitnessed(replace(trial, p0="zero"), own)
     said = config_record(scenario.config) | {REPLAY: {RECORDED: asdict(RealOptions())}}

@@ -107,7 +107,7 @@ def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservat
         odometry_of_scanner(Odometry(*each), scanner)
         for each in zip(recording.odometry, recording.odometry_cov, strict=True)
     ]
-    world = load_world(trial.world, trial.start, trial.scale)
+    world = load_world(trial.world, trial.start, trial.drawing)
     chance = chance_in(world, trial.seed)
     witness = Witness(truth_of(world, trial.robot), poses_world, run.true_face_of_beam)
     extractor = PerfectExtraction(witness, chance) if perfect_extraction else extract

@@ -183,7 +183,7 @@ def replay(
     """
     config = replayed(run, backend)
     check(config)
-    world = world or load_world(config.world, config.start, config.scale)
+    world = world or load_world(config.world, config.start, config.drawing)
     recording = run.recording
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))

@@ -29,7 +29,7 @@ def gif_of(folder: Path) -> bytes:
         raise UsageError(f"expected a run with a {LOG}, found none in {folder}: name the folder of one run")
     run, options = read_run(log), read_options(folder / "config.json")
     trial = run.trial
-    world = load_world(trial.world, trial.start, trial.scale)
+    world = load_world(trial.world, trial.start, trial.drawing)
     to_estimate = inverse(alignment(run.start_pose, run.true_poses_world[0]))
     rings = (world.free.exterior, *world.free.interiors)
     floor = [to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings]

@@ -115,7 +115,7 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
         return {}
     first = runs[0]
     trial = first.trial
-    world = load_world(trial.world, trial.start, trial.scale)
+    world = load_world(trial.world, trial.start, trial.drawing)
     rings, title = true_rings(world), f"{world.name}, seed {trial.seed}"
     paths = {run.trial.backend: run.estimated_world for run in runs}
     lines = first.walls["lines_world"]

@@ -46,7 +46,7 @@ FIGURES: dict[str, tuple[str, float]] = {
 }  # fmt: skip
 """What the table tells: the key of summary.json, words, and what it is multiplied by."""
 
-LIMITS = {"--scale": "scale", "--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
+LIMITS = {"--max-steps": "max_steps", "--max-path": "max_path_m", "--time-limit": "time_limit_s"}
 
 
 LARGEST_PLAN = 20_000_000

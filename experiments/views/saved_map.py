@@ -49,7 +49,7 @@ def saved_map(
         walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
     )
     marks = walls["sightings"], walls["tentative"], walls["crooked"]
-    world = load_world(trial.world, trial.start, trial.scale)
+    world = load_world(trial.world, trial.start, trial.drawing)
     return over_truth(
         world, trial, summary, StochasticMap(belief, walls["extents"], *marks), _chains(features["chain"]),
         tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],

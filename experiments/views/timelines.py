@@ -150,7 +150,7 @@ def record_comparison(
         recording = TimelineOutput(title, (), None, False, rrd)
     else:
         trial = run.trial
-        world = load_world(trial.world, trial.start, trial.scale)
+        world = load_world(trial.world, trial.start, trial.drawing)
         recording = TimelineOutput(title, backends, world, trial.errorless, rrd)
         for backend in backends:
             if recording.is_on:

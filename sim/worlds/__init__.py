@@ -2,8 +2,8 @@
 
 from .contour import Contour
 from .drawing import WorldError
-from .options import DrawingOptions
+from .options import AS_DRAWN, DrawingOptions
 from .registry import WORLDS, listing, load
 from .world import World
 
-__all__ = ["WORLDS", "Contour", "DrawingOptions", "World", "WorldError", "listing", "load"]
+__all__ = ["AS_DRAWN", "WORLDS", "Contour", "DrawingOptions", "World", "WorldError", "listing", "load"]

@@ -31,13 +31,14 @@ class DrawingOptions:
         if self.scale is not None and not 0 < self.scale < float("inf"):
             raise WorldError(f"expected a scale above 0 metres per unit, found --scale {self.scale}: correct it")
         if self.threshold is not None and not 0 < self.threshold <= 1:
-            raise WorldError(f"expected a threshold above 0 and up to 1, found --threshold {self.threshold}: correct it")
+            raise WorldError(
+                f"expected a threshold above 0 and up to 1, found --threshold {self.threshold}: correct it"
+            )
 
     @property
     def given(self) -> tuple[str, ...]:
         """The names of what is said."""
-        plain = DrawingOptions() if self != DrawingOptions() else self
-        return tuple(each.name for each in fields(self) if getattr(self, each.name) != getattr(plain, each.name))
+        return tuple(each.name for each in fields(self) if getattr(self, each.name) != each.default)
 
     def check_only(self, allowed: Iterable[str], what: str) -> None:
         """Raise WorldError where anything else is said than means something for a kind of drawing."""
@@ -70,6 +71,10 @@ class DrawingOptions:
                     few = ", ".join(shorten(each) for each in sorted(there)[:8]) or "none"
                     more = f" and {len(there) - 8} more" if len(there) > 8 else ""
                     raise WorldError(f"expected --{option} of the drawing ({few}{more}), found {shorten(name)}")
+
+
+AS_DRAWN = DrawingOptions()
+"""Nothing is said beside the file."""
 
 
 def matches(wanted: Iterable[str], names: Iterable[str]) -> bool:

@@ -10,7 +10,8 @@ import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
-from .options import DrawingOptions
+from .foreign import check_foreign
+from .options import AS_DRAWN, DrawingOptions
 from .readers.files import read_bytes, read_json_map
 from .solid import build
 from .world import World
@@ -84,7 +85,7 @@ def listing() -> dict[str, str]:
 def load(
     name_or_path: str | Path,
     start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
-    options: DrawingOptions = DrawingOptions(),
+    options: DrawingOptions = AS_DRAWN,
 ) -> World:
     """Return a bundled world, one of a family, or one drawn in a file.
 
@@ -102,7 +103,9 @@ def load(
             return build(name, drawing, pose)
         except WorldError as error:
             # What was not understood is most often why.
-            raise WorldError(f"{error} (the file: {'; '.join(drawing.notes)})" if drawing.notes else str(error)) from None
+            raise WorldError(
+                f"{error} (the file: {'; '.join(drawing.notes)})" if drawing.notes else str(error)
+            ) from None
         except shapely.errors.GEOSException as error:
             raise _unmended(error) from None
 
@@ -123,6 +126,7 @@ def _read(text: str, options: DrawingOptions) -> tuple[str, Drawing]:
         # Results name their world in many files, which are to be read again.
         raise WorldError(f"expected a file name of letters that can be shown, found {shorten(text)}: rename the file")
     path = Path(text)
+    check_foreign(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise WorldError(

@@ -55,7 +55,7 @@ def faulty(run: RecordedRun, fault: Fault) -> RecordedRun:
 def _noisier(run: RecordedRun, sigma_m: float) -> RecordedRun:
     """Return the recording with its ranges measured again from the true poses, the same draws a different size."""
     trial, recording = run.trial, run.recording
-    world, lidar = load_world(trial.world, trial.start, trial.scale), trial.robot.lidar
+    world, lidar = load_world(trial.world, trial.start, trial.drawing), trial.robot.lidar
     finder, chance = RangeFinder(world.faces, lidar), chance_in(world, trial.seed)
     ranges, faces = np.empty_like(recording.ranges_m), np.empty_like(run.true_face_of_beam)
     for k, pose in enumerate(run.true_poses_world):

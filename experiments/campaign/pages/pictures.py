@@ -9,6 +9,7 @@ import shapely
 from jaxtyping import Float
 
 from explore.strategies import STRATEGIES
+from sim.worlds import DrawingOptions
 from viz import palette
 from viz.figures.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_figure
 from viz.figures.maps import png
@@ -21,7 +22,7 @@ from ...usage import UsageError
 from ..comparison.comparison import BASELINE_BACKEND, BASELINE_STRATEGY
 from ..comparison.tables import read_rows
 from ..comparison.words import ARMS_SHORT
-from ..plan import CLOSED, Campaign, Trial, trials, world_key
+from ..plan import CLOSED, Campaign, Trial, drawing_of, trials, world_key
 from ..store import Store
 
 MARGIN_M = 0.5
@@ -112,7 +113,7 @@ def map_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[PagePictu
             cell = [
                 Trial(world, strategy, backend, map_arm(campaign), campaign.first_seed) for backend in campaign.backends
             ]
-            floor = _floor(world)
+            floor = _floor(world, drawing_of(campaign))
             maps = [found for t in cell if t in known and (found := _map(store, t, floor)) is not None]
             if maps:
                 points = np.concatenate([*(small.ends_world.reshape(-1, 2) for small in maps), *floor])
@@ -132,10 +133,10 @@ def _map(store: Store, trial: Trial, floor: tuple[Float[np.ndarray, "_ 2"], ...]
     )
 
 
-def _floor(world: str) -> tuple[Float[np.ndarray, "_ 2"], ...]:
+def _floor(world: str, drawing: DrawingOptions) -> tuple[Float[np.ndarray, "_ 2"], ...]:
     """Return the rings of a world's floor; none where its file has gone."""
     try:
-        free = load_world(world).free
+        free = load_world(world, drawing=drawing).free
     except UsageError:
         return ()
     return tuple(shapely.get_coordinates(ring) for ring in (free.exterior, *free.interiors))

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..drawing import Drawing, WorldError, shorten
-from ..options import DrawingOptions
+from ..options import AS_DRAWN, DrawingOptions
 from .geojson.reader import from_geojson
 from .plan_json import from_json
 
@@ -26,7 +26,7 @@ def read_bytes(path: Path) -> bytes:
         raise WorldError(f"expected a readable file, found {shorten(str(error))}: check the path") from None
 
 
-def read_json_map(data: bytes, options: DrawingOptions = DrawingOptions()) -> Drawing:
+def read_json_map(data: bytes, options: DrawingOptions = AS_DRAWN) -> Drawing:
     """Return the drawing in a JSON file's bytes, told by its content: GeoJSON has a "type", a plan has "walls"."""
     document = _parse(data)
     if isinstance(document, dict) and "walls" in document:

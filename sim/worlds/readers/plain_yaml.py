@@ -30,7 +30,8 @@ def plain_mapping(
     if len(data) > FILE_MAX:
         raise WorldError(f"expected a YAML file of at most {FILE_MAX} bytes, found {len(data)}: shorten it")
     try:
-        events = yaml.parse(data, Loader=yaml.SafeLoader)
+        # What reads these files in a robot (yaml-cpp) takes a tab between a key and its value, PyYAML does not.
+        events = yaml.parse(data.replace(b"\t", b" "), Loader=yaml.SafeLoader)
         documents = [_value(events, next(events), 0) for event in events if isinstance(event, yaml.DocumentStartEvent)]
     except WorldError:
         raise
@@ -40,6 +41,11 @@ def plain_mapping(
         found = shorten(documents[0]) if len(documents) == 1 else f"{len(documents)} documents"
         raise WorldError(f"expected {what}{holding}, found {found}: correct it")
     return documents[0]
+
+
+def as_number(value: Value) -> Value:
+    """Return a number that stands in quotes, as yaml-cpp, a robot's reader, takes it; other values as they are."""
+    return float(value) if isinstance(value, str) and NUMBER.fullmatch(value.strip()) else value
 
 
 def _value(events: Iterator[yaml.Event], event: yaml.Event, depth: int) -> Value:
@@ -54,8 +60,13 @@ def _value(events: Iterator[yaml.Event], event: yaml.Event, depth: int) -> Value
         raise WorldError(f"expected values at most {DEEPEST} deep in the YAML file, found deeper ones: flatten it")
     if isinstance(event, yaml.SequenceStartEvent):
         return [_value(events, item, depth + 1) for item in _until(events, yaml.SequenceEndEvent)]
-    keys = _until(events, yaml.MappingEndEvent)
-    return {str(_value(events, key, depth + 1)): _value(events, next(events), depth + 1) for key in keys}
+    mapping: dict[str, Value] = {}
+    for key in _until(events, yaml.MappingEndEvent):
+        name = str(_value(events, key, depth + 1))
+        if name in mapping:
+            raise WorldError(f"expected each key once in the YAML file, found {shorten(name)} twice: take one away")
+        mapping[name] = _value(events, next(events), depth + 1)
+    return mapping
 
 
 def _until(events: Iterator[yaml.Event], end: type[yaml.Event]) -> Iterator[yaml.Event]:

@@ -8,11 +8,11 @@ from jaxtyping import Float
 
 from ..drawing import Drawing, WorldError, as_pose, counted, numbers, shorten
 from ..limits import check_count, check_labels, check_size
-from ..options import DrawingOptions
+from ..options import AS_DRAWN, DrawingOptions
 from ..text import name_of
 
 
-def from_json(document: dict[str, Any], options: DrawingOptions = DrawingOptions()) -> Drawing:
+def from_json(document: dict[str, Any], options: DrawingOptions = AS_DRAWN) -> Drawing:
     """Return the drawing of a parsed plan; `start` (2 or 3 numbers) and `labels` (name: [x, y]) are optional."""
     options.check_only(("scale",), "a plan in JSON")
     metres = 1.0 if options.scale is None else options.scale
@@ -21,7 +21,9 @@ def from_json(document: dict[str, Any], options: DrawingOptions = DrawingOptions
         raise WorldError(f'expected "walls" to be a list of [x1, y1, x2, y2], found {shorten(walls)}: correct the file')
     check_count(len(walls))
     rows = [numbers(wall, (4,), f"wall {i}", "[x1, y1, x2, y2]") for i, wall in enumerate(walls)]
-    lines = tuple(shapely.LineString(metres * row.reshape(2, 2)) for row in rows if row[0] != row[2] or row[1] != row[3])
+    lines = tuple(
+        shapely.LineString(metres * row.reshape(2, 2)) for row in rows if row[0] != row[2] or row[1] != row[3]
+    )
     start = document.get("start")
     labels = document.get("labels") or {}
     if not isinstance(labels, dict):

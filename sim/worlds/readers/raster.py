@@ -1,173 +1,71 @@
 """Maps as pictures: drawn in a paint program, or made by a robot.
 
-In a bare picture dark is wall and light is free, transparency lies on white, and a pixel is 0.05 m unless the caller
-says otherwise. A picture with much of grey 205 and of 254 is a robot's map without its YAML: 205 is unknown. Unknown is
-solid, for nobody can vouch for it. Beyond the border of the picture all is solid.
+In a bare picture dark is wall and light is free, and a pixel is 0.05 m unless the caller says otherwise. What is
+transparent is unknown where other pixels are light, and paper where there is nothing but ink. A picture with much of
+grey 205 and of 254 is a robot's map without its YAML: 205 is unknown. Unknown is solid, for nobody can vouch for it.
+Beyond the border of the picture all is solid.
 """
 
-import io
-import math
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import shapely
-from jaxtyping import Bool, Float, Int, UInt8
-from PIL import Image, UnidentifiedImageError
-from skimage.measure import find_contours, label
+from jaxtyping import Bool
 
-from ..drawing import Drawing, WorldError, shorten
-from ..options import DrawingOptions
-from ..solid import drop_collinear
-from .files import read_bytes
+from ..drawing import Drawing
+from ..options import AS_DRAWN, DrawingOptions
+from .outlines import outlines
+from .picture import Picture, read_picture
+from .ros_map import UNKNOWN_GREY, map_beside, read_ros_map
 
 PIXEL_M = 0.05
-PIXELS_MAX = 40_000_000
-SIDE_MAX = 20_000
-EDGES_MAX = 1_000_000
-"""Sides of pixels between wall and free floor: 50 km of them at 0.05 m; noise and patterns have more."""
-FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF", "WEBP")
 WALL_GREY = 160
 """Above the middle, so that a one-pixel line whose antialiasing spreads it over two rows stays a wall."""
-UNKNOWN_GREY, FREE_GREY = 205, 254
+FREE_GREY = 254
 UNKNOWN_SHARE = 0.05
-SPECK_PIXELS = 6
-STRAIGHT_PIXELS = 1.0
-"""Slanted walls are stairs of pixels: what deviates less than this from straight is straight."""
-STRIP_PIXELS = 4_000_000
-"""Pictures are converted in strips of rows of about this size, to hold one copy of a large one and not four."""
+CLEAR = 128
+"""Of 255: less than half of a pixel is there."""
 
 
-def read_image(path: Path, options: DrawingOptions = DrawingOptions()) -> Drawing:
-    """Return the drawing in a bare picture, `scale` metres per pixel (0.05 where None), origin at its lower left."""
-    scale = options.scale
-    grey = read_grey(path)
-    mapped = np.mean(grey == UNKNOWN_GREY) > UNKNOWN_SHARE and np.mean(grey >= FREE_GREY) > UNKNOWN_SHARE
-    said = "given" if scale else "assumed (--scale METRES says another)"
-    words = "dark pixels and unknown ones as walls" if mapped else "dark pixels as walls"
-    drawing = outlines(grey <= UNKNOWN_GREY if mapped else grey < WALL_GREY, scale or PIXEL_M, np.zeros(3))
-    return replace(drawing, understood=words, scale=f"{scale or PIXEL_M:g} m a pixel, {said}")
+def read_image(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
+    """Return the drawing in a picture, its scale in metres per pixel (0.05 where None), origin at its lower left.
 
-
-def read_grey(path: Path) -> UInt8[np.ndarray, "h w"]:
-    """Return a picture's lightness, transparency on white; raise WorldError where it cannot be read."""
-    data = read_bytes(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            image = Image.open(io.BytesIO(data), formats=FORMATS)
-            width, height = image.size
-            if min(width, height) < 2 or max(width, height) > SIDE_MAX or width * height > PIXELS_MAX:
-                raise WorldError(
-                    f"expected an image of 2 to {SIDE_MAX} pixels a side and at most {PIXELS_MAX / 1e6:g} megapixels,"
-                    f" found {width} x {height}: shrink it"
-                )
-            return _lightness(image)
-    except WorldError:
-        raise
-    except Image.DecompressionBombError:
-        raise WorldError(f"expected at most {PIXELS_MAX / 1e6:g} megapixels, found far more: shrink it") from None
-    except UnidentifiedImageError:
-        raise WorldError(
-            f"expected a PNG or PGM image, found another or a broken one: save {path.name} again"
-        ) from None
-    except Exception as error:
-        # Decoders raise whatever a broken file makes them meet; to the user all of it is one bad file.
-        raise WorldError(f"expected a PNG or PGM image, found {shorten(str(error))}: save {path.name} again") from None
-
-
-def _lightness(image: Image.Image) -> UInt8[np.ndarray, "h w"]:
-    if image.mode == "F":
-        raise WorldError("expected grey or colour pixels, found floating point: save the image as PNG")
-    if image.mode.startswith("I"):
-        return (np.clip(np.asarray(image), 0, 65535) >> 8).astype(np.uint8)
-    width, height = image.size
-    rows = max(STRIP_PIXELS // width, 1)
-    strips = [image.crop((0, top, width, min(top + rows, height))) for top in range(0, height, rows)]
-    return np.concatenate([_strip_lightness(strip) for strip in strips])
-
-
-def _strip_lightness(strip: Image.Image) -> UInt8[np.ndarray, "h w"]:
-    if strip.mode not in ("1", "L") or "transparency" in strip.info:
-        rgba = strip.convert("RGBA")
-        strip = Image.alpha_composite(Image.new("RGBA", rgba.size, "white"), rgba)
-    return np.asarray(strip.convert("L"))
-
-
-def outlines(solid: Bool[np.ndarray, "h w"], metres: float, origin: Float[np.ndarray, "3"]) -> Drawing:
-    """Return the outlines of solid pixels as polygons in the frame of the map's origin (x, y, yaw).
-
-    Raises WorldError where there is no wall, no free floor, or so much outline that this is no plan of a building.
+    A ROS map's YAML file beside it that names this picture is read instead, unless the caller says something else.
     """
-    height = len(solid)
-    solid, corner = _about_the_free(solid)
-    kept = _without_specks(solid)
-    if not kept.any():
-        raise WorldError("expected dark walls on a light ground, found no dark line in the image: draw the walls")
-    edges = sum(int(np.count_nonzero(np.diff(kept, axis=axis))) for axis in (0, 1))
-    if edges > EDGES_MAX:
-        raise WorldError(
-            f"expected at most {EDGES_MAX} sides of pixels between wall and free floor, found {edges}: this is noise"
-            " or a pattern; smooth the picture, or shrink it"
+    options.check_only(("scale", "threshold", "negate"), "a picture")
+    beside = map_beside(path) if options == AS_DRAWN else None
+    if beside is not None:
+        drawing = read_ros_map(beside)
+        return replace(
+            drawing, notes=(f"read with {beside.name} beside it (--scale leaves that aside)", *drawing.notes)
         )
-    found = find_contours(np.pad(kept, 1), 0.5, fully_connected="high")  # type: ignore[no-untyped-call]
-    rings = [_square(ring[:-1]) for ring in found if len(ring) > 4]
-    moved = [_to_world(ring + corner, height, metres, origin) for ring in rings]
-    area = shapely.build_area(shapely.geometrycollections([shapely.LinearRing(ring) for ring in moved]))
-    corners = 0.5 + np.array([(0, 0), (0, kept.shape[1]), kept.shape, (kept.shape[0], 0)])
-    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
-    sheet = shapely.Polygon(_to_world(corners + corner, height, metres, origin))
-    return Drawing(solids=tuple(parts), sheet=sheet, simplify_m=STRAIGHT_PIXELS * metres)
+    picture = read_picture(path, turns=True)
+    metres = options.scale or PIXEL_M
+    said = "given" if options.scale else "assumed (--scale METRES says another)"
+    solid, words, notes = _walls(picture, options)
+    drawing = outlines(solid, metres, np.zeros(3))
+    return replace(drawing, understood=words, scale=f"{metres:g} m a pixel, {said}", notes=tuple(notes))
 
 
-def _about_the_free(solid: Bool[np.ndarray, "h w"]) -> tuple[Bool[np.ndarray, "i j"], Int[np.ndarray, "2"]]:
-    """Return the part of a picture around its free pixels, a solid pixel about it, and where it begins.
-
-    A robot's map is mostly unknown: what lies about the floor is solid, however much of it there is.
-    """
-    spans = []
-    for axis in (1, 0):
-        free = np.flatnonzero(~solid.all(axis=axis))
-        if not len(free):
-            raise WorldError("expected light free space, found only dark or unknown pixels: check the image's greys")
-        spans.append((max(int(free[0]) - 1, 0), int(free[-1]) + 2))
-    (top, bottom), (left, right) = spans
-    return solid[top:bottom, left:right], np.array([top, left])
-
-
-def _without_specks(solid: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
-    """Return the solid pixels without clusters too small to be a thing that stands there."""
-    clusters = label(solid, connectivity=2)  # type: ignore[no-untyped-call]
-    count = int(clusters.max()) + 1
-    sizes = np.zeros(count, dtype=np.int64)
-    for strip in np.array_split(clusters, clusters.size // STRIP_PIXELS + 1):
-        sizes += np.bincount(strip.ravel(), minlength=count)
-    keep = sizes >= SPECK_PIXELS
-    keep[0] = False
-    kept: Bool[np.ndarray, "h w"] = keep[clusters]
-    return kept
-
-
-def _square(ring: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
-    """Return a ring of pixel outlines (row, column) whose right angles, cut by the tracing, are corners again."""
-    ring = drop_collinear(ring)
-    after = np.roll(ring, -1, axis=0)
-    edge = after - ring
-    before, behind = np.roll(edge, 1, axis=0), np.roll(edge, -1, axis=0)
-    length = np.abs(edge).sum(axis=1)
-    chamfer = (np.abs(np.abs(edge) - 0.5) < 1e-9).all(axis=1) & (np.abs(np.sum(before * behind, axis=1)) < 1e-9)
-    chamfer &= (np.roll(length, 1) >= 1) & (np.roll(length, -1) >= 1)
-    chamfer &= (np.abs(before).min(axis=1) < 1e-9) & (np.abs(behind).min(axis=1) < 1e-9)
-    corner = ring + np.where(np.abs(before) > 1e-9, edge, 0.0)
-    squared: Float[np.ndarray, "m 2"] = np.where(chamfer[:, None], corner, ring)[~np.roll(chamfer, 1)]
-    return squared
-
-
-def _to_world(
-    pixels: Float[np.ndarray, "n 2"], height: int, metres: float, origin: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "n 2"]:
-    """Return (row, column) of the padded picture in the world frame, m; the origin is the lower left pixel's corner."""
-    x, y = (pixels[:, 1] - 0.5) * metres, (height - pixels[:, 0] + 0.5) * metres
-    c, s = math.cos(origin[2]), math.sin(origin[2])
-    return np.stack([origin[0] + c * x - s * y, origin[1] + s * x + c * y], axis=1)
+def _walls(picture: Picture, options: DrawingOptions) -> tuple[Bool[np.ndarray, "h w"], str, list[str]]:
+    """Return the solid pixels of a bare picture, what was taken for a wall, and what else was done, in words."""
+    grey = picture.grey
+    notes = ["turned as its EXIF orientation says"] if picture.is_turned else []
+    if options.negate:
+        grey = (
+            255 - grey if picture.alpha is None else np.where(picture.alpha < CLEAR, 255, 255 - grey).astype(np.uint8)
+        )
+    mapped = np.mean(grey == UNKNOWN_GREY) > UNKNOWN_SHARE and np.mean(grey >= FREE_GREY) > UNKNOWN_SHARE
+    mapped = bool(mapped) and options.threshold is None
+    least = WALL_GREY if options.threshold is None else 255 * options.threshold
+    solid: Bool[np.ndarray, "h w"] = grey <= UNKNOWN_GREY if mapped else grey < least
+    if picture.is_jpeg:
+        notes.append("JPEG blurs greys: edges are rough, and what a robot's map means by unknown is lost")
+    if picture.alpha is not None:
+        clear = picture.alpha < CLEAR
+        # Ink on a clear sheet has no other paper; where some is white, what is clear was never seen.
+        if np.mean(~clear & ~solid) > UNKNOWN_SHARE:
+            solid = solid | clear
+            notes.append("transparent pixels are unknown, and as walls")
+    words = "dark pixels and unknown ones as walls" if mapped else "dark pixels as walls"
+    return solid, words.replace("dark", "light") if options.negate else words, notes

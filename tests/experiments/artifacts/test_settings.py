@@ -135,7 +135,7 @@ FILES = {
     "another format": b'{"format": 99, "trial": {}}',
     "no format": b'{"trial": {}}',
     "a missing key": b'{"format": %d, "trial": {"world": "hall"}}' % FORMATS[CONFIG],
-    "no number": b'{"scale": NaN}',
+    "no number": b'{"drawing": {"scale": NaN}}',
 }
 
 

@@ -85,9 +85,9 @@ def test_double_entries_are_held_against_the_gate_of_the_campaign():
     assert doubles(counts)["doubles_beyond_gate"] == pytest.approx(11.0)
 
 
-@pytest.mark.parametrize("key", ["world", "backend", "strategy", "seed", "errorless", "start", "scale"])
+@pytest.mark.parametrize("key", ["world", "backend", "strategy", "seed", "errorless", "start"])
 def test_what_a_campaign_settles_itself_cannot_be_set(key, capsys):
-    value = {"seed": 1, "errorless": "true", "start": "[1, 2]", "scale": 2.0}.get(key, "hall")
+    value = {"seed": 1, "errorless": "true", "start": "[1, 2]"}.get(key, "hall")
     assert main(["compare", "--preset", "smoke", "--out", "DIR", "--set", f"{key}={value}"]) == 2
     assert "is settled otherwise" in capsys.readouterr().err
 

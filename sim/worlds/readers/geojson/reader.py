@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from ...drawing import Drawing, WorldError, counted, shorten
 from ...limits import check_labels, check_size
-from ...options import DrawingOptions
+from ...options import AS_DRAWN, DrawingOptions
 from ...rooms import WALL_M, Outline, areas, plan_of
 from .doors import at_point, opening, shared_walls
 from .features import About, features, listed, position, positions
@@ -46,7 +46,7 @@ class _Found:
     left_out: int = 0
 
 
-def from_geojson(document: dict[str, Any], options: DrawingOptions = DrawingOptions()) -> Drawing:
+def from_geojson(document: dict[str, Any], options: DrawingOptions = AS_DRAWN) -> Drawing:
     """Return the drawing of a parsed GeoJSON object; raise WorldError where it is no GeoJSON of a building."""
     options.check_only(("scale", "level"), "GeoJSON")
     said, storey = _on_level(features(document), options.level)
@@ -83,7 +83,7 @@ def _drawing(found: _Found, where: Laid, storey: str) -> Drawing:
     notes = [
         *([storey] if storey else []),
         *([f"left out: {counted(shells, 'outline', 'outlines')} of a storey or a building"] if shells else []),
-        *([f"left out: {counted(found.left_out, 'feature', 'features')} of kinds that are no walls"] * (found.left_out > 0)),
+        *_left_out(found),
         *_lost(found, doors),
     ]  # fmt: skip
     labels = {name: (float(at[0]), float(at[1])) for name, at in found.points.items()}
@@ -91,6 +91,11 @@ def _drawing(found: _Found, where: Laid, storey: str) -> Drawing:
         tuple(lines), plan.solids, start, labels, openings=tuple(openings), understood=text, scale=where.words,
         notes=tuple(notes),
     )  # fmt: skip
+
+
+def _left_out(found: _Found) -> list[str]:
+    count = counted(found.left_out, "feature", "features")
+    return [f"left out: {count} of kinds that are no walls"] if count else []
 
 
 def _lost(found: _Found, doors: int) -> list[str]:
@@ -161,8 +166,8 @@ def _add(found: _Found, geometry: dict[str, Any], about: About, plane: Plane) ->
             if np.ptp(path, axis=0).any():
                 _add_line(found, shapely.LineString(plane(path)), about)
     elif kind in ("Polygon", "MultiPolygon"):
-        for rings in [coordinates] if kind == "Polygon" else coordinates:
-            paths = [plane(positions(ring, 4)) for ring in rings]
+        for rings in [coordinates] if kind == "Polygon" else listed(coordinates, "MultiPolygon"):
+            paths = [plane(positions(ring, 4)) for ring in listed(rings, "Polygon")]
             if paths:
                 _add_polygon(found, shapely.Polygon(paths[0], paths[1:]), about)
 
@@ -198,5 +203,3 @@ def _add_polygon(found: _Found, polygon: shapely.Polygon, about: About) -> None:
     elif about.kind == "room":
         found.rooms += parts
         found.walled += parts if about.is_walled else []
-
-

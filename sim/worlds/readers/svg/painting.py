@@ -5,6 +5,7 @@ seen. All in metres.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -141,7 +142,7 @@ def _stroke(
             continue
         if line.length > first + last + SLIVER_M:
             rest = substring(line, first, line.length - last) if first or last else line
-            lines.append(rest)
+            lines.append(shapely.LineString(shapely.get_coordinates(rest)))
         else:
             solids += areas(line.buffer(0.5 * WALL_M, cap_style="flat", join_style="mitre"))
     return lines, solids
@@ -152,9 +153,9 @@ def _runs(
 ) -> list[tuple[Float[np.ndarray, "_ 2"], bool, bool]]:
     """Return the parts of a line of which some of the width can be seen, and which of their ends are cut."""
     shapely.prepare([each for each in (clip, above) if each is not None])
-    runs: list[tuple[list[Float[np.ndarray, "2"]], bool, bool]] = []
+    runs: list[tuple[list[Float[np.ndarray, 2]], bool, bool]] = []
     is_open = False
-    for a, b in zip(ring[:-1], ring[1:], strict=True):
+    for a, b in pairwise(ring):
         size = float(np.hypot(*(b - a)))
         if size == 0.0:
             continue

@@ -1,6 +1,7 @@
 """What is drawn, in the order in which it is drawn."""
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -10,8 +11,14 @@ from shapely.geometry.base import BaseGeometry
 from .paint import Paint
 from .winding import filled
 
-JOINS = {"miter": "mitre", "miter-clip": "mitre", "arcs": "mitre", "round": "round", "bevel": "bevel"}
-CAPS = {"butt": "flat", "round": "round", "square": "square"}
+JOINS: dict[str, Literal["mitre", "round", "bevel"]] = {
+    "miter": "mitre",
+    "miter-clip": "mitre",
+    "arcs": "mitre",
+    "round": "round",
+    "bevel": "bevel",
+}
+CAPS: dict[str, Literal["flat", "round", "square"]] = {"butt": "flat", "round": "round", "square": "square"}
 
 
 @dataclass(frozen=True, eq=False)

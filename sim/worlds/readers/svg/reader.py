@@ -12,9 +12,7 @@ add the attribute with the XML editor, 0.1 for a plan at 1:100 in mm. The file's
 the world's origin is the lower left corner of the view box.
 """
 
-import math
 from dataclasses import replace
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -22,28 +20,26 @@ import shapely
 import svgelements
 from shapely.geometry.base import BaseGeometry
 
-from ...drawing import LARGEST_M, SMALLEST_M, Drawing, WorldError, counted, shorten
+from ...drawing import Drawing, WorldError, counted, shorten
 from ...limits import check_labels, check_size
-from ...options import DrawingOptions
+from ...options import AS_DRAWN, DrawingOptions
 from ...text import name_of
 from .document import parse
 from .painting import Walls, walls_of
 from .pieces import Group, Piece, leaves
 from .rendered import Place, Renderer
+from .scale import stated_scale, unitless_scale
 from .shapes import Box, length, view, view_box
 
-UNITLESS_MAX = 200.0
-PHYSICAL = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "Q": 0.00025}
-PIXEL_M = 0.0254 / 96
 OPTIONS = ("scale", "layers", "ids", "without")
 
 
-def read_svg(data: bytes, options: DrawingOptions = DrawingOptions()) -> Drawing:
+def read_svg(data: bytes, options: DrawingOptions = AS_DRAWN) -> Drawing:
     """Return the drawing in an SVG file's bytes; the scale is in metres per user unit and overrides the file's own."""
     options.check_only(OPTIONS, "an SVG file")
     root = parse(data)
     box = view_box(root.get("viewBox"))
-    stated, said = _stated_scale(root, box) if options.scale is None else (options.scale, "given")
+    stated, said = stated_scale(root, box) if options.scale is None else (options.scale, "given")
     renderer = Renderer(root, options)
     pieces = _painted(renderer, root, box)
     options.check_names(renderer.found.layers, renderer.found.ids)
@@ -51,11 +47,13 @@ def read_svg(data: bytes, options: DrawingOptions = DrawingOptions()) -> Drawing
     notes = _notes(renderer, options)
     if not dark:
         raise _without_walls(notes)
-    metres = stated if stated is not None else _unitless_scale(dark)
+    metres = stated if stated is not None else unitless_scale(dark)
     height = box[3] if box else 0.0
     page = _page(root, box)
     placed = _in_metres(pieces, metres, height)
-    check_size([shapely.LineString(ring) for piece in leaves(placed) if piece.paint.is_dark for ring in piece.rings], ())
+    check_size(
+        [shapely.LineString(ring) for piece in leaves(placed) if piece.paint.is_dark for ring in piece.rings], ()
+    )
     whole = walls_of(placed)
     walls = whole if page is None else _on_page(placed, whole, _moved(page, metres, height))
     notes += _hidden(walls, whole)
@@ -104,9 +102,7 @@ def _painted(renderer: Renderer, root: Element, box: Box | None) -> list[Piece |
 
 def _without_walls(notes: list[str]) -> WorldError:
     also = f" ({notes[0]})" if notes else ""
-    return WorldError(
-        f"expected dark lines or dark filled shapes in the SVG file, found none{also}: draw the walls"
-    )
+    return WorldError(f"expected dark lines or dark filled shapes in the SVG file, found none{also}: draw the walls")
 
 
 def _notes(renderer: Renderer, options: DrawingOptions) -> list[str]:
@@ -137,8 +133,9 @@ def _hidden(walls: Walls, whole: Walls) -> list[str]:
             f"expected a drawing on its page, found {100 * off / _extent(whole):.0f} % of its walls beyond the viewBox,"
             " where no viewer shows them: resize the page to its content"
         )
-    notes = [f"not to be seen (clipped away, or below what is light): {counted(whole.hidden, 'dark piece', 'dark pieces')}"] * bool(whole.hidden)
-    return notes + [f"beyond the page, where no viewer shows them: {off:.3g} m of walls"] * (off > 0.05)
+    hidden = counted(whole.hidden, "dark piece", "dark pieces")
+    notes = [f"not to be seen (clipped away, or below what is light): {hidden}"] if hidden else []
+    return notes + ([f"beyond the page, where no viewer shows them: {off:.3g} m of walls"] if off > 0.05 else [])
 
 
 def _extent(walls: Walls) -> float:
@@ -191,44 +188,3 @@ def _clipped(pieces: list[Piece | Group], page: BaseGeometry) -> list[Piece | Gr
         else replace(each, clip=page if each.clip is None else page.intersection(each.clip))
         for each in pieces
     ]  # fmt: skip
-
-
-def _stated_scale(root: Element, box: Box | None) -> tuple[float | None, str]:
-    """Return metres per user unit where the file states it, and in words who says so."""
-    text = root.get("data-metres-per-unit")
-    if text is not None:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not 0 < value < math.inf:
-            raise WorldError(f"expected data-metres-per-unit above 0, found {shorten(text)}: correct the <svg> element")
-        return value, "as the file says"
-    sizes = []
-    for key, i in (("width", 2), ("height", 3)):
-        written = (root.get(key) or "").strip()
-        if written.endswith(tuple(PHYSICAL)):
-            try:
-                metres = float(written.rstrip("mcinptQ")) * next(v for k, v in PHYSICAL.items() if written.endswith(k))
-            except ValueError:
-                raise WorldError(
-                    f"expected {key} as a length such as 900cm, found {shorten(written)}: correct it"
-                ) from None
-            sizes.append(metres / box[i] if box else PIXEL_M)
-    if sizes and math.isfinite(min(sizes)) and min(sizes) > 0:
-        return min(sizes), "by the size of the page, drawn 1:1 (--scale METRES says another)"
-    return None, "assumed (--scale METRES says another)"
-
-
-def _unitless_scale(dark: list[Piece]) -> float:
-    points = np.concatenate([ring for piece in dark for ring in piece.rings])
-    extent = float(np.max(np.ptp(points, axis=0)))
-    if not SMALLEST_M <= extent <= min(UNITLESS_MAX, LARGEST_M):
-        metres = 0.01 if extent < 1e4 else 0.001
-        raise WorldError(
-            f"expected a drawing in metres, found {extent:.4g} units wide without a physical size: state the scale,"
-            f' such as --scale {metres:g}, or data-metres-per-unit="{metres:g}" in the <svg> element'
-        )
-    return 1.0
-
-

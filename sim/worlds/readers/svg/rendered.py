@@ -189,13 +189,13 @@ class Renderer:
         stroke = self._paint(style, "stroke", element, place, depth)
         units = math.sqrt(abs(place.frame.determinant)) if style.word("vector-effect") == "none" else 1.0
         width = style.inherited("stroke-width", lambda tokens: _width(tokens, place.whole), math.nan)
-        common = {"clip": place.clip, "units": units}
-        pen = {"width": None if math.isnan(width) else width * units, "cap": style.word("stroke-linecap")}
-        filled_, stroked = Piece(rings, fill, style.word("fill-rule"), **common), None
+        filling, stroked = Piece(rings, fill, style.word("fill-rule"), clip=place.clip), None
         if width != 0.0:
-            stroked = Piece(rings, stroke, None, join=style.word("stroke-linejoin"), **pen, **common)
+            wide = None if math.isnan(width) else width * units
+            ends = style.word("stroke-linecap"), style.word("stroke-linejoin")
+            stroked = Piece(rings, stroke, None, wide, *ends, units, place.clip)
         first = [getattr(token, "lower_value", "") for token in style.inherited("paint-order", list, [])][:1]
-        order = [stroked, filled_] if first == ["stroke"] else [filled_, stroked]
+        order = [stroked, filling] if first == ["stroke"] else [filling, stroked]
         yield from (each for each in order if each is not None and each.paint.alpha > 0.0)
 
     def _paint(self, style: Style, name: str, element: Element, place: Place, depth: int) -> Paint:
@@ -229,7 +229,8 @@ class Renderer:
         return chain
 
     def _gradient(self, stops: list[Element]) -> Paint:
-        paints, places = [], []
+        paints: list[Paint] = []
+        places: list[float] = []
         for stop in stops:
             style = self.styles.of(stop, None)
             paint = style.paint("stop-color")
@@ -244,6 +245,7 @@ class Renderer:
     def _pattern(self, content: Element, said: dict[str, str], element: Element, place: Place, depth: int) -> Paint:
         box = view_box(said.get("viewBox"))
         of_box = said.get("patternUnits", "objectBoundingBox") == "objectBoundingBox"
+        assert place.style is not None
         around = self._box(element, place.style, place) or (0.0, 0.0, 1.0, 1.0)
         wholes = (1.0, 1.0) if of_box else place.whole
         sizes = [length(said.get(key, "0"), of) for key, of in zip(("width", "height"), wholes, strict=True)]
@@ -339,19 +341,17 @@ class Renderer:
 
     def _set(self, label: str, element: Element, style: Style, place: Place) -> None:
         """Remember the middle of a mark."""
-        box = bounds(self._outlines(element, style, place))
+        rings = self._outlines(element, style, place)
         if kind(element) == "text":
-            x, y = (length(style.text(key).split()[0] if style.text(key) else "0", 0.0) for key in "xy")
-            at = place.frame.point_in_matrix_space((x, y))
-            box = float(at[0]), float(at[1]), 0.0, 0.0
-        if box is None:
+            x, y = (length((style.text(key).split() or ["0"])[0], 0.0) for key in "xy")
+            rings = [np.array([place.frame.point_in_matrix_space((x, y))], dtype=float)[:, :2]]
+        if not rings:
             self.styles.note(f"the mark {label}, which has no shape")
             return
+        points = np.concatenate(rings)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         turn = math.radians(float(element.get("data-heading-deg") or 0.0))
-        # Written so, and not as a corner and half of the size, the middle is that of the corners to the last bit.
-        low, high = np.array(box[:2]), np.array(box[:2]) + np.array(box[2:])
-        x, y = (0.5 * (low + high)).tolist()
-        self.found.marks[label] = (x, y, turn)
+        self.found.marks[label] = (float(middle[0]), float(middle[1]), turn)
 
 
 def overlaid(pieces: list[Piece], adds: Callable[[Paint], bool], removes: Callable[[Paint], bool]) -> BaseGeometry:

@@ -108,9 +108,13 @@ def _path(name: str, style: Style, element: Any, whole: tuple[float, float]) -> 
             radii = (radii[1] if radii[0] < 0 else radii[0], radii[0] if radii[1] < 0 else radii[1])
             if not min(radii) > 0:
                 return None
-            return svgelements.Path(svgelements.Ellipse(cx=at("cx", across), cy=at("cy", down), rx=radii[0], ry=radii[1]))
+            return svgelements.Path(
+                svgelements.Ellipse(cx=at("cx", across), cy=at("cy", down), rx=radii[0], ry=radii[1])
+            )
         case "line":
-            ends = [length(element.get(key, ""), of) for key, of in zip(("x1", "y1", "x2", "y2"), whole * 2, strict=True)]
+            ends = [
+                length(element.get(key, ""), of) for key, of in zip(("x1", "y1", "x2", "y2"), whole * 2, strict=True)
+            ]
             return svgelements.Path(svgelements.SimpleLine(*ends))
         case _:
             numbers = [float(each) for each in NUMBER.findall(element.get("points", ""))]
@@ -137,7 +141,12 @@ def _rings(path: Any) -> list[Ring]:
 
 def placed(box: Box, frame: Any) -> shapely.Polygon:
     """Return a box in the frame of the page."""
-    corners = [(box[0], box[1]), (box[0] + box[2], box[1]), (box[0] + box[2], box[1] + box[3]), (box[0], box[1] + box[3])]
+    corners = [
+        (box[0], box[1]),
+        (box[0] + box[2], box[1]),
+        (box[0] + box[2], box[1] + box[3]),
+        (box[0], box[1] + box[3]),
+    ]
     return shapely.Polygon([tuple(frame.point_in_matrix_space(corner)) for corner in corners])
 
 
