@@ -19,6 +19,7 @@ import numpy as np
 import shapely
 from ezdxf import recover, units
 from ezdxf.enums import InsertUnits
+from jaxtyping import Float
 
 from ..drawing import Drawing, WorldError, counted, shorten
 from ..limits import check_count, check_size
@@ -39,8 +40,8 @@ OWN_STYLE, OWN_WALLS, OWN_WAY = "CHAINSLAM", "WALLS", "PATH"
 
 @dataclass
 class _Found:
-    paths: list[np.ndarray[Any, Any]] = field(default_factory=list)
-    faces: list[np.ndarray[Any, Any]] = field(default_factory=list)
+    paths: list[Float[np.ndarray, "_ 2"]] = field(default_factory=list)
+    faces: list[Float[np.ndarray, "_ 2"]] = field(default_factory=list)
     start: tuple[float, float] | None = None
     layers: set[str] = field(default_factory=set)
     blocks: set[str] = field(default_factory=set)
@@ -105,7 +106,7 @@ def _unit(document: Any) -> tuple[float | None, str]:
     return metres, "as the file says"
 
 
-def _unitless(paths: list[np.ndarray[Any, Any]]) -> float:
+def _unitless(paths: list[Float[np.ndarray, "_ 2"]]) -> float:
     extent = float(np.max(np.ptp(np.concatenate(paths), axis=0)))
     if not UNITLESS_M[0] <= extent <= UNITLESS_M[1]:
         metres = 0.01 if extent < 5e3 else 0.001

@@ -71,12 +71,12 @@ def _converted(image: Image.Image) -> tuple[UInt8[np.ndarray, "h w"], UInt8[np.n
     strips = [image.crop((0, top, width, min(top + rows, height))) for top in range(0, height, rows)]
     is_clear = image.has_transparency_data
     grey, alpha = zip(*(_strip(strip, is_clear) for strip in strips), strict=True)
-    shown = np.concatenate(alpha) if is_clear else None
-    return np.concatenate(grey), None if shown is None or np.all(shown == 255) else shown
+    shown = np.concatenate(alpha) if is_clear else np.array(255)
+    return np.concatenate(grey), None if np.all(shown == 255) else shown
 
 
-def _strip(strip: Image.Image, is_clear: bool) -> tuple[UInt8[np.ndarray, "h w"], UInt8[np.ndarray, "h w"]]:
-    alpha = np.zeros((0, strip.width), dtype=np.uint8)
+def _strip(strip: Image.Image, is_clear: bool) -> tuple[UInt8[np.ndarray, "h w"], UInt8[np.ndarray, "h w"] | None]:
+    alpha = None
     if strip.mode not in ("1", "L") or is_clear:
         rgba = strip.convert("RGBA")
         alpha = np.asarray(rgba.getchannel("A")) if is_clear else alpha

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 from shapely.errors import GEOSException
 
-from sim.worlds import World, WorldError, load, registry
-from sim.worlds.readers import geojson
+from sim.worlds import DrawingOptions, World, WorldError, load, registry
+from sim.worlds.readers.geojson import features
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
 NS = 'xmlns="http://www.w3.org/2000/svg"'
@@ -168,7 +168,7 @@ BAD: dict[str, tuple[str, str | bytes, str]] = {
     "yaml nan": ("a.yaml", "image: b.pgm\nresolution: .nan", "finite"),
     "yaml digits": ("a.yaml", "image: b.pgm\nresolution: " + "9" * 5000, "finite"),
     "yaml date": ("a.yaml", "image: b.pgm\nresolution: 2001-01-01", "resolution"),
-    "extension": ("a.dwg", "x", "ending in"),
+    "extension": ("a.plan", "x", "ending in"),
 }
 
 
@@ -228,21 +228,36 @@ def test_bad_starts_and_scales_are_refused(tmp_path):
     assert "inside a wall" in _refused("hall", start=(7.9, 6.2))
     (tmp_path / "a.svg").write_text(f"<svg {NS}>{ROOM}</svg>")
     for scale in (0.0, -1.0, float("nan"), float("inf")):
-        assert "scale" in _refused(tmp_path / "a.svg", scale=scale)
+        with pytest.raises(WorldError, match="scale"):
+            DrawingOptions(scale=scale)
 
 
-def test_a_scale_is_refused_where_the_file_has_its_own(tmp_path):
-    (tmp_path / "a.json").write_text(_plan())
-    (tmp_path / "a.yaml").write_text("image: b.pgm\nresolution: 0.05")
-    assert "no scale for JSON" in _refused(tmp_path / "a.json", scale=0.1)
-    assert "no scale for a ROS map" in _refused(tmp_path / "a.yaml", scale=0.1)
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [("a.yaml", "scale"), ("a.json", "level"), ("a.svg", "level"), ("a.geojson", "layers"), ("hall", "scale"),
+     ("random:1", "without"), ("a.svg", "negate"), ("a.pgm", "ids"), ("a.dxf", "threshold")],
+)  # fmt: skip
+def test_an_option_is_refused_where_it_means_nothing(tmp_path, name, option):
+    files = {
+        "a.json": _plan(),
+        "a.yaml": _map(""),
+        "a.svg": _svg(""),
+        "a.geojson": _feature(),
+        "a.pgm": "",
+        "a.dxf": "0",
+    }
+    value = {"scale": 0.1, "level": "1", "threshold": 0.5, "negate": True}.get(option, ("a",))
+    if name in files:
+        (tmp_path / name).write_text(files[name])
+    told = _refused(tmp_path / name if name in files else name, options=DrawingOptions(**{option: value}))
+    assert f"no --{option} for" in told
 
 
 def test_a_picture_of_the_wrong_scale_is_refused(tmp_path):
     room = np.full((60, 60), 255, dtype=np.uint8)
     room[[5, 54]] = room[:, [5, 54]] = 0
     Image.fromarray(room).save(tmp_path / "a.png")
-    assert "1000 m, found 3e+03 m" in _refused(tmp_path / "a.png", scale=50.0)
+    assert "1000 m, found 3e+03 m" in _refused(tmp_path / "a.png", options=DrawingOptions(scale=50.0))
 
 
 def test_outlines_that_cannot_be_mended_are_told(monkeypatch):
@@ -254,7 +269,7 @@ def test_outlines_that_cannot_be_mended_are_told(monkeypatch):
 
 
 def test_geojson_of_more_pieces_than_can_be_read_soon_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(geojson, "PIECES_MAX", 4)
+    monkeypatch.setattr(features, "PIECES_MAX", 4)
     (tmp_path / "a.geojson").write_text(_geo("LineString", [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]))
     assert "coordinates to hold a list" in _refused(tmp_path / "a.geojson")
 

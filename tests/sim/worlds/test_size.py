@@ -30,7 +30,7 @@ LARGE = {
     "noise": ("a.png", RANDOM.random((1100, 1100)) < 0.5, "sides of pixels"),
     "arcs": ("a.svg", f'{SVG}{ROOM}<path fill="none" stroke="black" d="{ARCS}"/></svg>', "straight pieces"),
     "style": ("a.svg", f'{SVG}{ROOM}<path style="{"x" * 100_000}" d="M1 1h5v5"/></svg>', "10000 characters"),
-    "style sheet": ("a.svg", f"{SVG}{ROOM}<style>{'a' * 100_000}</style></svg>", "10000 characters"),
+    "style sheet": ("a.svg", f"{SVG}{ROOM}<style>{'a' * 300_000}</style></svg>", "200000 in a <style>"),
     "transform": ("a.svg", f'{SVG}<g transform="{"rotate(1 " * 9000}">{ROOM}</g></svg>', "10000 characters"),
     "polygon": ("a.svg", f'{SVG}{ROOM}<polygon points="{"1 2 3 1 " * 20_000}"/></svg>', "straight pieces"),
     "decoration": (

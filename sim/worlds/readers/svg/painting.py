@@ -130,8 +130,8 @@ def _stroke(
     if above is None and piece.clip is None:
         return [shapely.LineString(ring)], []
     # A stroke as wide as no wall is, such as one of a unit that nobody chose, says nothing of the wall's width.
-    said = piece.width is not None and piece.width < BROAD_M
-    half = 0.5 * SHARE * (piece.width if said and piece.width else WALL_M)
+    width = piece.page_width
+    half = 0.5 * SHARE * (width if width and width < BROAD_M else WALL_M)
     lines: list[shapely.LineString] = []
     solids: list[shapely.Polygon] = []
     for points, cut_first, cut_last in _runs(ring, half, piece.clip, above):

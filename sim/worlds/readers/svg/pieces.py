@@ -1,5 +1,6 @@
 """What is drawn, in the order in which it is drawn."""
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -20,6 +21,9 @@ JOINS: dict[str, Literal["mitre", "round", "bevel"]] = {
 }
 CAPS: dict[str, Literal["flat", "round", "square"]] = {"butt": "flat", "round": "round", "square": "square"}
 
+MITRE = 4.0
+"""Of SVG, where nothing else is said: sharper corners are cut off."""
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -30,24 +34,30 @@ class Piece:
     rule: str | None = None
     """How rings are filled; None for a stroke."""
     width: float | None = None
-    """Of a stroke; None where the drawing does not say it, which means one unit."""
+    """Of a stroke, where it is drawn; None where the drawing does not say it, which means one unit."""
     cap: str = "butt"
     join: str = "miter"
-    units: float = 1.0
-    """Units of the page in a unit of where the shape is drawn."""
+    pen: Float[np.ndarray, "2 2"] = field(default_factory=lambda: np.eye(2))
+    """From where the shape is drawn to the page, for points as rows: it turns and skews what a pen draws."""
     clip: BaseGeometry | None = None
     """All that may be seen of it; None where nothing is clipped away."""
 
-    def area(self, width: float | None = None) -> BaseGeometry:
-        """Return what is painted, a stroke in its own width or in another."""
+    @property
+    def page_width(self) -> float | None:
+        """The width of a stroke on the page, on the mean; None where the drawing does not say it."""
+        return None if self.width is None else self.width * math.sqrt(abs(float(np.linalg.det(self.pen))))
+
+    def area(self) -> BaseGeometry:
+        """Return what is painted."""
         if self.rule is not None:
             shape: BaseGeometry = shapely.union_all(filled(self.rings, self.rule == "evenodd"))
         else:
-            wide = width if width is not None else self.units if self.width is None else self.width
-            lines = [shapely.LineString(ring) for ring in self.rings]
-            shape = shapely.union_all(
-                [line.buffer(0.5 * wide, cap_style=CAPS[self.cap], join_style=JOINS[self.join]) for line in lines]
-            )
+            inverse = np.linalg.pinv(self.pen)
+            lines = [shapely.LineString(ring @ inverse) for ring in self.rings]
+            wide = 1.0 if self.width is None else self.width
+            style = {"cap_style": CAPS[self.cap], "join_style": JOINS[self.join], "mitre_limit": MITRE}
+            drawn = shapely.buffer(lines, 0.5 * wide, **style)
+            shape = shapely.transform(shapely.union_all(drawn), lambda at: at @ self.pen)
         return shape if self.clip is None else shape.intersection(self.clip)
 
 

@@ -31,6 +31,7 @@ from .rendered import Place, Renderer
 from .scale import stated_scale, unitless_scale
 from .shapes import Box, length, view, view_box
 
+FLIP = np.diag([1.0, -1.0])
 OPTIONS = ("scale", "layers", "ids", "without")
 
 
@@ -150,9 +151,8 @@ def _in_metres(pieces: list[Piece | Group], metres: float, height: float) -> lis
             placed.append(replace(piece, pieces=_in_metres(piece.pieces, metres, height)))
             continue
         rings = [np.round((ring * [1, -1] + [0, height]) * metres, 6) for ring in piece.rings]
-        width = None if piece.width is None else piece.width * metres
         clip = None if piece.clip is None else _moved(piece.clip, metres, height)
-        placed.append(replace(piece, rings=rings, width=width, clip=clip, units=piece.units * metres))
+        placed.append(replace(piece, rings=rings, clip=clip, pen=piece.pen @ FLIP * metres))
     return placed
 
 

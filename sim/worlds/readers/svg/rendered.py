@@ -71,7 +71,7 @@ class Renderer:
     def root(self, root: Element, place: Place) -> list[Piece | Group]:
         """Return what is painted of a document in a frame of its page."""
         style = self.styles.of(root, None)
-        if [getattr(token, "lower_value", "") for token in style.tokens("display")] == ["none"]:
+        if is_gone(style):
             return []
         inside = replace(place, style=style)
         painted = [each for child in root for each in self.pieces(child, inside)]
@@ -84,7 +84,7 @@ class Renderer:
         if not (name in GROUPS or name in SHAPES or name in LEFT_OUT) or not _applies(element):
             return []
         style = self.styles.of(element, place.style)
-        if [getattr(token, "lower_value", "") for token in style.tokens("display")] == ["none"]:
+        if is_gone(style):
             return []
         place = self._within(element, name, style, place)
         if marks and (label := _mark(element)) is not None:
@@ -122,6 +122,8 @@ class Renderer:
         rings = []
         for child, at in self._children(element, name, style, place):
             inner = self.styles.of(child, at.style)
+            if is_gone(inner):
+                continue
             rings += self._outlines(child, inner, self._within(child, kind(child), inner, at))
         return rings
 
@@ -187,13 +189,14 @@ class Renderer:
             return
         fill = self._paint(style, "fill", element, place, depth)
         stroke = self._paint(style, "stroke", element, place, depth)
-        units = math.sqrt(abs(place.frame.determinant)) if style.word("vector-effect") == "none" else 1.0
+        frame = place.frame
+        pen = np.array([[frame.a, frame.b], [frame.c, frame.d]], dtype=float)
+        pen = pen if style.word("vector-effect") == "none" else np.eye(2)
         width = style.inherited("stroke-width", lambda tokens: _width(tokens, place.whole), math.nan)
         filling, stroked = Piece(rings, fill, style.word("fill-rule"), clip=place.clip), None
         if width != 0.0:
-            wide = None if math.isnan(width) else width * units
             ends = style.word("stroke-linecap"), style.word("stroke-linejoin")
-            stroked = Piece(rings, stroke, None, wide, *ends, units, place.clip)
+            stroked = Piece(rings, stroke, None, None if math.isnan(width) else width, *ends, pen, place.clip)
         first = [getattr(token, "lower_value", "") for token in style.inherited("paint-order", list, [])][:1]
         order = [stroked, filling] if first == ["stroke"] else [filling, stroked]
         yield from (each for each in order if each is not None and each.paint.alpha > 0.0)
@@ -303,8 +306,7 @@ class Renderer:
                 continue
             at = self._within(child, kind(child), self.styles.of(child, own), Place(own, frame, place.whole))
             assert at.style is not None
-            hidden = [getattr(token, "lower_value", "") for token in at.style.tokens("display")] == ["none"]
-            if hidden or at.style.word("visibility") != "visible":
+            if is_gone(at.style) or at.style.word("visibility") != "visible":
                 continue
             rings = self._outlines(child, at.style, at)
             part = shapely.union_all(filled(rings, at.style.word("clip-rule") == "evenodd"))
@@ -352,6 +354,11 @@ class Renderer:
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         turn = math.radians(float(element.get("data-heading-deg") or 0.0))
         self.found.marks[label] = (float(middle[0]), float(middle[1]), turn)
+
+
+def is_gone(style: Style) -> bool:
+    """Return whether an element and all within is not rendered at all."""
+    return [getattr(token, "lower_value", "") for token in style.tokens("display")] == ["none"]
 
 
 def overlaid(pieces: list[Piece], adds: Callable[[Paint], bool], removes: Callable[[Paint], bool]) -> BaseGeometry:

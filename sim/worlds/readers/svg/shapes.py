@@ -80,9 +80,9 @@ def rings_of(name: str, style: Style, element: Any, frame: Any, whole: tuple[flo
     path = _path(name, style, element, whole)
     if path is None:
         return []
-    path *= frame
-    path.reify()
-    return [ring for ring in _rings(path) if len(ring) > 1]
+    # Points are moved, not the path: the library does not skew arcs rightly.
+    linear, moved = np.array([[frame.a, frame.b], [frame.c, frame.d]]), np.array([frame.e, frame.f])
+    return [ring @ linear + moved for ring in _rings(path) if len(ring) > 1]
 
 
 def _path(name: str, style: Style, element: Any, whole: tuple[float, float]) -> Any:
