@@ -1,8 +1,8 @@
 """The map as a CAD drawing, `map.dxf`: the walls of `map.geojson` on layers, in metres, in the frame of the map."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
-from pathlib import Path
+import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,25 @@ from viz.figures.floor_plan import Dimension
 
 WALLS, TENTATIVE, DIMENSIONS, PATH = "WALLS", "WALLS-TENTATIVE", "DIMENSIONS", "PATH"
 OPEN_ENDS, NOTES = "OPEN-ENDS", "NOTES"
+DASHED = "CHAINSLAM-DASHED"
+LAYERS = {
+    WALLS: (7, 35, "Continuous"),
+    TENTATIVE: (8, 18, DASHED),
+    DIMENSIONS: (5, 13, "Continuous"),
+    PATH: (3, 13, "Continuous"),
+    OPEN_ENDS: (1, 18, "Continuous"),
+    NOTES: (8, 13, "Continuous"),
+}
+"""Colour (of the CAD palette), width of lines in 0.01 mm, and line type of each layer."""
+DASH_M = 0.2, -0.1
 LETTERS = "CHAINSLAM"
-"""Style of the letters."""
+"""Style of the letters; by it the reader of worlds knows a drawing of ours."""
 CAPITALS = 0.72
 """Height of a capital, which a drawing states, as a share of the letters' height, which the floor plan states."""
 RING_M, START_M, NOTE_M = 0.2, 0.12, 0.2
 """Radius of the rings around open ends and around the start, and height of the letters of a note."""
-SPACE, FIRST_HANDLE = "17", 0x1000
-"""The blank drawing's name for its model space, and the first name that it leaves free."""
+VERSION = "R2000"
+"""The oldest format that states its unit: all that read DXF read it."""
 
 
 def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimension], title: str) -> bytes:
@@ -40,21 +51,33 @@ def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimensio
     return plan.drawing(low, high)
 
 
-@cache
-def _blank() -> str:
-    """Return a drawing without shapes, in the oldest format that states its unit (R2000): all that read DXF read it.
+@contextmanager
+def _without_time() -> Iterator[None]:
+    """Let a drawing not tell when it was made, and have no identity of its own."""
+    from ezdxf import options  # type: ignore[attr-defined]
 
-    It has the layers, line types and letters of ours. ezdxf wrote it; to import that takes longer than ten steps.
-    """
-    return (Path(__file__).parent / "blank.dxf").read_text(encoding="ascii")
+    before, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
+    try:
+        yield
+    finally:
+        options.write_fixed_meta_data_for_testing = before
 
 
 class _Plan:
-    """Gathers shapes as lines of the file, a code and a value in turn, and keeps how far they reach."""
+    """Gathers shapes in a drawing, and keeps how far they reach."""
 
     def __init__(self) -> None:
-        self._lines: list[str] = []
-        self._shapes = 0
+        # To import it takes longer than ten steps, and most commands write no drawing.
+        from ezdxf import units
+        from ezdxf.filemanagement import new
+
+        with _without_time():
+            self._document = new(VERSION, units=units.M)
+        self._document.linetypes.add(DASHED, [sum(map(abs, DASH_M)), *DASH_M], description="not seen well enough yet")
+        self._document.styles.add(LETTERS, font="arial.ttf")
+        for name, (colour, width, line) in LAYERS.items():
+            self._document.layers.add(name, color=colour, lineweight=width, linetype=line)
+        self._space = self._document.modelspace()
         self._corners: list[Float[np.ndarray, "_ 2"]] = []
 
     @property
@@ -65,22 +88,19 @@ class _Plan:
 
     def drawing(self, low_world: Float[np.ndarray, "2"], high_world: Float[np.ndarray, "2"]) -> bytes:
         """Return the file, which a program opens with all between two corners in sight."""
-        middle, size = 0.5 * (low_world + high_world), high_world - low_world
-        values = {
-            **dict(
-                zip(("LOW_X", "LOW_Y", "HIGH_X", "HIGH_Y"), (*low_world.tolist(), *high_world.tolist()), strict=True)
-            ),
-            **dict(zip(("MIDDLE_X", "MIDDLE_Y"), middle.tolist(), strict=True)),
-            "TALL": 1.2 * max(float(size.max()), 1.0),
-            "NEXT": f"{FIRST_HANDLE + self._shapes:X}",
-        }
-        text = _blank()
-        for name, value in values.items():
-            text = text.replace(f"@{name}@", str(value))
-        text = text.replace("@ENTITIES@\n", "".join(f"{line}\n" for line in self._lines))
-        # A letter that the code page lacks stands by its number.
-        escaped = (each if _is_western(each) else f"\\U+{ord(each):04x}" for each in text)
-        return "".join(escaped).encode("cp1252")
+        size = high_world - low_world
+        for name, at in (("EXT", (low_world, high_world)), ("LIM", (low_world, high_world))):
+            for end, corner in zip(("MIN", "MAX"), at, strict=True):
+                x, y = corner.tolist()
+                self._document.header[f"${name}{end}"] = (x, y, 0.0) if name == "EXT" else (x, y)
+        self._space.reset_extents((*low_world.tolist(), 0.0), (*high_world.tolist(), 0.0))
+        self._document.set_modelspace_vport(
+            1.2 * max(float(size.max()), 1.0), (0.5 * (low_world + high_world)).tolist()
+        )
+        text = io.StringIO()
+        with _without_time():
+            self._document.write(text)
+        return self._document.encode(text.getvalue())
 
     def feature(self, feature: Mapping[str, Any]) -> None:
         """Draw a feature of `map.geojson`, of the kinds that a floor plan has."""
@@ -112,16 +132,16 @@ class _Plan:
         points = self._placed(points_world)
         if points is None:
             return
+        on = {"layer": layer}
         if len(points) == 2 and not closed:
-            self._shape("LINE", layer, "AcDbLine", *_at(points[0]), *_at(points[1], 1))
-            return
-        corners = [pair for x, y in points.tolist() for pair in ((10, x), (20, y))]
-        self._shape("LWPOLYLINE", layer, "AcDbPolyline", (90, len(points)), (70, int(closed)), *corners)
+            self._space.add_line(points[0].tolist(), points[1].tolist(), dxfattribs=on)
+        else:
+            self._space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on)
 
     def _ring(self, centre_world: Any, radius_m: float, layer: str) -> None:
         centre = self._placed([centre_world])
         if centre is not None:
-            self._shape("CIRCLE", layer, "AcDbCircle", *_at(centre[0]), (40, radius_m))
+            self._space.add_circle(centre[0].tolist(), radius_m, dxfattribs={"layer": layer})
 
     def _placed(self, points_world: Any) -> Float[np.ndarray, "n 2"] | None:
         points = np.asarray(points_world, dtype=np.float64).reshape(-1, 2)
@@ -134,31 +154,11 @@ class _Plan:
         self, words: str, at_world: Float[np.ndarray, "2"], height_m: float, turn_deg: float, layer: str,
         is_centred: bool = True,
     ) -> None:  # fmt: skip
+        from ezdxf.enums import TextEntityAlignment
+
         # A line of the file is a value: a line break in a world's name would end it.
         line = "".join(each if each.isprintable() else " " for each in words)
-        across, along = [(72, 1)] * is_centred, [(73, 2)] * is_centred
-        self._shape(
-            "TEXT", layer, "AcDbText", *_at(at_world), (40, height_m), (1, line), (50, turn_deg), (7, LETTERS),
-            *across, *_at(at_world, 1), (100, "AcDbText"), *along,
-        )  # fmt: skip
-
-    def _shape(self, kind: str, layer: str, marker: str, *values: tuple[int, object]) -> None:
-        handle = f"{FIRST_HANDLE + self._shapes:X}"
-        self._shapes += 1
-        begin = ((0, kind), (5, handle), (330, SPACE), (100, "AcDbEntity"), (8, layer), (100, marker))
-        for code, value in (*begin, *values):
-            self._lines += [f"{code:3}", str(value)]
-
-
-def _at(point_world: Float[np.ndarray, "2"], nth: int = 0) -> list[tuple[int, object]]:
-    """Return the codes and values of the nth point of a shape."""
-    x, y = point_world.tolist()
-    return [(10 + nth, x), (20 + nth, y), (30 + nth, 0.0)]
-
-
-def _is_western(letter: str) -> bool:
-    try:
-        letter.encode("cp1252")
-    except UnicodeEncodeError:
-        return False
-    return True
+        on = {"layer": layer, "style": LETTERS}
+        text = self._space.add_text(line, height=height_m, rotation=turn_deg, dxfattribs=on)
+        align = TextEntityAlignment.MIDDLE_CENTER if is_centred else TextEntityAlignment.LEFT
+        text.set_placement(at_world.tolist(), align=align)

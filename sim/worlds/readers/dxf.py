@@ -98,7 +98,7 @@ def _unit(document: Any) -> tuple[float | None, str]:
     if number == 0:
         return None, "assumed, for the file names no unit (--scale METRES says another)"
     try:
-        metres = float(units.conversion_factor(InsertUnits(number), units.M))
+        metres = float(units.conversion_factor(InsertUnits(number), InsertUnits.Meters))
     except (ValueError, TypeError, KeyError):
         metres = 0.0
     if not 0 < metres < np.inf:

@@ -55,8 +55,8 @@ class Piece:
             inverse = np.linalg.pinv(self.pen)
             lines = [shapely.LineString(ring @ inverse) for ring in self.rings]
             wide = 1.0 if self.width is None else self.width
-            style = {"cap_style": CAPS[self.cap], "join_style": JOINS[self.join], "mitre_limit": MITRE}
-            drawn = shapely.buffer(lines, 0.5 * wide, **style)
+            cap, join = CAPS[self.cap], JOINS[self.join]
+            drawn = [line.buffer(0.5 * wide, cap_style=cap, join_style=join, mitre_limit=MITRE) for line in lines]
             shape = shapely.transform(shapely.union_all(drawn), lambda at: at @ self.pen)
         return shape if self.clip is None else shape.intersection(self.clip)
 
