@@ -23,9 +23,12 @@ def shared_walls(rooms: Sequence[shapely.Polygon]) -> list[shapely.LineString]:
     walls = []
     for i, j in zip(first, second, strict=True):
         if i < j:
-            touching = rooms[i].boundary.intersection(rooms[j].buffer(SHUT_M, join_style="mitre"))
-            parts = shapely.get_parts(shapely.line_merge(touching) if touching.geom_type != "Point" else touching)
-            walls += [part for part in parts if part.geom_type == "LineString" and part.length > 4 * SHUT_M]
+            # Where both have the very same edge, its ends are known; else they lie within the width of the slit.
+            same = rooms[i].boundary.intersection(rooms[j].boundary)
+            near = rooms[i].boundary.intersection(rooms[j].buffer(SHUT_M, join_style="mitre"))
+            parts = shapely.get_parts(shapely.get_parts(same if same.length > 0.5 * near.length else near))
+            merged = shapely.line_merge(shapely.multilinestrings([p for p in parts if p.geom_type == "LineString"]))
+            walls += [part for part in shapely.get_parts(merged) if part.length > 4 * SHUT_M]
     return walls
 
 

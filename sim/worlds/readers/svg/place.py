@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 from xml.etree.ElementTree import Element
 
 import shapely
@@ -45,6 +45,7 @@ class Found:
     count: int = 0
 
 
+@runtime_checkable
 class Walk(Protocol):
     """A walk through a document, for what an element refers to."""
 

@@ -27,7 +27,8 @@ from ...text import name_of
 from .document import parse
 from .painting import Walls, walls_of
 from .pieces import Group, Piece, leaves
-from .rendered import Place, Renderer
+from .place import Place
+from .rendered import Renderer
 from .scale import stated_scale, unitless_scale
 from .shapes import Box, length, view, view_box
 
