@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import results, words, worlds
+from . import drawings, results, words, worlds
 
 Mutator = Callable[[np.random.Generator, Path], list[list[str]]]
 MUTATORS: dict[str, Mutator] = {
@@ -24,4 +24,7 @@ MUTATORS: dict[str, Mutator] = {
     "world-values": worlds.other_values,
     "world-words": worlds.other_words,
     "world-shapes": worlds.other_shapes,
+    "world-drawings": drawings.svg,
+    "world-codes": drawings.codes,
+    "world-storeys": drawings.storeys,
 }

@@ -1,12 +1,14 @@
 """Broken world files of every format: bytes changed, pieces spliced, values replaced by those that break readers."""
 
+import gzip
 import json
 from functools import cache
-from io import BytesIO
+from io import BytesIO, StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -28,9 +30,9 @@ MARKUP = (
 
 def damaged_file(rng: np.random.Generator, folder: Path) -> list[list[str]]:
     """Change, cut, repeat and splice the bytes of a good file of any format."""
-    name = str(rng.choice(sorted(_good())))
-    content = bytearray(_good()[name])
-    other = _good()[str(rng.choice(sorted(_good())))]
+    name = str(rng.choice(sorted(good())))
+    content = bytearray(good()[name])
+    other = good()[str(rng.choice(sorted(good())))]
     for _ in range(int(rng.integers(1, 8))):
         at, length = int(rng.integers(0, len(content) + 1)), int(rng.integers(0, 30))
         match int(rng.integers(0, 6)):
@@ -47,27 +49,27 @@ def damaged_file(rng: np.random.Generator, folder: Path) -> list[list[str]]:
                 content[at : at + length] = other[begin : begin + 5 * length]
             case _:
                 content[at : at + length] = str(rng.choice(WORDS)).encode()
-    return _explored(rng, folder, name, bytes(content))
+    return explored(rng, folder, name, bytes(content))
 
 
 def other_values(rng: np.random.Generator, folder: Path) -> list[list[str]]:
     """Replace, drop, repeat and nest values anywhere in a plan or a GeoJSON file."""
-    name = str(rng.choice([name for name in sorted(_good()) if name.endswith("json")]))
-    document = json.loads(_good()[name])
+    name = str(rng.choice([name for name in sorted(good()) if name.endswith("json")]))
+    document = json.loads(good()[name])
     for _ in range(int(rng.integers(1, 5))):
         document = _changed(rng, document)
-    return _explored(rng, folder, name, json.dumps(document).encode())
+    return explored(rng, folder, name, json.dumps(document).encode())
 
 
 def other_words(rng: np.random.Generator, folder: Path) -> list[list[str]]:
     """Put YAML's and SVG's own tricks where they are not expected."""
-    name = str(rng.choice([name for name in sorted(_good()) if name.endswith((".yaml", ".svg"))]))
+    name = str(rng.choice([name for name in sorted(good()) if name.endswith((".yaml", ".svg"))]))
     tricks = TAGS if name.endswith("yaml") else MARKUP
-    content = bytearray(_good()[name])
+    content = bytearray(good()[name])
     for _ in range(int(rng.integers(1, 6))):
         at, length = int(rng.integers(0, len(content) + 1)), int(rng.integers(0, 12))
         content[at : at + length] = tricks[int(rng.integers(0, len(tricks)))] * int(rng.choice([1, 1, 1, 3, 500]))
-    return _explored(rng, folder, name, bytes(content))
+    return explored(rng, folder, name, bytes(content))
 
 
 def other_shapes(rng: np.random.Generator, folder: Path) -> list[list[str]]:
@@ -95,17 +97,17 @@ def other_shapes(rng: np.random.Generator, folder: Path) -> list[list[str]]:
     elif kind == "svg":
         letters = rng.choice(list("MLHVCSQTAZmlhvcsqtaz"), len(pairs))
         path = " ".join(f"{c} {x:g} {y:g} {y:g} {x:g} 0 1 1" for c, (x, y) in zip(letters, pairs, strict=True))
-        content = _good()["map.svg"].replace(b"</svg>", f'<path stroke="black" d="{path}"/></svg>'.encode())
+        content = good()["map.svg"].replace(b"</svg>", f'<path stroke="black" d="{path}"/></svg>'.encode())
     else:
         grey = rng.integers(0, 256, rng.integers(1, 60, 2)).astype(np.uint8)
         content = _encoded(Image.fromarray(np.kron(grey > 99, np.ones((4, 4))).astype(np.uint8) * 255), "PNG")
-    return _explored(rng, folder, f"map.{kind}", content)
+    return explored(rng, folder, f"map.{kind}", content)
 
 
-def _explored(rng: np.random.Generator, folder: Path, name: str, content: bytes) -> list[list[str]]:
+def explored(rng: np.random.Generator, folder: Path, name: str, content: bytes) -> list[list[str]]:
     """Write the file, beside what a YAML file names, and return the command that explores it for a step or two."""
     for other in ("map.pgm", "map.png"):
-        (folder / other).write_bytes(_good()[other])
+        (folder / other).write_bytes(good()[other])
     (folder / name).write_bytes(content)
     words = ["explore", name, "--out", "out", "--max-steps", str(int(rng.integers(1, 3)))]
     if rng.random() < 0.15:
@@ -147,7 +149,7 @@ def _changed(rng: np.random.Generator, value: Any) -> Any:
 
 
 @cache
-def _good() -> dict[str, bytes]:
+def good() -> dict[str, bytes]:
     """Return a good file of each format by its name."""
     image = Image.new("L", (170, 130), 254)
     draw = ImageDraw.Draw(image)
@@ -178,12 +180,28 @@ def _good() -> dict[str, bytes]:
         "lines.geojson": json.dumps({"type": "FeatureCollection", "features": [*drawn, *rooms[2:]]}).encode(),
         "own.geojson": json.dumps({"type": "FeatureCollection", "features": chains, **own}).encode(),
         "map.svg": (Path(sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(),
+        "map.svgz": gzip.compress((Path(sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(), mtime=0),
+        "map.dxf": _dxf(),
         "map.yaml": f"{yaml}occupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n".encode(),
         "map.pgm": _encoded(image, "PPM"),
         "map.png": _encoded(image, "PNG"),
         **{f"map.{kind.lower()}": _encoded(image, kind) for kind in ("BMP", "GIF", "TIFF", "WEBP", "JPEG")},
         "clear.png": _encoded(image.convert("LA"), "PNG"),
     }
+
+
+def _dxf() -> bytes:
+    document = ezdxf.new("R2010")
+    document.units = ezdxf.units.M
+    space, block = document.modelspace(), document.blocks.new("PILLAR")
+    block.add_circle((0, 0), 0.3)
+    for x0, y0, x1, y1 in BOX:
+        space.add_lwpolyline([(x0, y0), (x1, y1)], dxfattribs={"layer": "WALLS"})
+    space.add_blockref("PILLAR", (6, 3))
+    space.add_arc((4, 2.5), 1.1, 0, 90, dxfattribs={"layer": "DOORS"})
+    text = StringIO()
+    document.write(text)
+    return document.encode(text.getvalue())
 
 
 def _encoded(image: Image.Image, kind: str) -> bytes:

@@ -7,6 +7,7 @@ program wrote the walls are read, and the start.
 """
 
 import io
+import logging
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,6 +27,8 @@ from ..limits import check_count, check_size
 from ..options import AS_DRAWN, DrawingOptions
 from .files import read_bytes
 
+# The library tells each fault that it mends to whoever listens; what cannot be mended is told below.
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 FACES = ("SOLID", "TRACE", "3DFACE")
 ENTITIES_MAX = 200_000
@@ -52,12 +55,17 @@ class _Found:
 def read_dxf(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
     """Return the drawing in a DXF file; raises WorldError, in one line, for any other file."""
     options.check_only(("scale", "layers", "ids", "without"), "a DXF file")
-    document = _document(read_bytes(path))
+    document, mended = _document(read_bytes(path))
     metres, said = _unit(document) if options.scale is None else (options.scale, "given")
     is_own = OWN_STYLE in document.styles and not options.chooses
     found = _Found()
-    for entity, layer, blocks in _entities(document, document.modelspace(), "0", (), found):
-        _take(entity, layer, blocks, found, options, metres or STRAIGHT_M, is_own)
+    try:
+        for entity, layer, blocks in _entities(document, document.modelspace(), "0", (), found):
+            _take(entity, layer, blocks, found, options, metres or STRAIGHT_M, is_own)
+    except WorldError:
+        raise
+    except Exception as error:
+        raise _broken(error) from None
     options.check_names(found.layers, found.blocks)
     if not found.paths and not found.faces:
         raise WorldError(f"expected lines or polylines in the DXF file, found none{_left_out(found)}: draw the walls")
@@ -71,7 +79,7 @@ def read_dxf(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
         counted(len(lines), "line as a wall", "lines as walls"),
         counted(len(solids), "face as solid", "faces as solid"),
     )
-    notes = [f"left out{_left_out(found)}"] if found.left_out else []
+    notes = mended + ([f"left out{_left_out(found)}"] if found.left_out else [])
     if not options.chooses and not is_own:
         names = sorted(found.layers)
         notes.append(f"layers: {', '.join(map(shorten, names[:8]))}{' ...' if len(names) > 8 else ''}"
@@ -82,15 +90,21 @@ def read_dxf(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
     )  # fmt: skip
 
 
-def _document(data: bytes) -> Any:
+def _document(data: bytes) -> tuple[Any, list[str]]:
+    """Return a file and what was mended in it, in words."""
     if data.startswith(b"AutoCAD Binary DXF"):
         raise WorldError("expected a DXF file of text, found a binary one: save it as ASCII DXF")
     try:
-        document, _ = recover.read(io.BytesIO(data))
+        document, found = recover.read(io.BytesIO(data))
     except Exception as error:
         # The library raises whatever a broken file makes it meet; to the user all of it is one bad file.
-        raise WorldError(f"expected a DXF file, found a broken one ({shorten(str(error))}): save it again") from None
-    return document
+        raise _broken(error) from None
+    faults = len(found.errors) + len(found.fixes)
+    return document, ([f"mended: {counted(faults, 'fault', 'faults')} of the file"] if faults else [])
+
+
+def _broken(error: Exception) -> WorldError:
+    return WorldError(f"expected a DXF file, found a broken one ({shorten(str(error))}): save it again")
 
 
 def _unit(document: Any) -> tuple[float | None, str]:
