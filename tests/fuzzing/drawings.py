@@ -1,4 +1,4 @@
-"""Drawings as other programs write them: SVG that hides and shows, DXF with broken codes, GeoJSON of several storeys."""
+"""Drawings as other programs write them: SVG that hides and shows, DXF with broken codes, GeoJSON of storeys."""
 
 import json
 from pathlib import Path
