@@ -13,7 +13,7 @@ from experiments.commands.cli import main
 from experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import say
-from sim.worlds import load
+from sim.worlds import DrawingOptions, load
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" {}><rect width="{}" height="{}" fill="none" stroke="black"/></svg>'
@@ -46,7 +46,7 @@ def test_what_was_assumed_is_told_with_how_to_say_it(tmp_path):
     _, told = lines_of(path)
     assert "0.05 m a pixel, assumed (--scale METRES says another)" in told
     assert "assumed, where a robot has most room (--start X Y says another)" in told
-    assert "0.1 m a pixel, given" in lines_of(path, scale=0.1)[1]
+    assert "0.1 m a pixel, given" in lines_of(path, options=DrawingOptions(scale=0.1))[1]
 
 
 @pytest.mark.parametrize(
