@@ -43,9 +43,11 @@ FENCE = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]]
 PLACES = ("start", "mission.free_space.fence")
 """Settings that are no number of their own."""
 NAMED = {
-    "mission.free_space.fence": FENCE, "drawing.level": "1", "drawing.threshold": 0.5,
-    **dict.fromkeys(("drawing.layers", "drawing.ids", "drawing.without"), ["walls", "doors"]),
-}  # fmt: skip
+    "mission.free_space.fence": FENCE,
+    "drawing.level": "1",
+    "drawing.threshold": 0.5,
+    **{f"drawing.{name}": ["walls", "doors"] for name in ("layers", "ids", "without")},
+}
 """Settings whose default does not say what they hold."""
 
 
