@@ -42,8 +42,8 @@ def test_of_one_run_all_walls_are_scored_as_in_its_summary():
 
 
 def test_tentative_walls_are_scored_by_themselves_only():
-    """After two scans of figure 9 one wall was seen once."""
-    result = run_trial(TrialConfig("paper-fig9", "invariant-ekf", seed=1, max_steps=2))
+    """After two scans of figure 9 on this seed one wall was seen once; most seeds show it twice."""
+    result = run_trial(TrialConfig("paper-fig9", "invariant-ekf", seed=7, max_steps=2))
     found, walls = causes(result), result.last.map
     assert np.count_nonzero(walls.tentative) == 1 == len(walls) - found["lines"]
     every = map_error(result.votes, walls.ids, result.joint, np.ones(len(walls), dtype=bool))

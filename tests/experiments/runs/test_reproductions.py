@@ -87,11 +87,12 @@ def test_figure_4_is_planned_and_driven_as_in_the_text():
 def test_table_1_and_figure_8_are_made_from_one_drive(monkeypatch):
     monkeypatch.setattr(table1, "DRIVES", 1)
     for module in (table1, maps):
-        monkeypatch.setattr(module, "BESIDE", ("block-ekf", "full-ekf"))
+        monkeypatch.setattr(module, "BESIDE", ("block-ekf", "invariant-ekf"))
     distances, map_made = table1.reproduce(1), fig8.reproduce(1)
     for pair, by_hand in table1.BY_HAND.items():
         assert distances.ours["true"][f"{pair}, m"] == pytest.approx(by_hand, abs=0.026)
         assert distances.ours["block-ekf"][f"{pair}, m"] == pytest.approx(by_hand, abs=0.05)
     assert map_made.ours["block-ekf"]["least trace of the pose covariance over the start's"] < 0.5
-    assert map_made.ours["full-ekf"]["least trace of the pose covariance over the start's"] > 0.99
+    # What no scan can tell it never claims, on any seed; the full EKF loses a little of it.
+    assert map_made.ours["invariant-ekf"]["least trace of the pose covariance over the start's"] >= 1.0 - 1e-6
     assert {"paper", "ours", "command"} <= set(map_made.record("made by"))
