@@ -48,6 +48,8 @@ class WholeStudy:
 
     trials: int = 20
     """Runs in each cell of the campaign and of each study; ten times as many of heading's short rings."""
+    first_seed: int = 1
+    """The seed of the first run of each."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/study")
@@ -56,23 +58,34 @@ class WholeStudy:
     def parts(self) -> list[Part]:
         """Return the studies in their order."""
         at, trials, jobs = str(self.out), str(self.trials), ("--jobs", str(self.jobs))
+        first = ("--first-seed", str(self.first_seed))
         cli = "experiments.commands.cli"
-        bias = ("studies.consistency.bias", "--strategies", "nearest-robot", "nearest-start", "--seeds", trials, *jobs)
+        bias = (
+            "studies.consistency.bias",
+            "--strategies",
+            "nearest-robot",
+            "nearest-start",
+            "--seeds",
+            trials,
+            *first,
+            *jobs,
+        )
         return [
             Part("campaign", "The campaign",
-                 (cli, "compare", "--preset", "paper", "--trials", trials, *jobs, "--out", f"{at}/campaign")),
+                 (cli, "compare", "--preset", "paper", "--trials", trials, *first, *jobs, "--out", f"{at}/campaign")),
             Part("bias", "Biased wheels and ranges, with the true association", (*bias, "--out", f"{at}/bias.jsonl")),
             Part("bias-own", "Biased wheels and ranges, each back end matches for itself",
                  (*bias, "--association", "own", "--out", f"{at}/bias-own.jsonl")),
             Part("heading", "Heading error and length of the loop",
-                 ("studies.consistency.heading", "--seeds", trials, *jobs, "--out", f"{at}/heading.jsonl",
+                 ("studies.consistency.heading", "--seeds", trials, *first, *jobs, "--out", f"{at}/heading.jsonl",
                   "--picture", f"{at}/heading.png"), (("heading.png", "Pose ANEES by ring and heading error"),)),
             Part("strategies", "How far each strategy drives",
-                 ("studies.exploration.strategies", "--seeds", trials, *jobs, "--out", f"{at}/strategies.jsonl")),
+                 ("studies.exploration.strategies", "--seeds", trials, *first, *jobs,
+                  "--out", f"{at}/strategies.jsonl")),
             Part("intervals", "Intervals of distances between corners",
-                 ("studies.consistency.intervals", "--seeds", trials, *jobs, "--out", f"{at}/intervals.jsonl")),
+                 ("studies.consistency.intervals", "--seeds", trials, *first, *jobs, "--out", f"{at}/intervals.jsonl")),
             Part("paper", "The paper's figures",
-                 ("studies.paper.study", "--seeds", trials, *jobs, "--out", f"{at}/paper.jsonl",
+                 ("studies.paper.study", "--seeds", trials, *first, *jobs, "--out", f"{at}/paper.jsonl",
                   "--page", f"{at}/paper.md")),
             Part("figures", "One drive of each of the paper's figures",
                  (cli, "reproduce", "--out", f"{at}/figures"),

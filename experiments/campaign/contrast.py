@@ -12,6 +12,7 @@ from ..artifacts.settings import leaves, nested, record_of, trial_of
 from ..usage import UsageError
 from .comparison import shapes
 from .comparison.comparison import MEASURES, Row, difference, select
+from .comparison.families import in_family
 from .comparison.tables import trial_row
 from .merge import agree, in_order, union
 from .plan import Trial, trials
@@ -120,4 +121,4 @@ def _differences(first: Sequence[Row], second: Sequence[Row]) -> list[Row]:
         names = {"backend": backend, "mode": mode, "association": association}
         pair = (select(second, **names), select(first, **names))
         found.append(names | difference(*pair, measure))
-    return found
+    return in_family(found)

@@ -31,7 +31,7 @@ from slam.geometry.poses import to_world
 
 from ..runner.command import run_study
 from ..runner.faults import Fault, faulty
-from ..runner.scores import Key, Scores, bootstrap, fill
+from ..runner.scores import Key, Scores, fill, interval_words
 
 KEY = ("world", "strategy", "fault", "size", "association", "backend", "seed")
 SCORES = ("pose_anees", "map_anees", "ate_cm", "walls_cm", "shape_cm", "duplicate_lines", "false_matches")
@@ -50,7 +50,9 @@ class BiasStudy:
     strategies: tuple[str, ...] = ("nearest-robot",)
     """Exploration strategies."""
     seeds: int = 20
-    """Recordings, with seeds 1 to this."""
+    """Recordings."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     backends: tuple[str, ...] = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf")
     """The estimators."""
     faults: tuple[Kind, ...] = ("wheel-scale", "heading", "range", "range-noise")
@@ -82,7 +84,7 @@ class BiasStudy:
             choose("back end", name, BACKENDS)
         for strategy in self.strategies:
             strategy_of(strategy)
-        kinds, seeds = self.chosen, range(1, self.seeds + 1)
+        kinds, seeds = self.chosen, range(self.first_seed, self.first_seed + self.seeds)
         tasks = {
             (strategy, seed): [self.key(strategy, fault, n, seed) for fault in kinds for n in self.backends]
             for strategy in self.strategies
@@ -126,8 +128,7 @@ def ratio(first: Float[np.ndarray, " r"], second: Float[np.ndarray, " r"]) -> st
     if not (np.all(first > 0.0) and np.all(second > 0.0)):
         return ""
     logs = np.log(first / second)
-    low, high = np.exp(bootstrap(logs))
-    return f"{np.exp(logs.mean()):.2f} ({low:.2f} to {high:.2f})"
+    return f"{np.exp(logs.mean()):.2f} {interval_words(logs, 2, is_log=True)}"
 
 
 def rows_of(study: BiasStudy, task: tuple[str, int]) -> dict[Key, Scores]:

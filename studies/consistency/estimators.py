@@ -2,7 +2,7 @@
 
 Each seed is explored once with `--driver`; the recording then goes through every back end from every start covariance,
 with the truth in place of extraction and association or not. Seeds are the samples (steps of one run are nearly one
-draw): intervals are bootstrapped over runs.
+draw): intervals are over runs.
 """
 
 import functools
@@ -34,7 +34,9 @@ class EstimatorStudy:
     world: str = "paper-fig8"
     """A bundled world or a file."""
     seeds: int = 100
-    """Recordings, with seeds 1 to this."""
+    """Recordings."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     backends: tuple[str, ...] = tuple(BACKENDS)
     """The estimators."""
     p0: tuple[P0, ...] = ("small",)
@@ -64,7 +66,7 @@ class EstimatorStudy:
             raise UsageError(
                 f"expected --told-noise above 0, and 1 without --association true, found {self.told_noise}: change it"
             )
-        seeds = range(1, self.seeds + 1)
+        seeds = range(self.first_seed, self.first_seed + self.seeds)
         tasks = {seed: [self.key(p0, name, seed) for p0 in self.p0 for name in self.backends] for seed in seeds}
         found = fill(self.out, (KEY, SCORES), tasks, functools.partial(rows_of, self), self.jobs)
         extraction = "stated noise" if self.perfect_extraction else "real extraction"

@@ -26,7 +26,7 @@ from ..exploration.ring_worlds import LEAST_M, ring_world
 from ..runner.command import run_study
 from ..runner.explored import explored
 from ..runner.rows import Key, Row, key_of, read, rows_of
-from ..runner.scores import bootstrap
+from ..runner.scores import interval_words
 
 NAMES = ("length_m", "heading_deg", "p0", "strategy", "backend", "seed", "way")
 KINDS: dict[str, Literal["png", "svg", "pdf"]] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
@@ -60,7 +60,9 @@ class HeadingStudy:
     p0: P0 = "small"
     """Covariance of the start."""
     seeds: int = 10
-    """Rings of each kind, with seeds 1 to this."""
+    """Rings of each kind."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     jobs: int = 1
     """Number of processes."""
     out: Path = Path("results/heading.jsonl")
@@ -90,7 +92,11 @@ class HeadingStudy:
     def rings(self) -> list[Ring]:
         """Return the runs, seed by seed, so that what is there is balanced."""
         kinds = itertools.product(
-            range(1, self.seeds + 1), self.length_m, self.heading_deg, self.strategies, self.backends
+            range(self.first_seed, self.first_seed + self.seeds),
+            self.length_m,
+            self.heading_deg,
+            self.strategies,
+            self.backends,
         )
         return [Ring(length, heading, strategy, name, seed) for seed, length, heading, strategy, name in kinds]
 
@@ -150,11 +156,10 @@ def told(runs: Sequence[Row]) -> str:
     anees, off = _values(runs, "pose_anees"), _values(runs, "heading_error_deg")
     if not len(anees):
         return f"{len(runs)} runs, none could be scored"
-    low, high = bootstrap(anees)
     closed = sum(run["contours_closed"] == run["contours_reachable"] for run in runs)
     doubles, returns = _values(runs, "double_entries"), _values(runs, "returns")
     means = ", ".join(f"{values.mean():.1f}" if len(values) else "-" for values in (doubles, returns))
-    words = f"{np.median(anees):.2f}, {anees.mean():.2f} ({low:.2f} to {high:.2f}); {np.median(off):.2f}; {means}"
+    words = f"{np.median(anees):.2f}, {anees.mean():.2f} {interval_words(anees, 2)}; {np.median(off):.2f}; {means}"
     return f"{words}; {closed} of {len(runs)}"
 
 

@@ -42,7 +42,9 @@ class CauseStudy:
     backend: str = "invariant-ekf"
     """The estimator that drives and that is replayed."""
     seeds: int = 60
-    """Drives, with seeds 1 to this."""
+    """Drives."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/interval-causes.jsonl")
@@ -52,7 +54,8 @@ class CauseStudy:
         """Run what is to be run and print the table; raises UsageError."""
         check(TrialConfig(self.world, self.backend))
         tasks = [
-            (seed, [(self.world, self.backend, seed, stage) for stage in STAGES]) for seed in range(1, self.seeds + 1)
+            (seed, [(self.world, self.backend, seed, stage) for stage in STAGES])
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
         ]
         rows = list(rows_of(self.out, NAMES, tasks, partial(_replays_of, self.world, self.backend), self.jobs))
         plain_console(width=120).print(table(rows))

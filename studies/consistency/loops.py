@@ -40,7 +40,9 @@ class LoopStudy:
     p0: P0 = "small"
     """Covariance of the start."""
     seeds: int = 100
-    """Rings of each kind, with seeds 1 to this."""
+    """Rings of each kind."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     jobs: int = 2
     """Number of processes."""
     out: Path = Path("results/loops.jsonl")
@@ -51,7 +53,7 @@ class LoopStudy:
         for name in self.backends:
             choose("back end", name, BACKENDS)
         choose("start covariance (--p0)", self.p0, P0_SIGMAS)
-        seeds = range(1, self.seeds + 1)
+        seeds = range(self.first_seed, self.first_seed + self.seeds)
         kinds = [Loop(*numbers) for numbers in itertools.product(self.length_m, self.heading_deg, self.gap_m)]
         for loop in kinds:
             if loop.length_m < 20.0 or loop.heading_deg <= 0.0 or not 0.0 <= loop.gap_m < loop.length_m:

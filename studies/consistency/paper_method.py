@@ -49,7 +49,9 @@ class PaperMethodStudy:
     methods: tuple[str, ...] = tuple(METHODS)
     """Which of them."""
     seeds: int = 20
-    """Trials of each method, with seeds 1 to this."""
+    """Trials of each method."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     max_steps: int = 600
     """A run is stopped after this many scans: half as many again as today's mapper takes."""
     jobs: int = 1
@@ -62,7 +64,7 @@ class PaperMethodStudy:
         common = {"world": self.world, "max_steps": self.max_steps}
         return {
             (name, seed): trial_of(METHODS[name], common | {"seed": seed})
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for name in self.methods
         }
 

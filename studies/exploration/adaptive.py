@@ -47,7 +47,9 @@ class AdaptiveStudy:
     p0: tuple[P0, ...] = ("small",)
     """Covariances of the start."""
     seeds: int = 10
-    """Trials for each, with seeds 1 to this."""
+    """Trials for each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     metres: float = 60.0
     """So far each robot drives, unless it has finished before; then its last state counts."""
     against: str = "full-ekf"
@@ -63,7 +65,7 @@ class AdaptiveStudy:
         """Return the trials, seed by seed, so that what is there is balanced."""
         return [
             TrialConfig(world, backend, strategy, seed, p0, max_path_m=self.metres)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for world in self.worlds
             for p0 in self.p0
             for backend in self.backends
@@ -126,10 +128,11 @@ def comparison_table(rows: Sequence[Row], first: Contender, others: Sequence[Con
             if found is None:
                 cells.append("-")
                 continue
-            numbers = np.array([found.mean, found.low, found.high])
-            mean, low, high = np.exp(numbers) if key in RATIOS else numbers
             sign, digits = ("x", 2) if key in RATIOS else ("", 3 if key == "coverage" else 2)
-            cells.append(f"{sign}{mean:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}), {found.runs}")
+            numbers = [found.mean] if found.low is None or found.high is None else [found.mean, found.low, found.high]
+            mean, *ends = (f"{x:.{digits}f}" for x in (np.exp(numbers) if key in RATIOS else numbers))
+            within = f" ({' to '.join(ends)})" if ends else ""
+            cells.append(f"{sign}{mean}{within}, {found.runs}")
         shown.add_row(", ".join(other), *cells)
     return shown
 

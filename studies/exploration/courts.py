@@ -28,7 +28,9 @@ class CourtsStudy:
     buildings: int = 10
     """How many; the building of a number is always the same."""
     seeds: int = 5
-    """Runs in each building, with seeds 1 to this; all buildings have one seed before any has the next."""
+    """Runs in each building; all buildings have one seed before any has the next."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     backends: tuple[str, ...] = ("invariant-ekf",)
     """The estimators."""
     max_steps: int = 3000
@@ -47,7 +49,7 @@ class CourtsStudy:
             file.write_text(json.dumps(court(k)))
         return [
             TrialConfig(str(file), backend, seed=seed, max_steps=self.max_steps)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for file in files
             for backend in self.backends
         ]

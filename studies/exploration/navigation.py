@@ -32,7 +32,9 @@ class NavigationStudy:
     strategies: tuple[str, ...] = tuple(STRATEGIES)
     """Names or schedules, for the worlds; plans are explored by the first."""
     seeds: int = 20
-    """Trials for each world and strategy, with seeds 1 to this."""
+    """Trials for each world and strategy."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     errorless: bool = False
     """Exact ranges and wheels in the worlds, too."""
     plans: Path | None = None
@@ -52,7 +54,7 @@ class NavigationStudy:
         """Return the trials, seed by seed, each with every navigation; raises UsageError for a folder without plans."""
         found = [
             TrialConfig(world, strategy=strategy, seed=seed, errorless=self.errorless, max_steps=self.max_steps)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for world in self.worlds
             for strategy in self.strategies
         ]

@@ -16,6 +16,7 @@ from rich.table import Table
 from experiments.scenario import Scenario, TrialConfig, build
 from experiments.scoring.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
 from experiments.scoring.records import Log
+from experiments.scoring.statistics import estimate, paired
 from experiments.scoring.swept import Floor, visible_floor
 from experiments.scoring.truth import truth_of
 from experiments.terminal.console import plain_console
@@ -39,7 +40,6 @@ SCORES = (
 KEYS = ("world", "strategy", "seed", "errorless")
 LENGTHS = tuple(f"{what}_{share:g}_m" for what in ("contour", "floor") for share in SHARES)
 BASELINE = "nearest-robot"
-FEWEST_PAIRS = 5
 
 
 @dataclass
@@ -107,7 +107,9 @@ class StrategyStudy:
     strategies: tuple[str, ...] = tuple(STRATEGIES)
     """Names or schedules."""
     seeds: int = 20
-    """Trials for each, with seeds 1 to this."""
+    """Trials for each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     errorless: bool = False
     """Exact ranges and wheels."""
     jobs: int = 1
@@ -121,7 +123,7 @@ class StrategyStudy:
         """Return the trials, seed by seed, so that what is there is balanced."""
         return [
             TrialConfig(world, strategy=strategy, seed=seed, errorless=self.errorless)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for world in self.worlds
             for strategy in self.strategies
         ]
@@ -132,32 +134,28 @@ class StrategyStudy:
         print_report(rows, plain_console(width=160))
 
 
-def ratio(
-    rows: Sequence[Row], strategy: str, column: str, draws: int = 2000
-) -> tuple[dict[str, float], float, float, float]:
-    """Return the ratio of mean lengths to the baseline's in each world, and their geometric mean with its interval.
+def ratio(rows: Sequence[Row], strategy: str, column: str) -> tuple[dict[str, float], float, float, float]:
+    """Return the geometric mean of the ratios of lengths to the baseline's, in each world and over all pairs.
 
-    Only seeds that both have reached count. The 95 % interval resamples the pairs within each world; the worlds stay.
-    It is NaN where a world has fewer than five pairs.
+    Only seeds that both have reached count. Then the ends of the 95 % interval over all, by run, these worlds being
+    given: NaN for fewer than five pairs.
     """
-    lengths = {(row["world"], row["strategy"], row["seed"]): row.get(column) for row in rows}
-    pairs: dict[str, list[tuple[float, float]]] = {}
-    for (world, name, seed), length in lengths.items():
-        base = lengths.get((world, BASELINE, seed))
-        if name == strategy and length is not None and base is not None:
-            pairs.setdefault(world, []).append((length, base))
-    if not pairs:
+    logs = {
+        name: {
+            (row["world"], row["seed"]): float(np.log(row[column]))
+            for row in rows
+            if row["strategy"] == name and row.get(column) is not None
+        }
+        for name in (strategy, BASELINE)
+    }
+    pairs = paired(logs[strategy], logs[BASELINE])
+    found = estimate(pairs)
+    if found is None:
         return {}, np.nan, np.nan, np.nan
-    rng, drawn = np.random.default_rng(0), []
-    for values in map(np.array, pairs.values()):
-        picks = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
-        drawn.append(np.log(picks[:, 0] / picks[:, 1]))
-    means = {world: float(np.divide(*np.mean(found, axis=0))) for world, found in pairs.items()}
-    mean = float(np.exp(np.mean(np.log(list(means.values())))))
-    if min(map(len, pairs.values())) < FEWEST_PAIRS:
-        return means, mean, np.nan, np.nan
-    low, high = np.exp(np.quantile(np.mean(drawn, axis=0), [0.025, 0.975]))
-    return means, mean, float(low), float(high)
+    worlds = dict.fromkeys(world for world, _ in pairs)
+    means = {name: float(np.exp(np.mean([x for (world, _), x in pairs.items() if world == name]))) for name in worlds}
+    ends = [np.nan if end is None else float(np.exp(end)) for end in (found.low, found.high)]
+    return means, float(np.exp(found.mean)), ends[0], ends[1]
 
 
 def print_report(rows: Sequence[Row], console: Console) -> None:

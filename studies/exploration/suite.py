@@ -34,7 +34,9 @@ class Suite:
     named: str = "*"
     """Which files of the folder, as the shell would write it."""
     seeds: int = 1
-    """Trials for each world, with seeds 1 to this."""
+    """Trials for each world."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     backend: str = "full-ekf"
     """The estimator."""
     strategy: str = "nearest-robot"
@@ -71,7 +73,7 @@ class Suite:
             TrialConfig, backend=self.backend, strategy=self.strategy, p0=self.p0, errorless=self.errorless,
             max_steps=self.max_steps, max_path_m=self.max_path_m, robot=replace(robot, wheels=wheels),
         )  # fmt: skip
-        return [one(name, seed=seed) for name in names for seed in range(1, self.seeds + 1)]
+        return [one(name, seed=seed) for name in names for seed in range(self.first_seed, self.first_seed + self.seeds)]
 
     def run(self) -> None:
         """Run the suite and print its table."""

@@ -41,7 +41,9 @@ class MatchedStudy:
     backends: tuple[str, ...] = ("invariant-ekf",)
     """The estimators; each drives."""
     seeds: int = 20
-    """Runs of each, with seeds 1 to this."""
+    """Runs of each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     jobs: int = 1
     """Number of processes."""
     out: Path = Path("studies/logs/matched_drives.jsonl")
@@ -51,7 +53,7 @@ class MatchedStudy:
         """Run what is to be run and print the table; raises UsageError."""
         keys = [
             (world, backend, odometry, seed)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for world in self.worlds
             for backend in self.backends
             for odometry in SOURCES

@@ -57,7 +57,9 @@ class SurveyStudy:
     bows: tuple[float, ...] = (0.0, 0.02)
     """How far corners of walls are off their line, sigma in metres; 0 for walls drawn with a ruler."""
     seeds: int = 10
-    """Runs of each, with seeds 1 to this."""
+    """Runs of each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     jobs: int = 1
     """Number of processes."""
     out: Path = Path("studies/logs/surveys.jsonl")
@@ -67,7 +69,12 @@ class SurveyStudy:
         """Run what is to be run and print the table; raises UsageError."""
         for world in self.worlds:
             check(TrialConfig(world))
-        keys = [(world, bow, seed) for seed in range(1, self.seeds + 1) for world in self.worlds for bow in self.bows]
+        keys = [
+            (world, bow, seed)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
+            for world in self.worlds
+            for bow in self.bows
+        ]
         rows = list(rows_of(self.out, NAMES, [(key, [key]) for key in keys], _one, self.jobs))
         plain_console(width=170).print(table(rows))
 

@@ -51,7 +51,9 @@ class BodiesStudy:
     backend: str = "full-ekf"
     """The estimator."""
     seeds: int = 5
-    """Runs of each, with seeds 1 to this."""
+    """Runs of each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     max_steps: int = 2500
     """A run is stopped after this many scans."""
     jobs: int = 1
@@ -67,7 +69,7 @@ class BodiesStudy:
             check(self.trial(PAPER, world, 1))
             loaded = load_world(world)
             fitting = [case for case, robot in CASES.items() if fits(loaded, robot.radius_m)]
-            seeds = range(1, self.seeds + 1)
+            seeds = range(self.first_seed, self.first_seed + self.seeds)
             keys += [(case, world, self.backend, seed, self.max_steps) for seed in seeds for case in fitting]
         tasks = [(key[:2] + key[3:4], [(key[0], Path(key[1]).stem, *key[2:])]) for key in keys]
         rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, self), self.jobs))

@@ -53,7 +53,9 @@ class BumpsStudy:
     bump_deg: float = 8.0
     """How far it turns the robot."""
     seeds: int = 5
-    """Runs of each, with seeds 1 to this."""
+    """Runs of each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     max_steps: int = 1500
     """A run is stopped after this many scans."""
     jobs: int = 1
@@ -68,7 +70,7 @@ class BumpsStudy:
         check(self.trial(self.beams[0], 1))
         tasks = [
             ((beams, seed), [(beams, self.world, self.backend, seed, self.max_steps, self.share, self.bump_deg)])
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for beams in self.beams
         ]
         rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, self), self.jobs, self.any_code))

@@ -74,7 +74,9 @@ class ScannersStudy:
     backend: str = "full-ekf"
     """The estimator."""
     seeds: int = 5
-    """Runs of each, with seeds 1 to this."""
+    """Runs of each."""
+    first_seed: int = 1
+    """The seed of the first; the others follow it."""
     max_steps: int = 1500
     """A run is stopped after this many scans."""
     jobs: int = 1
@@ -87,7 +89,7 @@ class ScannersStudy:
         check(self.trial("180 beams", 1))
         keys = [
             (name, self.world, self.backend, seed, self.max_steps)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
             for name in cases()
         ]
         tasks = [((key[0], key[3]), [key]) for key in keys]

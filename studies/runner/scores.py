@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
+from experiments.scoring.statistics import mean_interval
 from experiments.terminal.console import plain_console
 
 from .rows import Row, key_of, rows_of
@@ -46,11 +47,16 @@ def _rows(
     return [dict(zip((*names, *scores), (*key, *values), strict=True)) for key, values in run(task).items()]
 
 
-def bootstrap(values: Float[np.ndarray, " n"], draws: int = 2000, seed: int = 0) -> tuple[float, float]:
-    """Return the 95 % interval of the mean, by resampling whole runs."""
-    rng = np.random.default_rng(seed)
-    means = rng.choice(values, (draws, len(values))).mean(axis=1)
-    return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
+def interval_words(values: Float[np.ndarray, " n"], digits: int = 3, is_log: bool = False) -> str:
+    """Return the 95 % interval of the mean over runs in brackets, of `is_log` values their exponentials'.
+
+    Fewer than five runs have none.
+    """
+    ends = mean_interval(values)
+    if ends is None:
+        return f"({len(values)} runs: no interval)"
+    low, high = np.exp(ends) if is_log else ends
+    return f"({low:.{digits}f} to {high:.{digits}f})"
 
 
 def show(title: str, runs: Mapping[str, Float[np.ndarray, "r c"]], scores: Sequence[str]) -> None:
@@ -64,5 +70,4 @@ def show(title: str, runs: Mapping[str, Float[np.ndarray, "r c"]], scores: Seque
 
 
 def _summary(values: Float[np.ndarray, " n"]) -> str:
-    low, high = bootstrap(values)
-    return f"{values.mean():.3f} ({low:.3f} to {high:.3f}), {np.median(values):.3f}"
+    return f"{values.mean():.3f} {interval_words(values)}, {np.median(values):.3f}"

@@ -73,7 +73,7 @@ def test_a_map_has_a_field_for_each_strategy_and_back_end_and_is_drawn_from_rows
     assert len(ran) == len(set(ran)) == 8
     assert ran[0] == ("nearest-robot", "full-ekf", 1, "ring-30-1")
     found = capsys.readouterr().out
-    assert "graph, adaptive, 30 m, 4: 7.00, 7.00 (7.00 to 7.00); 0.50; 1.0, 3.0; 2 of 2" in found
+    assert "graph, adaptive, 30 m, 4: 7.00, 7.00 (1 runs: no interval); 0.50; 1.0, 3.0; 2 of 2" in found
     assert (tmp_path / "map.svg").read_bytes().startswith(b"<?xml")
     replace(study, only_report=True, seeds=10).run()
     assert len(ran) == 8

@@ -18,6 +18,7 @@ from experiments.replays.replay import ReplayOptions, replay
 from experiments.reproductions.runs.origin import ShiftedOrigin
 from experiments.reproductions.runs.standing import slope, stand
 from experiments.scenario import TrialConfig, drawn_start
+from experiments.scoring.statistics import mean_interval
 from experiments.trial import run_trial
 from experiments.usage import UsageError
 from slam.backends import BACKENDS
@@ -29,7 +30,6 @@ from studies.consistency.existence import ExistenceStudy, Looks, counted, seen_l
 from studies.consistency.extraction import PLANS, ExtractionStudy, worlds
 from studies.consistency.loops import LoopStudy
 from studies.runner.faults import Fault, faulty
-from studies.runner.scores import bootstrap
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 
@@ -141,9 +141,8 @@ def mean_anees(told, loops=16):
 def test_the_study_has_teeth():
     """A filter that is told half of the noise is rejected by its interval, and one that is told all of it is not."""
     honest, fooled = mean_anees(1.0), mean_anees(0.5)
-    print(f"told all {honest.mean():.2f} {bootstrap(honest)}, told half {fooled.mean():.2f} {bootstrap(fooled)}")
-    assert bootstrap(fooled)[0] > 1.15
-    low, high = bootstrap(honest)
+    assert mean_interval(fooled)[0] > 1.15
+    low, high = mean_interval(honest)
     assert low < 1.15
     assert high > 0.85
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...scoring.statistics import estimate, paired, share_better
 from ..plan import CLOSED, Campaign
+from .families import in_family
 
 Row = dict[str, Any]
 Runs = dict[tuple[str, int], float]
@@ -69,9 +70,9 @@ def compare(campaign: Campaign, trials: Sequence[Row], marks: Sequence[Row], ban
         "counts": _counts(trials),
         "pooled": _pooled(campaign, trials, cells),
         "cells": cells,
-        "backends": list(_backends(campaign, trials)),
-        "strategies": list(_strategies(campaign, trials)),
-        "interaction": list(_interaction(campaign, trials)),
+        "backends": in_family(_backends(campaign, trials)),
+        "strategies": in_family(_strategies(campaign, trials)),
+        "interaction": in_family(_interaction(campaign, trials)),
         "marks": _marks(marks),
     }
 
@@ -114,13 +115,12 @@ def _told(differences: Runs, measure: Measure) -> dict[str, Any]:
     if found is None:
         return {"value": None, "low": None, "high": None, "runs": 0}
     of: Callable[[float], float] = math.exp if measure.is_ratio else float
-    ends = {"low_buildings": found.low_buildings, "high_buildings": found.high_buildings}
+    ends = {name: getattr(found, name) for name in ("low", "high", "low_buildings", "high_buildings")}
     return {
         "value": of(found.mean),
-        "low": of(found.low),
-        "high": of(found.high),
         **{name: None if end is None else of(end) for name, end in ends.items()},
         "effect_size": found.effect_size,
+        "p": found.p,
         "runs": found.runs,
     }
 

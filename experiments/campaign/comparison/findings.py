@@ -112,7 +112,7 @@ def _doubles(row: Row) -> tuple[Row, bool | None]:
 
 def _inside(estimate: Row | None, aim: tuple[float, float]) -> bool | None:
     """Return whether an interval lies within the aim; None where partly, or of few runs: more would tell."""
-    if estimate is None or estimate["runs"] < FEW_RUNS:
+    if estimate is None or estimate["runs"] < FEW_RUNS or estimate["low"] is None:
         return None
     if aim[0] <= estimate["low"] and estimate["high"] <= aim[1]:
         return True

@@ -13,13 +13,17 @@ ENDS = OneOf(
     {"low_buildings?": float, "high_buildings?": float},
     {"low_buildings?": Word(None), "high_buildings?": Word(None)},
 )
-ESTIMATE: Shape = All({"mean": float, "low": float, "high": float, "runs": int, "effect_size": NUMBER}, ENDS)
+WITHIN = OneOf({"low": float, "high": float}, {"low": Word(None), "high": Word(None)})
+"""An interval by run; fewer than five runs have none."""
+ESTIMATE: Shape = All({"mean": float, "runs": int, "effect_size": NUMBER}, WITHIN, ENDS)
 TOLD: Shape = All(
     OneOf(
-        {"value": float, "low": float, "high": float, "runs": int, "effect_size?": NUMBER},
-        {"value": Word(None), "low": Word(None), "high": Word(None), "runs": Word(0)},
+        {"value": float, "runs": int, "effect_size?": NUMBER, "p?": NUMBER},
+        {"value": Word(None), "runs": Word(0)},
     ),
+    WITHIN,
     ENDS,
+    {"p_holm?": NUMBER, "family?": int},
     {"measure": Word(*MEASURE_WORDS), "pairs_without_value": int},
 )
 DIFFERENCE: Shape = All(TOLD, {"kind": Word("ratio", "difference"), "first_better": NUMBER})
@@ -37,7 +41,7 @@ _AT_A_MARK = {
     "baseline": STATES,
     **dict.fromkeys(
         ("wall_rmse_m", "wall_shape_m", "pose_error_m", "pose_anees_so_far", "uncovered"),
-        OneOf({"value": float, "low": float, "high": float, "runs": int}, {"value": Word(None), "low": Word(None)}),
+        All(OneOf({"value": float, "runs": int}, {"value": Word(None)}), WITHIN),
     ),
 }
 FOUND: dict[str, Shape] = {

@@ -167,7 +167,7 @@ def _honesty(ratio: dict[str, Any]) -> str:
     if ratio["value"] is None:
         return "How well each knows its own error cannot be told."
     words = f"he NEES of its pose is {_times(ratio)} that of the other."
-    if ratio["runs"] > 1 and ratio["low"] > 1.0:
+    if ratio["low"] is not None and ratio["low"] > 1.0:
         return f"The strategy does not mend what it says of itself: t{words}"
     return f"T{words}"
 

@@ -182,7 +182,7 @@ def band_scores(records: Sequence[TrialScores], steps: Sequence[Row]) -> Row:
     low, high = pooled_band(runs, 3) if runs else (None, None)
     return {
         "steps_outside_band": float(np.mean(outside)) if outside else None,
-        "pooled_anees": float(np.concatenate(runs).mean()) / 3.0 if runs else None,
+        "pooled_anees": float(np.mean([run.mean() for run in runs])) / 3.0 if runs else None,
         "pooled_low": low,
         "pooled_high": high,
     }

@@ -26,14 +26,14 @@ SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps")
 
 
 def interval(found: dict[str, Any], scale: float = 1.0, digits: int = 3) -> str:
-    """Return the interval by run, and that by building where there is one; one run has none."""
-    if found["low"] is None or found["runs"] < 2:
-        return NONE
-    words = " to ".join(number(scale * found[end], digits) for end in ("low", "high"))
-    if found.get("low_buildings") is not None:
-        wide = " to ".join(number(scale * found[end], digits) for end in ("low_buildings", "high_buildings"))
-        words += f"; for other buildings {wide}"
-    return words
+    """Return the interval by run and that by building, where there are such; few runs have none."""
+    kinds = (("", ("low", "high")), ("for other buildings ", ("low_buildings", "high_buildings")))
+    words = [
+        what + " to ".join(number(scale * found[end], digits) for end in ends)
+        for what, ends in kinds
+        if found.get(ends[0]) is not None
+    ]
+    return "; ".join(words) or NONE
 
 
 def within(value: str, found: dict[str, Any], scale: float = 1.0, more: str = "") -> str:

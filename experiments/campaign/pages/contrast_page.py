@@ -10,6 +10,7 @@ from viz.reports.report import Page, PageTable, Section
 from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import NONE, digits_apart, number
 from ..comparison.comparison import Row, arm_of
+from ..comparison.families import family_words, is_clear
 from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, interval
 from ..contrast import TRIALS, read_contrast
 
@@ -49,12 +50,12 @@ def verdict(said: dict[str, Any]) -> tuple[str, ...]:
         return (f"No: all {count['shared']} trials that both have came out the same, timings excepted.",)
     told = [row for row in said["differences"] if row["value"] is not None]
     firm = [row for row in told if row["runs"] >= FEW_RUNS]
-    clear = [row for row in firm if _is_clear(row)]
+    clear = [row for row in firm if is_clear(row)]
     first = f"Yes: {count['different']} of {count['shared']} trials that both have came out differently."
     if firm:
         first += (
-            f" Of {len(firm)} means, {len(clear)} changed by more than chance (95 % interval); by chance alone"
-            f" {number(0.05 * len(firm), 2)} would."
+            f" Of {len(firm)} means, {len(clear)} changed by more than chance (p below 0.05 after Holm's correction for"
+            " all of them)."
         )
     if len(firm) < len(told):
         first += f" {len(told) - len(firm)} means of fewer than {FEW_RUNS} runs cannot be told from chance."
@@ -69,18 +70,14 @@ def _in_words(row: Row) -> str:
 
 def _value(row: Row) -> tuple[str, str]:
     """Return a difference and its interval, with as many digits as tell them from none."""
-    digits = digits_apart([row["value"], row["low"], row["high"], _none(row)])
+    told = [row[name] for name in ("value", "low", "high") if row[name] is not None]
+    digits = digits_apart([*told, _none(row)])
     return number(row["value"], digits), interval(row, digits=digits)
 
 
 def _none(row: Row) -> float:
     """Return what no difference is."""
     return 1.0 if row["kind"] == "ratio" else 0.0
-
-
-def _is_clear(row: Row) -> bool:
-    """Return whether a difference is more than chance; what fewer than FEW_RUNS runs show never is."""
-    return bool(row["runs"] >= FEW_RUNS and (row["low"] > _none(row) or row["high"] < _none(row)))
 
 
 def _size(row: Row) -> float:
@@ -118,12 +115,12 @@ def _differences(rows: Sequence[Row]) -> PageTable:
         (
             row["backend"], ARMS_SHORT[arm_of(row)], MEASURE_WORDS[row["measure"]], row["kind"], *_value(row),
             number(row.get("effect_size"), 2), number(row["runs"]),
-            number(row["pairs_without_value"]), "yes" if _is_clear(row) else "",
+            number(row["pairs_without_value"]), "yes" if is_clear(row) else "",
         )
         for row in rows
         if row["value"] is not None
     )  # fmt: skip
-    note = "Left out: runs that did not complete in both, or for which one has no such value."
+    note = f"Left out: runs that did not complete in both, or for which one has no such value. {family_words(rows)}"
     return PageTable("Second against first", header, told, note)
 
 

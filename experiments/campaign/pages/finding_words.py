@@ -74,8 +74,10 @@ def _doubles(found: Row) -> str:
     if beyond is None:
         return words
     more, side = beyond["mean"] > 0.0, 1.0 if beyond["mean"] > 0.0 else -1.0
-    ends = sorted(side * beyond[end] for end in ("low", "high"))
-    than = f"{'more' if more else 'fewer'} than that ({number(ends[0])} to {number(ends[1])})"
+    than = f"{'more' if more else 'fewer'} than that"
+    if beyond["low"] is not None:
+        ends = sorted(side * beyond[end] for end in ("low", "high"))
+        than += f" ({number(ends[0])} to {number(ends[1])})"
     return f"{words}: {number(side * beyond['mean'])} a run {than}"
 
 

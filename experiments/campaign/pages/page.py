@@ -8,8 +8,8 @@ from typing import Any
 from viz.reports.report import Page, PageTable, Section, filled
 
 from ...artifacts.reading import read_json
-from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import NONE, number, percent
+from ..comparison.families import family_words, is_clear
 from ..comparison.shapes import COMPARISON
 from ..comparison.story import story_of
 from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, command_of, interval, mean, share, within
@@ -69,8 +69,9 @@ _BAND_WORDS = (
     " overconfident.",
 )
 _RATIO_WORDS = (
-    "Paired by run: the same world, start and noise. A ratio above 1 is worse than the full EKF; the interval is that"
-    f" of a bootstrap of whole runs, and too narrow with fewer than {FEW_RUNS}.",
+    "Paired by run: the same world, start and noise. A ratio above 1 is worse than the full EKF. The interval is that"
+    " of a studentised bootstrap of whole runs, and that for other buildings Student's over the buildings' means; fewer"
+    " than five have none.",
 )
 _STRATEGY_WORDS = (
     "Paired by run, against nearest-robot. The interaction tells how much more a back end gains by a strategy than"
@@ -183,17 +184,17 @@ def _differences(rows: Sequence[dict[str, Any]]) -> tuple[PageTable, ...]:
                 for row in kept
             ),
             "Effect size: mean paired difference over its standard deviation. Left out: runs that did not complete with"
-            " both, or for which one has no such value. Better: share of runs; a failure loses.",
+            f" both, or for which one has no such value. Better: share of runs; a failure loses. {family_words(rows)}",
         ),
     )
 
 
-_TOLD_HEADER = ("95 % interval", "effect size", "runs", "left out", "better in %")
+_TOLD_HEADER = ("95 % interval", "effect size", "runs", "left out", "clear", "better in %")
 
 
 def _told(row: dict[str, Any]) -> tuple[str, ...]:
     better = row.get("first_better")
-    counts = (number(row["runs"]), number(row["pairs_without_value"]))
+    counts = (number(row["runs"]), number(row["pairs_without_value"]), "yes" if is_clear(row) else "")
     words = (number(row["value"]), interval(row), number(row.get("effect_size"), 2), *counts)
     return (*words, number(None if better is None else 100 * better))
 
@@ -206,7 +207,8 @@ def _strategies(said: dict[str, Any]) -> PageTable:
     ]
     header = ("strategy", "back end", "measure", "ratio", *_TOLD_HEADER)
     rows = tuple((row["first"], row["backend"], MEASURE_WORDS[row["measure"]], *_told(row)) for row in kept)
-    return PageTable("Strategies against nearest-robot, closed loop", header, rows)
+    note = family_words(said["strategies"])
+    return PageTable("Strategies against nearest-robot, closed loop", header, rows, note)
 
 
 def _interaction(said: dict[str, Any]) -> PageTable:
@@ -217,7 +219,8 @@ def _interaction(said: dict[str, Any]) -> PageTable:
     ]
     header = ("strategy", "back end", "measure", "ratio of ratios", *_TOLD_HEADER[:-1])
     rows = tuple((row["strategy"], row["backend"], MEASURE_WORDS[row["measure"]], *_told(row)[:-1]) for row in kept)
-    return PageTable("Interaction of strategy and back end, closed loop", header, rows)
+    note = family_words(said["interaction"])
+    return PageTable("Interaction of strategy and back end, closed loop", header, rows, note)
 
 
 def marks_table(said: dict[str, Any]) -> PageTable:

@@ -61,7 +61,7 @@ def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:
     """Return the ratios to the full EKF with their intervals, a picture for each measure."""
     pictures = []
     for measure, label in RATIO_LABELS.items():
-        rows = [row for row in said["backends"] if row["measure"] == measure and row["value"] is not None]
+        rows = [row for row in said["backends"] if row["measure"] == measure and row["low"] is not None]
         rows.sort(key=lambda row: row["first"])
         ratios = [Ratio(row["first"], ARMS_SHORT[row["arm"]], row["value"], row["low"], row["high"]) for row in rows]
         if ratios:

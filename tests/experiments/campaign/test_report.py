@@ -179,12 +179,14 @@ def test_numbers_are_short_and_never_in_powers_of_ten():
     assert interval({"low": 0.5, "high": 2.0, "runs": 2}, 100.0) == "50 to 200"
 
 
-def test_one_run_has_no_interval():
-    one = {"low": 0.5, "high": 0.5, "runs": 1}
+def test_few_runs_have_no_interval():
+    one = {"low": None, "high": None, "runs": 4}
     assert interval(one) == "–"
     assert within("0.5", one) == "0.5"
     assert within("0.5", one, more="3 distances") == "0.5 (3 distances)"
-    assert within("0.5", one | {"runs": 2, "high": 0.7}, more="3 distances") == "0.5 (0.5 to 0.7; 3 distances)"
+    assert (
+        within("0.5", one | {"runs": 5, "low": 0.5, "high": 0.7}, more="3 distances") == "0.5 (0.5 to 0.7; 3 distances)"
+    )
 
 
 def pooled(backend, **changes):

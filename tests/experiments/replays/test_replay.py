@@ -19,7 +19,6 @@ from slam.backends.kalman.config import EkfConfig
 from slam.extraction.config import ExtractionConfig
 from slam.geometry.poses import compose, wrap
 from slam.robot import MotionCommand
-from studies.runner.scores import bootstrap
 
 
 @pytest.fixture(scope="module")
@@ -115,14 +114,6 @@ def test_what_is_no_log_gets_one_line_and_status_2(made, tmp_path, capsys):
         assert said.startswith("chainslam: expected")
         assert "\n" not in said
         assert "found" in said
-
-
-def test_the_interval_of_a_mean_holds_it_and_shrinks_with_the_runs():
-    values = np.random.default_rng(5).chisquare(3, 400) / 3
-    low, high = bootstrap(values)
-    few = bootstrap(values[:40])
-    assert low < values.mean() < high
-    assert high - low < few[1] - few[0]
 
 
 @pytest.mark.parametrize("perfect_extraction", [False, True])

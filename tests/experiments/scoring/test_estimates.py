@@ -1,11 +1,10 @@
-"""The numbers of an estimate, against arithmetic by hand and a bootstrap of plain loops."""
-
-from itertools import product
+"""The numbers of an estimate, against arithmetic by hand, scipy, and a bootstrap of plain loops."""
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from experiments.scoring.statistics import FEW_BUILDINGS, estimate, paired, share_better
+from experiments.scoring.statistics import LEAST, estimate, mean_interval, paired, share_better
 
 
 def test_the_mean_the_runs_and_the_effect_size_are_the_plain_ones():
@@ -16,11 +15,28 @@ def test_the_mean_the_runs_and_the_effect_size_are_the_plain_ones():
     assert two.effect_size == pytest.approx(2.0 / 2.0**0.5)
 
 
-def test_one_run_is_its_own_interval_and_has_no_effect_size():
-    found = estimate({("a", 1): 7.0})
-    assert (found.mean, found.low, found.high, found.runs, found.effect_size) == (7.0, 7.0, 7.0, 1, None)
+def test_few_runs_have_neither_interval_nor_test_and_one_no_effect_size():
+    four = estimate({("a", seed): float(seed) for seed in range(LEAST - 1)})
+    assert four.low is four.high is four.low_buildings is four.p is None
+    one = estimate({("a", 1): 7.0})
+    assert (one.mean, one.low, one.runs, one.effect_size) == (7.0, None, 1, None)
     assert estimate({("a", 1): 2.0, ("a", 2): 2.0}).effect_size is None
     assert estimate({}) is None
+    assert mean_interval(np.arange(4.0)) is None
+
+
+def test_a_building_of_one_run_tells_nothing_of_other_runs_there():
+    alone = {(f"b{k}", 1): float(k) for k in range(LEAST)}
+    found = estimate(alone)
+    assert found.low is None
+    assert found.low_buildings is not None
+    assert estimate(alone | {(f"b{k}", 2): k + 0.5 for k in range(LEAST)}).low is not None
+
+
+def test_values_that_are_all_the_same_are_their_own_interval():
+    found = estimate({("a", seed): 3.0 for seed in range(LEAST)})
+    assert (found.mean, found.low, found.high, found.p) == (3.0, 3.0, 3.0, 0.0)
+    assert estimate({("a", seed): 0.0 for seed in range(LEAST)}).p == 1.0
 
 
 def test_the_same_values_give_the_same_interval_and_another_seed_another():
@@ -30,61 +46,61 @@ def test_the_same_values_give_the_same_interval_and_another_seed_another():
     assert estimate(dict(reversed(values.items()))) == estimate(values)
 
 
-@pytest.mark.parametrize(("buildings", "told"), [(FEW_BUILDINGS - 1, False), (FEW_BUILDINGS, True)])
-def test_an_interval_by_building_takes_five_of_them(buildings, told):
-    found = estimate({(f"b{k}", seed): k + 0.1 * seed for k in range(buildings) for seed in range(3)})
-    assert (found.low_buildings is not None) == (found.high_buildings is not None) == told
-    if told:
-        assert found.low_buildings < found.low < found.mean < found.high < found.high_buildings
+def test_by_building_it_is_students_interval_of_the_buildings_means():
+    groups = np.random.default_rng(2).normal(size=(LEAST, 3)) + 5.0
+    found = estimate({(f"b{k}", seed): x for k, group in enumerate(groups) for seed, x in enumerate(group)})
+    expected = stats.t.interval(0.95, LEAST - 1, groups.mean(), stats.sem(groups.mean(axis=1)))
+    assert (found.low_buildings, found.high_buildings) == pytest.approx(expected)
+    assert found.p == pytest.approx(stats.ttest_1samp(groups.mean(axis=1), 0.0).pvalue)
+    assert estimate({(f"b{k}", seed): float(k) for k in range(LEAST - 1) for seed in range(3)}).low_buildings is None
 
 
-def resampled(groups, draws, rng, by_building):
-    """Means of resamples: runs drawn one at a time, each residual widened as a spread over n - 1 asks."""
-    means = []
+def test_over_runs_it_is_welchs_test_of_the_buildings_sum():
+    """Of two buildings of equally many runs the mean is half of the sum: Welch's test of one and minus the other."""
+    one, other = np.random.default_rng(3).normal(size=(2, 8)) * [[1.0], [5.0]]
+    found = estimate({(name, seed): x for name, group in (("a", one), ("b", other)) for seed, x in enumerate(group)})
+    assert found.p == pytest.approx(stats.ttest_ind(one, -other, equal_var=False).pvalue)
+    alone = estimate({("a", seed): x for seed, x in enumerate(one)})
+    assert alone.p == pytest.approx(stats.ttest_1samp(one, 0.0).pvalue)
+
+
+def resampled(groups, draws, rng):
+    """The ends of a studentised bootstrap by plain loops: runs drawn one at a time within each building."""
+    total = sum(map(len, groups))
+
+    def mean_and_error(samples):
+        parts = [np.var(sample, ddof=1) * len(sample) / total**2 for sample in samples]
+        return np.concatenate(samples).mean(), np.sqrt(sum(parts))
+
+    middle, error = mean_and_error(groups)
+    found = []
     for _ in range(draws):
-        drawn = [groups[rng.integers(len(groups))] for _ in groups] if by_building else groups
-        every = []
-        for group in drawn:
-            middle, widen = np.mean(group), np.sqrt(len(group) / max(len(group) - 1, 1))
-            every += [middle + widen * (group[rng.integers(len(group))] - middle) for _ in group]
-        means.append(np.mean(every))
-    values = np.concatenate(groups)
-    return np.quantile(np.clip(means, values.min(), values.max()), [0.025, 0.975])
+        mean, own = mean_and_error([[group[rng.integers(len(group))] for _ in group] for group in groups])
+        found.append((mean - middle) / own if own > 0 else np.copysign(np.inf, mean - middle))
+    low, high = np.quantile(found, [0.025, 0.975], method="inverted_cdf")
+    return middle - high * error, middle - low * error
 
 
-GROUPS = [[0.0, 0.0, 0.0, 9.0], [1.0, 2.0, 30.0], [5.0, 5.5, 6.0, 6.5, 20.0], [3.0, 3.0, 12.0], [8.0, 9.0, 40.0, 41.0]]
+GROUPS = [[0.0, 0.5, 0.0, 9.0, 2.0, 4.0], [1.0, 2.0, 30.0, 4.0, 8.0], [5.0, 5.5, 6.0, 6.5, 20.0]]
+SKEWED = [[0.0, 1.0, 2.0, 0.3, 1.1, 2.5, 0.2, 1.6, 2.1, 40.0]]
 
 
-SKEWED = [[0.0, 1.0, 2.0, 0.0, 1.0, 2.0, 0.0, 1.0, 2.0, 40.0]]
-
-
-@pytest.mark.parametrize(("groups", "by_building"), [(GROUPS, False), (GROUPS, True), (SKEWED, False)])
-def test_an_interval_is_that_of_runs_drawn_one_at_a_time(groups, by_building):
+@pytest.mark.parametrize("groups", [GROUPS, SKEWED])
+def test_an_interval_is_that_of_runs_drawn_one_at_a_time(groups):
     values = {(f"b{k}", seed): x for k, group in enumerate(groups) for seed, x in enumerate(group)}
     found = estimate(values)
-    low, high = resampled(groups, 4000, np.random.default_rng(7), by_building)
-    ours = (found.low_buildings, found.high_buildings) if by_building else (found.low, found.high)
-    width = high - low
-    # Ends of two bootstraps of 4,000 draws differ by about 2 % of their width; a skewed group shows a mirrored one.
-    assert ours == pytest.approx((low, high), abs=0.06 * width)
+    low, high = resampled(groups, 4000, np.random.default_rng(7))
+    # A skewed group leans the interval to its long side; tails of two bootstraps of 4,000 draws differ by some percent.
+    assert high - found.mean > found.mean - low
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.12 * (high - low))
 
 
-def test_of_two_runs_in_a_building_every_resample_is_known():
-    """Each building's mean is its own, or off by sqrt(2) half differences: 1, 2, 1 of 4 draws."""
-    halves = (1.0, 2.0, 4.0)
-    values = {(f"b{k}", sign): 10.0 + sign * half for k, half in enumerate(halves) for sign in (-1, 1)}
-    shares = ((-1.0, 0.25), (0.0, 0.5), (1.0, 0.25))
-    means = {}
-    for draw in product(shares, repeat=3):
-        off = sum(sign * half * 2.0**0.5 for (sign, _), half in zip(draw, halves, strict=True)) / 3.0
-        means[off] = means.get(off, 0.0) + float(np.prod([share for _, share in draw]))
-    reached = 0.0
-    for off in sorted(means, reverse=True):
-        reached += means[off]
-        if reached > 0.025:
-            break
-    found = estimate(values)
-    assert (found.low, found.high) == pytest.approx((10.0 - off, 10.0 + off))
+def test_values_of_which_most_are_the_same_get_students_ends():
+    """Most resamples have no spread, and so no t of their own."""
+    found = estimate({("a", seed): float(seed == 0) for seed in range(6)})
+    expected = stats.t.interval(0.95, 5, 1.0 / 6.0, stats.sem([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert found.low == pytest.approx(expected[0]) or found.high == pytest.approx(expected[1])
+    assert np.isfinite([found.low, found.high]).all()
 
 
 def test_pairs_are_first_less_second_over_the_runs_of_both():

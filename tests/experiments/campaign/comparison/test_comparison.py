@@ -74,7 +74,6 @@ def test_a_back_end_is_compared_with_the_baseline_and_not_the_other_way_round(sa
         told = found(said["backends"], arm=arm, first=backend, measure=name)
         assert (told["second"], told["kind"], told["runs"]) == ("full-ekf", "ratio", 6)
         assert told["value"] == pytest.approx(times)
-        # Every run has the same ratio, so that all resamples have.
         assert (told["low"], told["high"]) == pytest.approx((times, times))
         assert told["low_buildings"] is told["high_buildings"] is None
         assert told["first_better"] == float(times < 1.0)

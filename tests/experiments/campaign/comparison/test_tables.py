@@ -102,11 +102,10 @@ def test_what_lies_outside_its_band_is_counted_on_both_sides():
     assert none == {"steps_outside_band": None, "pooled_anees": None, "pooled_low": None, "pooled_high": None}
 
 
-def test_the_pooled_anees_is_that_of_all_steps_of_the_runs_that_have_it_throughout():
+def test_the_pooled_anees_is_the_mean_over_the_runs_that_have_it_throughout():
     constant = [run([3.0, 3.0, 3.0]), run([6.0, 6.0]), run([900.0, np.nan]), record()]
     found = band_scores(constant, [])
-    assert found["pooled_anees"] == pytest.approx((3 * 3.0 + 2 * 6.0) / 5 / 3.0)
-    # A constant series is worth one draw, so that two runs are worth two.
+    assert found["pooled_anees"] == pytest.approx((3.0 + 6.0) / 2 / 3.0)
     ends = chi2.ppf([0.025, 0.975], 6) / 6.0
     assert (found["pooled_low"], found["pooled_high"]) == pytest.approx(tuple(ends), rel=1e-9)
 
@@ -208,7 +207,7 @@ def test_the_tables_of_a_campaign_hold_each_trial_once_cell_by_cell(tmp_path):
     ]  # fmt: skip
     said = json.loads((tmp_path / "comparison.json").read_text())
     assert [cell["steps_outside_band"] for cell in said["cells"]] == [1.0, 0.0]
-    assert [cell["pooled_anees"] for cell in said["cells"]] == pytest.approx([10.0, 1.05])
+    assert [cell["pooled_anees"] for cell in said["cells"]] == pytest.approx([9.75, 1.05])
     assert said["hypothesis"] is None
     told = {(f["kind"], f["backend"]): f["arms"]["closed"]["found"] for f in said["findings"]}
     assert told["outside", "block-ekf"] == {"share": 1.0}
