@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -32,6 +32,13 @@ class BackendEntry:
     description: str
     options: type | None = None
     """Type of its options, one of those in `BackendOptions`."""
+    covariance: Literal["exact", "blocks", "bound"] = "exact"
+    """What its covariance is: that of its errors to first order; what is left of it where correlations are dropped; or
+    a bound of it, whatever the correlations are."""
+    is_about_origin: bool = False
+    """Whether its answer depends on where the world's origin lies."""
+    keeps_frame: bool = False
+    """Whether it never learns where the world lies, which no scan tells (docs/estimation.md)."""
 
     def make(
         self,
@@ -54,32 +61,50 @@ def _lazily(module: str, name: str) -> Callable[..., Backend]:
     return make
 
 
-def _filter(module: str, name: str, description: str) -> BackendEntry:
-    return BackendEntry(_lazily(module, name), description, EkfConfig)
+def _filter(module: str, name: str, description: str, **properties: Any) -> BackendEntry:
+    return BackendEntry(_lazily(module, name), description, EkfConfig, **properties)
 
 
 BACKENDS: dict[str, BackendEntry] = {
     "block-ekf": _filter(
-        "block_ekf", "BlockEkf", "the paper's filter: relocation, then fusion, all cross-covariances neglected"
+        "block_ekf",
+        "BlockEkf",
+        "the paper's filter: relocation, then fusion, all cross-covariances neglected",
+        covariance="blocks",
     ),
     "joint-block-ekf": _filter(
-        "joint_block_ekf", "JointBlockEkf", "one joint update a scan, then the cross-covariances dropped"
+        "joint_block_ekf",
+        "JointBlockEkf",
+        "one joint update a scan, then the cross-covariances dropped",
+        covariance="blocks",
     ),
     "relocation-ekf": _filter(
         "relocation_ekf", "RelocationEkf", "relocation, then fusion, with every cross-covariance kept"
     ),
     "full-ekf": _filter("full_ekf", "FullEkf", "EKF with every cross-covariance, one joint update a scan (baseline)"),
     "fej-ekf": _filter(
-        "fej_ekf", "FejEkf", "full EKF with its Jacobians at first estimates: gains nothing unobservable"
+        "fej_ekf",
+        "FejEkf",
+        "full EKF with its Jacobians at first estimates: gains nothing unobservable",
+        keeps_frame=True,
     ),
     "invariant-ekf": _filter(
-        "invariant_ekf", "InvariantEkf", "full EKF with the right-invariant error: gains nothing unobservable"
+        "invariant_ekf",
+        "InvariantEkf",
+        "full EKF with the right-invariant error: gains nothing unobservable",
+        keeps_frame=True,
     ),
     "graph": BackendEntry(
-        _lazily("graph.graph", "Graph"), "factor graph (GTSAM iSAM2): every pose kept and relinearised", GraphConfig
+        _lazily("graph.graph", "Graph"),
+        "factor graph (GTSAM iSAM2): every pose kept and relinearised",
+        GraphConfig,
+        keeps_frame=True,
     ),
     "graph-batch": BackendEntry(
-        _lazily("graph.batch", "GraphBatch"), "as graph, and everything optimised at the end", GraphConfig
+        _lazily("graph.batch", "GraphBatch"),
+        "as graph, and everything optimised at the end",
+        GraphConfig,
+        keeps_frame=True,
     ),
 }
 BUILT_IN = frozenset(BACKENDS)

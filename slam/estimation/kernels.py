@@ -40,7 +40,8 @@ def innovation_rows(
         to_robot += math.sin(means[k, 0]) * (anchors[k, 1] - pose_world[1])
         e[k, 0] = epsilon
         e[k, 1] = r * cosine - t0 * sine - (means[k, 1] + to_robot)
-        nx, ny, here = math.cos(alpha[k]), math.sin(alpha[k]), along(r, t0, epsilon)
+        nx, ny = math.cos(alpha[k]), math.sin(alpha[k])
+        here = along(r, t0, wrapped(lines[k, 0] - (alpha[k] - pose_world[2])))
         H_pose[k, 0, 2] = -1.0
         H_pose[k, 1, 0], H_pose[k, 1, 1], H_pose[k, 1, 2] = -nx, -ny, here
         H_line[k, 0, 0] = H_line[k, 1, 1] = 1.0

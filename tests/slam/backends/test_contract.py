@@ -99,6 +99,9 @@ def test_a_scan_without_matches_changes_nothing(name):
     "world", [np.array([100.0, -100.0, 0.0]), np.array([0.0, 0.0, 2.0]), np.array([70.0, 70.0, -1.0])]
 )
 def test_moving_the_world_moves_the_answer_on_the_same_observations(name, world):
+    if BACKENDS[name].is_about_origin:
+        pytest.skip("equation (4): lines about the world's origin feel where it lies")
+
     def run(world):
         rng = np.random.default_rng(9)
         return journey(name, Room.random(rng), 80, rng, world=world)[0]

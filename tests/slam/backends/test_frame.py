@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from slam.backends import BACKENDS
 from slam.backends.frame import Frame
+from slam.backends.kalman.config import EkfConfig
 from slam.estimation.backend import Joint
 from slam.geometry.poses import compose, inverse, to_world, wrap
 from slam.robot import Odometry
@@ -16,7 +17,7 @@ seeds = st.integers(0, 2**32)
 START, P0 = np.array([0.0, -1.0, 0.3]), np.diag([0.01, 0.01, 0.002]) ** 2
 LOST = np.diag([0.5, 0.5, 0.1]) ** 2
 """What 3 m without a wall in sight cost: half a metre and 6 degrees."""
-EKFS = [name for name in BACKENDS if name.endswith("-ekf")]
+EKFS = [name for name, entry in BACKENDS.items() if entry.options is EkfConfig]
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

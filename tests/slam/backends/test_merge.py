@@ -9,8 +9,6 @@ from slam.geometry.poses import wrap
 from slam.robot import Odometry
 
 pytestmark = pytest.mark.parametrize("name", list(BACKENDS))
-CONSTRAINED_AT_FIRST_SIGHT = {"fej-ekf", "invariant-ekf", "graph", "graph-batch"}
-"""These keep what is unobservable by taking Jacobians elsewhere: equal to the dense algebra to first order only."""
 START, P0 = np.array([12.0, -7.0, 0.4]), np.diag([0.02, 0.02, 0.004]) ** 2
 
 
@@ -59,12 +57,15 @@ def test_merging_is_conditioning_on_equality_and_reports_the_line_about_the_anch
     backend, keep, other, drop = two_of_one_wall(name)
     joint = backend.belief.joint([keep, other, drop])
     mean, cov = conditioned(joint)
+    if BACKENDS[name].covariance == "bound":
+        pytest.skip("a bound has no correlations to condition on")
     backend.merge(keep, drop)
     assert backend.belief.ids.tolist() == [keep, other]
     after = backend.belief.joint([keep, other])
     np.testing.assert_array_equal(after.anchors, joint.anchors[:2])
     sigma = np.sqrt(np.diag(cov)[:7])
-    close = 0.05 if name in CONSTRAINED_AT_FIRST_SIGHT else 1e-4
+    # Who learns nothing of where the world lies takes its Jacobians elsewhere: equal to first order only.
+    close = 0.05 if BACKENDS[name].keeps_frame else 1e-4
     np.testing.assert_allclose((after.mean - mean[:7]) / sigma, 0.0, atol=close)
     np.testing.assert_allclose((after.cov - cov[:7, :7]) / np.outer(sigma, sigma), 0.0, atol=close)
 
@@ -85,7 +86,10 @@ def test_merging_leaves_the_covariance_sound_and_its_volume_smaller(name):
     after = backend.belief.joint([keep, other]).cov
     np.testing.assert_allclose(after, after.T, atol=1e-18)
     assert np.linalg.eigvalsh(after).min() > 0
-    assert np.linalg.slogdet(after)[1] < np.linalg.slogdet(before)[1]
+    if BACKENDS[name].covariance == "bound":  # Two lines that may err alike tell it nothing.
+        assert np.trace(after) < np.trace(before) * (1.0 + 1e-8)
+    else:
+        assert np.linalg.slogdet(after)[1] < np.linalg.slogdet(before)[1]
 
 
 def test_merging_a_line_with_its_twin_again_and_again_stays_sound(name):
