@@ -106,6 +106,11 @@ BACKENDS: dict[str, BackendEntry] = {
         GraphConfig,
         keeps_frame=True,
     ),
+    "textbook-ekf": BackendEntry(
+        _lazily("textbook_ekf", "TextbookEkf"),
+        "full EKF as in textbooks: lines about the world's origin, linearised where the odometry ends",
+        is_about_origin=True,
+    ),
 }
 BUILT_IN = frozenset(BACKENDS)
 """What comes along; other names are a user's own, of which the processes of a campaign are told."""
