@@ -111,6 +111,9 @@ BACKENDS: dict[str, BackendEntry] = {
         "full EKF as in textbooks: lines about the world's origin, linearised where the odometry ends",
         is_about_origin=True,
     ),
+    "iterated-ekf": _filter(
+        "iterated_ekf", "IteratedEkf", "full EKF that linearises each scan again where its own update leads"
+    ),
 }
 BUILT_IN = frozenset(BACKENDS)
 """What comes along; other names are a user's own, of which the processes of a campaign are told."""
