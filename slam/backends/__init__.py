@@ -114,6 +114,12 @@ BACKENDS: dict[str, BackendEntry] = {
     "iterated-ekf": _filter(
         "iterated_ekf", "IteratedEkf", "full EKF that linearises each scan again where its own update leads"
     ),
+    "intersection-ekf": _filter(
+        "intersection_ekf",
+        "IntersectionEkf",
+        "split covariance intersection: the paper's diagonal blocks, each a bound whatever was dropped",
+        covariance="bound",
+    ),
 }
 BUILT_IN = frozenset(BACKENDS)
 """What comes along; other names are a user's own, of which the processes of a campaign are told."""
