@@ -120,6 +120,7 @@ BACKENDS: dict[str, BackendEntry] = {
         "split covariance intersection: the paper's diagonal blocks, each a bound whatever was dropped",
         covariance="bound",
     ),
+    "ukf": _filter("ukf", "Ukf", "unscented Kalman filter: the models' own mean and spread in place of Jacobians"),
 }
 BUILT_IN = frozenset(BACKENDS)
 """What comes along; other names are a user's own, of which the processes of a campaign are told."""

@@ -105,8 +105,7 @@ class Ekf(Generic[M]):
         """Move the pose by the odometry."""
         self._move_on()
         self._has_driven = True
-        motion = self._motion(odometry)
-        noise = motion.W @ odometry.cov @ motion.W.T
+        motion, noise = self._moved(odometry)
         self._map.move(motion.pose_world, motion.F, noise)
         self._odometry_cov = motion.F @ self._odometry_cov @ motion.F.T + noise
 
@@ -125,8 +124,8 @@ class Ekf(Generic[M]):
         if self._config.at_wall and self._has_driven and not len(self._map.ids):
             self._begin_frame()
         self._move_on()
-        new = self._initialisation(lines, centres)
-        return self._map.append(new.anchors, new.means, new.G_pose, new.G_line @ cov @ new.G_line.swapaxes(1, 2))
+        new, noise = self._grown(lines, cov, centres)
+        return self._map.append(new.anchors, new.means, new.G_pose, noise)
 
     def merge(self, keep: int, drop: int) -> None:
         """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
@@ -154,6 +153,18 @@ class Ekf(Generic[M]):
         self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
         self._map.move(np.zeros(POSE), np.zeros((POSE, POSE)), np.zeros((POSE, POSE)))
         self._begin()
+
+    def _moved(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
+        """Return the motion and the covariance that it adds to the pose's."""
+        motion = self._motion(odometry)
+        return motion, motion.W @ odometry.cov @ motion.W.T
+
+    def _grown(
+        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
+    ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
+        """Return new lines and the covariance that each has beside what it has of the pose."""
+        new = self._initialisation(lines, centres)
+        return new, new.G_line @ cov @ new.G_line.swapaxes(1, 2)
 
     def _motion(self, odometry: Odometry) -> Motion:
         return move(self._map.pose_world, odometry.motion)
