@@ -121,6 +121,12 @@ BACKENDS: dict[str, BackendEntry] = {
         covariance="bound",
     ),
     "ukf": _filter("ukf", "Ukf", "unscented Kalman filter: the models' own mean and spread in place of Jacobians"),
+    "oc-ekf": _filter(
+        "oc_ekf",
+        "OcEkf",
+        "observability-constrained EKF: as the invariant one, P changed least",
+        keeps_frame=True,
+    ),
 }
 BUILT_IN = frozenset(BACKENDS)
 """What comes along; other names are a user's own, of which the processes of a campaign are told."""

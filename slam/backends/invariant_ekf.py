@@ -42,19 +42,28 @@ class InvariantEkf(Ekf[DenseMap]):
         position, alpha = self._point()
         turned = alpha.copy()
         turned[rows] = ahead[POSE::2]
-        self._map.shear(*carry(position, ahead[:2], alpha, turned, self._map.anchors))
+        self._carry(position, ahead[:2], alpha, turned)
         self._carried_to = ahead[:2], turned
 
     def _condition(self, model: Linear) -> None:
         position, alpha = self._point()
         super()._condition(model)
         self._carried_to = None
-        after = self._map
-        after.shear(*carry(position, after.pose_world[:2], alpha, after.means[:, 0], after.anchors))
+        self._carry(position, self._map.pose_world[:2], alpha, self._map.means[:, 0])
 
     def _point(self) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, " n"]]:
         """Return the position and directions at which P holds its errors."""
         return self._carried_to or (self._map.pose_world[:2], self._map.means[:, 0])
+
+    def _carry(
+        self,
+        position: Float[np.ndarray, "2"],
+        moved: Float[np.ndarray, "2"],
+        alpha: Float[np.ndarray, " n"],
+        turned: Float[np.ndarray, " n"],
+    ) -> None:
+        """Carry P from one position and directions to others."""
+        self._map.shear(*carry(position, moved, alpha, turned, self._map.anchors))
 
     def _align(self, rows: Int[np.ndarray, "2"]) -> float:
         """Take the line dropped to the direction of the line kept: else their equality says where the world lies."""
@@ -62,5 +71,5 @@ class InvariantEkf(Ekf[DenseMap]):
         turned = alpha.copy()
         turned[rows[1]] = turned[rows[0]]
         position = self._map.pose_world[:2]
-        self._map.shear(*carry(position, position, alpha, turned, self._map.anchors))
+        self._carry(position, position, alpha, turned)
         return float(turned[rows[0]])

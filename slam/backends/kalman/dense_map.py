@@ -7,7 +7,7 @@ place.
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.linalg.blas import dsyr2k, dsyrk, dtrsm, dtrsv
+from scipy.linalg.blas import dsymm, dsyr2k, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from ...estimation.backend import POSE, Joint, columns_of
@@ -45,6 +45,11 @@ class DenseMap:
     def means(self) -> Float[np.ndarray, "n 2"]:
         """(alpha, d) of the lines, in the order of `ids`."""
         return self._x[POSE:].reshape(-1, 2)[self._slots]
+
+    @property
+    def variances(self) -> Float[np.ndarray, " s"]:
+        """Those of the pose and of all lines, s = 3 + 2 n."""
+        return np.diagonal(self._P)[self._columns(np.arange(len(self.ids)))]
 
     def joint(self, rows: Int[np.ndarray, " m"]) -> Joint:
         """Return the Gaussian of the pose and some lines."""
@@ -109,6 +114,18 @@ class DenseMap:
         U[self._columns(np.arange(len(self.ids)))[POSE:]] = by_line.reshape(-1, POSE)
         B = self._across(np.arange(POSE)).T + 0.5 * U @ self.pose_cov
         self._P = dsyr2k(1.0, U, B, beta=1.0, c=self._P, lower=1, overwrite_c=1)
+        self._mirror_pose()
+
+    def follow(self, moves: Float[np.ndarray, "s 3"], common: Float[np.ndarray, "s 3"]) -> None:
+        """Add multiples of what all errors have in common to all errors: P <- D P D' with D = I + moves common'.
+
+        Rows are those of the pose and of all lines, s = 3 + 2 n.
+        """
+        columns, t = self._columns(np.arange(len(self.ids))), len(self._x)
+        U, V = np.zeros((t, POSE), order="F"), np.zeros((t, POSE), order="F")
+        U[columns], V[columns] = moves, common
+        PV = dsymm(1.0, self._P, V, lower=1)
+        self._P = dsyr2k(1.0, U, PV + 0.5 * U @ (V.T @ PV), beta=1.0, c=self._P, lower=1, overwrite_c=1)
         self._mirror_pose()
 
     def _columns(self, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:

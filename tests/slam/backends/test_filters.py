@@ -18,7 +18,7 @@ from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
-EKFS = [name for name in BACKENDS if name.endswith("-ekf")]
+EKFS = [name for name, entry in BACKENDS.items() if entry.options is EkfConfig]
 START, P0 = np.array([0.2, -1.0, 0.3]), np.diag([0.02, 0.02, 0.01]) ** 2
 NONE = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
 
@@ -45,7 +45,7 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
     fast, slow = DenseMap(START, P0), Slow(P0)
     for _ in range(60):
         n, size = len(fast.ids), len(slow.P)
-        verb = rng.choice(["move", "append", "drop", "condition", "shear"])
+        verb = rng.choice(["move", "append", "drop", "condition", "shear", "follow"])
         if verb == "move":
             F, Q = np.eye(3) + 0.1 * rng.standard_normal((3, 3)), 1e-4 * np.eye(3)
             A = np.eye(size)
@@ -90,7 +90,12 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
             A[3:, :3] = by_line.reshape(-1, 3)
             fast.shear(by_pose, by_line)
             slow.apply(A, 0.0)
+        elif verb == "follow":
+            moves, common = 0.1 * rng.standard_normal((2, size, 3))
+            fast.follow(moves, common)
+            slow.apply(np.eye(size) + moves @ common.T, 0.0)
         joint = fast.joint(np.arange(len(fast.ids)))
+        np.testing.assert_array_equal(fast.variances, np.diag(joint.cov))
         np.testing.assert_allclose(joint.cov, slow.P, atol=1e-9 * np.abs(slow.P).max())
         np.testing.assert_allclose(np.sin(joint.mean - slow.x), 0.0, atol=1e-9)
 

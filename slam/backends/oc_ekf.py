@@ -1,0 +1,48 @@
+"""The observability-constrained EKF: Jacobians at the estimate, and P changed least so that what is unseen stays so.
+
+After Huang, Mourikis and Roumeliotis (2010) and Hesch et al. (2014), who prescribe the directions that no measurement
+sees, N, and give the transition from one estimate to the next the least change that leads N over into itself. Here the
+present estimates have their say in N, also of lines whose direction was off when they were first seen.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from ..estimation.backend import POSE
+from ..geometry.lines import normals
+from ..geometry.numerics import LEAST_SIGMA
+from ..geometry.poses import J
+from .invariant_ekf import InvariantEkf
+
+
+class OcEkf(InvariantEkf):
+    """The invariant filter but for how P is carried: by what all errors have in common, not by the pose's alone."""
+
+    def _carry(
+        self,
+        position: Float[np.ndarray, "2"],
+        moved: Float[np.ndarray, "2"],
+        alpha: Float[np.ndarray, " n"],
+        turned: Float[np.ndarray, " n"],
+    ) -> None:
+        """Carry P along: P <- D P D', D N = N+, D = I + (N+ - N) (N' W N)^-1 N' W nearest to I.
+
+        W holds one over the variances, so that errors count in units of their sigmas.
+        """
+        before, after = unseen(position, alpha, self._map.anchors), unseen(moved, turned, self._map.anchors)
+        variances = self._map.variances
+        variances[:2] = variances[:2].mean()  # As they are in a world that is turned.
+        weighted = before / np.maximum(variances, LEAST_SIGMA**2)[:, None]
+        self._map.follow(after - before, np.linalg.solve(before.T @ weighted, weighted.T).T)
+
+
+def unseen(
+    position: Float[np.ndarray, "2"], alpha: Float[np.ndarray, " n"], anchors: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "s 3"]:
+    """Return N: what a shift and a turn of everything do to pose and lines, s = 3 + 2 n (docs/estimation.md)."""
+    N, n = np.zeros((POSE + 2 * len(alpha), 3)), normals(alpha)
+    N[:POSE] = np.eye(POSE)
+    N[:2, 2] = J @ position
+    N[POSE::2, 2] = 1.0
+    N[POSE + 1 :: 2, :2], N[POSE + 1 :: 2, 2] = n, np.vecdot(n, anchors @ J.T)
+    return N
