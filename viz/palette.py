@@ -2,9 +2,12 @@
 
 from slam.backends import BACKENDS
 
-BACKEND_COLOURS = ("#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#3A3A3A", "#6B2C91")
-"""Okabe and Ito's set without its yellow, which white paper swallows; a dark purple in its place. With any colour
-vision two of them are as easily told apart as any two of that set (tests/viz/test_palette.py simulates it)."""
+BACKEND_COLOURS = (
+    "#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#3A3A3A", "#6B2C91",
+    "#874B00", "#0000D2", "#B42D69", "#B400FF", "#2D002D",
+)  # fmt: skip
+"""Okabe and Ito's set without its yellow, which white paper swallows, and six darker ones. With any colour vision two
+of them are as easily told apart as any two of that set (tests/viz/test_palette.py simulates it)."""
 
 
 def of_backend(name: str) -> str:
