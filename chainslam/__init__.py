@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from sim.worlds import DrawingOptions, World
     from sim.worlds.registry import READERS, WORLDS
     from slam.backends import BACKENDS, BackendEntry
-    from slam.estimation.backend import Backend, Belief, Joint, Observations
+    from slam.estimation.backend import Backend, Belief, Joint, Observations, StaleBeliefError
+    from slam.evaluation.axioms.check import Failure, check_backend
     from slam.robot import MotionCommand, Odometry, Robot, RobotError, RobotSpec, Scan, ScannerSpec, WheelSpec
     from slam.robot.streaming import SteppedRobot, StreamingRobot, TimedScan, Twist
 
@@ -36,7 +37,8 @@ _PLACES = {
     "sim.worlds": ("DrawingOptions", "World"),
     "sim.worlds.registry": ("READERS", "WORLDS"),
     "slam.backends": ("BACKENDS", "BackendEntry"),
-    "slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations"),
+    "slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations", "StaleBeliefError"),
+    "slam.evaluation.axioms.check": ("Failure", "check_backend"),
     "slam.robot": (
         "MotionCommand",
         "Odometry",
@@ -55,10 +57,10 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 __version__ = version("chainslam")
 __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
-    "DrawingOptions", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
-    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "Step", "SteppedRobot", "Strategy", "StrategyEntry",
-    "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__", "compare", "explore",
-    "load", "replay",
+    "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
+    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Strategy",
+    "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__",
+    "check_backend", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 
 

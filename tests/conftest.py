@@ -9,7 +9,6 @@ from hypothesis import settings
 # A kernel that is not in the cache yet compiles at its first example; no test is about time.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
-pytest.register_assert_rewrite("tests.slam.backends.rooms")
 
 
 @pytest.fixture(scope="session", autouse=True)

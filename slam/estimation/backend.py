@@ -17,7 +17,7 @@ from ..robot import Odometry
 
 
 class StaleBeliefError(RuntimeError):
-    """A belief was asked for its joint covariance after its back end had moved on."""
+    """A belief was asked for its joint covariance after its back end had moved on: ask for the present belief."""
 
 
 class ContradictionError(RuntimeError):
@@ -97,6 +97,8 @@ class Observations:
     """Lines seen in the robot frame and the map lines that they were matched to."""
 
     ids: Int[np.ndarray, " m"]
+    """In any order, and one id several times where a scan shows a wall in several pieces: one scan in two hundred does.
+    Each piece is an observation of its own, with its own noise."""
     lines: Float[np.ndarray, "m 2"]
     """(alpha rad, r m), alpha pointing into the wall."""
     cov: Float[np.ndarray, "m 2 2"]
@@ -107,7 +109,13 @@ class Observations:
 
 @runtime_checkable
 class Backend(Protocol):
-    """An estimator of the stochastic map: a few verbs, its state hidden, its belief shown."""
+    """An estimator of the stochastic map: a few verbs, its state hidden, its belief shown.
+
+    It is made from a pose (x m, y m, heading rad), world frame, and its covariance (3, 3), with an empty map; a third
+    argument is its options, if its `BackendEntry` names their type. Every verb but one that raises makes beliefs handed
+    out before stale. No verb may keep or change the arrays that it is given. `chainslam.check_backend` holds a class
+    against all this.
+    """
 
     @property
     def belief(self) -> Belief:

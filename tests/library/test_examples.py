@@ -11,7 +11,7 @@ import pytest
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PAGE = EXAMPLES.parent / "docs" / "python.md"
 SAID = {
-    "own_backend": "cautious-ekf: pose ANEES",
+    "own_backend": "axioms that fail: 0\n",
     "own_strategy": "farthest: complete",
     "own_world_format": "complete: coverage 1.000",
     "own_robot": "complete: 6 walls",

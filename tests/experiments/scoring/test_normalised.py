@@ -6,10 +6,10 @@ import pytest
 from experiments.scoring.without_truth.normalised import normalised_path, normalised_relations, pair_covs_of
 from experiments.scoring.without_truth.references import References
 from slam.backends import BACKENDS
+from slam.evaluation.axioms.room import Room, see
 from slam.evaluation.relations import Relations, between
 from slam.geometry.poses import compose, inverse
 from slam.robot import Odometry, ScannerSpec
-from tests.slam.backends.rooms import Room, see
 
 STEPS, RUNS = 60, 10
 START_COV = np.diag([1e-4, 1e-4, 1e-5]) ** 2
@@ -32,7 +32,7 @@ def drive(name, seed):
         lines, cov, centres = room.seen(true[-1], rows, rng)
         known = np.array([row in ids for row in rows])
         if np.any(known):
-            see(backend, [ids[row] for row in rows[known]], lines[known], cov[known])
+            see(backend, np.array([ids[row] for row in rows[known]]), (lines[known], cov[known], centres[known]))
         if not np.all(known):
             ids |= dict(zip(rows[~known], backend.grow(lines[~known], cov[~known], centres[~known]), strict=True))
         online.append(backend.belief.pose_world)

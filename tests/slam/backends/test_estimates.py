@@ -10,7 +10,7 @@ from slam.evaluation.consistency import joint_error, nees, pose_covariances, pos
 from slam.geometry.poses import arc, compose, wrap
 from slam.robot import Odometry
 
-RUNS = 200
+RUNS = 60
 
 pytestmark = [
     pytest.mark.parametrize("name", [name for name, entry in BACKENDS.items() if entry.covariance == "exact"]),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from slam.backends import BACKENDS
-from slam.estimation.backend import Observations, StaleBeliefError
 from slam.geometry.poses import wrap
 from slam.robot import Odometry
 
@@ -70,15 +69,6 @@ def test_merging_is_conditioning_on_equality_and_reports_the_line_about_the_anch
     np.testing.assert_allclose((after.cov - cov[:7, :7]) / np.outer(sigma, sigma), 0.0, atol=close)
 
 
-def test_a_merged_line_lies_between_the_two(name):
-    backend, keep, _, drop = two_of_one_wall(name)
-    belief = backend.belief
-    (a, _), (b, _) = belief.means[belief.rows([keep, drop])]
-    backend.merge(keep, drop)
-    merged = backend.belief.means[0, 0]
-    assert min(a, b) <= merged <= max(a, b)
-
-
 def test_merging_leaves_the_covariance_sound_and_its_volume_smaller(name):
     backend, keep, other, drop = two_of_one_wall(name)
     before = backend.belief.joint([keep, other]).cov
@@ -104,25 +94,3 @@ def test_merging_a_line_with_its_twin_again_and_again_stays_sound(name):
         P = backend.belief.joint([keep, other]).cov
         scale = np.sqrt(np.diag(P))
         assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 0
-
-
-def test_a_line_is_not_merged_with_itself_and_the_refusal_changes_nothing(name):
-    backend, keep, other, _ = two_of_one_wall(name)
-    belief = backend.belief
-    with pytest.raises(ValueError, match=f"expected two lines to merge, found line {keep} twice"):
-        backend.merge(keep, keep)
-    belief.joint([keep, other])
-
-
-def test_a_merge_makes_the_belief_stale_and_the_dropped_id_unknown(name):
-    backend, keep, _, drop = two_of_one_wall(name)
-    belief = backend.belief
-    backend.merge(keep, drop)
-    with pytest.raises(StaleBeliefError):
-        belief.joint([keep])
-    seen = Observations(np.array([drop]), np.array([[0.0, 1.9]]), 1e-5 * np.eye(2)[None])
-    for ask in (lambda: backend.belief.joint([drop]), lambda: backend.update(seen, seen)):
-        with pytest.raises(KeyError):
-            ask()
-    grown = backend.grow(seen.lines, seen.cov, np.array([[1.9, 0.0]]))
-    assert grown[0] != drop

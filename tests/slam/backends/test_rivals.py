@@ -1,14 +1,19 @@
 """Textbook, iterated, unscented and intersection filters against slow algebra, optimisers and sampling."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares, minimize
 
-from slam.backends import BACKENDS
+import chainslam
+from slam.backends import BACKENDS, BackendOptions
 from slam.backends.intersection_ekf import IntersectionMap
 from slam.backends.iterated_ekf import IteratedEkf
+from slam.backends.kalman.config import EkfConfig
 from slam.backends.oc_ekf import unseen
 from slam.backends.textbook_ekf import TextbookEkf
 from slam.backends.ukf import unscented
@@ -20,7 +25,7 @@ from slam.robot import Odometry
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
 START, P0 = np.array([0.2, -1.0, 0.3]), np.diag([0.02, 0.02, 0.01]) ** 2
-ZERO = np.zeros((0, 2))
+EXAMPLE = Path(__file__).parents[3] / "examples" / "own_backend.py"
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -184,6 +189,21 @@ def test_without_bend_the_unscented_filter_is_the_full_one(make_walls):
     sigma = np.sqrt(np.diag(ends[1].cov))
     np.testing.assert_allclose((ends[0].mean - ends[1].mean) / sigma, 0.0, atol=0.02)
     np.testing.assert_allclose((ends[0].cov - ends[1].cov) / np.outer(sigma, sigma), 0.0, atol=0.02)
+
+
+def test_a_filter_written_from_nothing_agrees_with_the_registrys(make_walls, monkeypatch):
+    """That of the how-to: every sigma point of the whole state, in (alpha, r)."""
+    monkeypatch.setattr(chainslam, "BACKENDS", {})
+    own = runpy.run_path(str(EXAMPLE))["OwnUkf"](START, P0)
+    ours = BACKENDS["ukf"].make(START, P0, BackendOptions(EkfConfig(at_wall=False)))
+    ends = []
+    for backend in (own, ours):
+        for _ in make_walls(8).tour(backend, START, np.random.default_rng(75), 30):
+            pass
+        ends.append(backend.belief.joint(backend.belief.ids))
+    sigma = np.sqrt(np.diag(ends[1].cov))
+    np.testing.assert_allclose((ends[0].mean - ends[1].mean) / sigma, 0.0, atol=0.1)
+    np.testing.assert_allclose((ends[0].cov - ends[1].cov) / np.outer(sigma, sigma), 0.0, atol=0.1)
 
 
 def blocks(rng, lines=3):
