@@ -14,7 +14,7 @@ from sim.worlds import load
 from slam.association.matching import match
 from slam.association.view import View
 from slam.backends import BACKENDS
-from slam.backends.frame import Frame
+from slam.backends.frame.frame import Frame
 from slam.mapper import Mapper
 
 

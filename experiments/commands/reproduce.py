@@ -26,7 +26,7 @@ class Reproduce:
     """Reproduce the paper's figures: a picture of each, and its numbers beside ours, by several back ends."""
 
     names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
-    """Out of table1, fig4, fig5, fig6, fig8, fig9, fig10, fig11, eq4; without names, all of them."""
+    """Out of table1, fig4, fig5, fig6, fig8, fig9, fig10, fig11, eq4, standing; without names, all of them."""
     out: Path = Path("results/reproduce")
     """Folder for NAME.png, NAME.svg and NAME.json."""
     seed: int = 1

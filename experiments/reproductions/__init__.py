@@ -1,6 +1,6 @@
 """The paper's figures, one file each, and one line in the registry."""
 
-from . import eq4, fig4, fig5, fig6, fig8, fig9, fig10, fig11, table1
+from . import eq4, fig4, fig5, fig6, fig8, fig9, fig10, fig11, standing, table1
 from .reproduction import Entry, Reproduction
 
 _FIGURES = (
@@ -13,6 +13,7 @@ _FIGURES = (
     (fig10, "the pose's uncertainty below its initial value, walls entered twice"),
     (fig11, "the uncertainty on coming back to the start"),
     (eq4, "what the distance from the world's origin does to r"),
+    (standing, "a robot that stands still and looks learns nothing of where it is (Julier and Uhlmann)"),
 )
 REPRODUCTIONS: dict[str, Entry] = {
     figure.__name__.rpartition(".")[2]: Entry(figure.reproduce, figure.numbers, figure.SAID, about)

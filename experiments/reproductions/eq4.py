@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from slam.backends.block_ekf import BlockEkf
+from slam.backends.blocks.block_ekf import BlockEkf
 from slam.backends.fej_ekf import FejEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.invariant_ekf import InvariantEkf

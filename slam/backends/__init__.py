@@ -67,13 +67,13 @@ def _filter(module: str, name: str, description: str, **properties: Any) -> Back
 
 BACKENDS: dict[str, BackendEntry] = {
     "block-ekf": _filter(
-        "block_ekf",
+        "blocks.block_ekf",
         "BlockEkf",
         "the paper's filter: relocation, then fusion, all cross-covariances neglected",
         covariance="blocks",
     ),
     "joint-block-ekf": _filter(
-        "joint_block_ekf",
+        "blocks.joint_block_ekf",
         "JointBlockEkf",
         "one joint update a scan, then the cross-covariances dropped",
         covariance="blocks",
@@ -115,7 +115,7 @@ BACKENDS: dict[str, BackendEntry] = {
         "iterated_ekf", "IteratedEkf", "full EKF that linearises each scan again where its own update leads"
     ),
     "intersection-ekf": _filter(
-        "intersection_ekf",
+        "blocks.intersection_ekf",
         "IntersectionEkf",
         "split covariance intersection: the paper's diagonal blocks, each a bound whatever was dropped",
         covariance="bound",

@@ -125,7 +125,9 @@ def write_page(rows: Sequence[Row], page: Path) -> None:
 
 
 def _title(name: str) -> str:
-    title = {"table1": "Table 1", "eq4": "Equation 4"}.get(name, name.replace("fig", "Figure "))
+    title = {"table1": "Table 1", "eq4": "Equation 4", "standing": "Standing still"}.get(
+        name, name.replace("fig", "Figure ")
+    )
     return f"{title}: {REPRODUCTIONS[name].about}"
 
 

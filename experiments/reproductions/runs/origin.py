@@ -12,7 +12,7 @@ import tyro
 from jaxtyping import Float
 from rich.table import Table
 
-from slam.backends.block_ekf import BlockEkf
+from slam.backends.blocks.block_ekf import BlockEkf
 from slam.backends.fej_ekf import FejEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.invariant_ekf import InvariantEkf

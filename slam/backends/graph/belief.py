@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from ...estimation.backend import Belief, Joint, StaleBeliefError
 from ...geometry.poses import compose
-from ..frame import Frame
+from ..frame.frame import Frame
 from .ahead import Ahead
 from .kernels import cov_world, joint_ahead, means_world
 from .record import Record

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from ...estimation.kernels import innovation_rows
 from ...geometry.compiled import compiled
 from ...geometry.matrix_kernels import gain_of, whitening, wrapped
-from ..frame_kernels import moving
+from ..frame.kernels import moving
 
 
 @compiled

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ...geometry.poses import compose
 from ...robot import Odometry
-from ..frame import Frame
+from ..frame.frame import Frame
 
 Seen = tuple[float, float, float, float, float]
 """One observation of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""

@@ -15,7 +15,7 @@ from ...estimation.backend import POSE, Belief, Joint, Observations, StaleBelief
 from ...estimation.models import Initialisation, Innovations, Linear, Motion, initialise, innovations, move, stack
 from ...geometry.numerics import LEAST_SIGMA
 from ...robot import Odometry
-from ..frame import Frame
+from ..frame.frame import Frame
 from .config import EkfConfig
 from .linear import equality
 

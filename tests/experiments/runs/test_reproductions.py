@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from experiments import reproductions
 from experiments.commands.cli import main
-from experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig4, fig8, table1
+from experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig4, fig8, standing, table1
 from experiments.reproductions.runs import maps
 from experiments.reproductions.runs.traversals import passes
 from viz.figures.panels import panels
 
-PAPER_NAMES = ["table1", "fig4", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "eq4"]
+PAPER_NAMES = ["table1", "fig4", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "eq4", "standing"]
 few = settings(max_examples=15, deadline=None, derandomize=True)
 
 
@@ -96,3 +96,14 @@ def test_table_1_and_figure_8_are_made_from_one_drive(monkeypatch):
     # What no scan can tell it never claims, on any seed; the full EKF loses a little of it.
     assert map_made.ours["invariant-ekf"]["least trace of the pose covariance over the start's"] >= 1.0 - 1e-6
     assert {"paper", "ours", "command"} <= set(map_made.record("made by"))
+
+
+def test_a_robot_that_stands_still_learns_by_dropped_correlations_and_by_nothing_else(monkeypatch):
+    monkeypatch.setattr(standing, "COMPARED", ("block-ekf", "oc-ekf", "intersection-ekf"))
+    monkeypatch.setattr(standing, "LOOKS", 40)
+    made = standing.reproduce(1)
+    trace = {name: values[standing.LAST] for name, values in made.ours.items()}
+    assert trace["block-ekf"] < 1e-3
+    assert trace["oc-ekf"] == pytest.approx(1.0, abs=1e-9)
+    assert trace["intersection-ekf"] >= 1.0 - 1e-9
+    assert len(made.figure.axes) == 2

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.backends import BACKENDS, BackendOptions
-from slam.backends.block_ekf import weighted_mean
+from slam.backends.blocks.block_ekf import weighted_mean
 from slam.backends.full_ekf import FullEkf
 from slam.backends.kalman.config import EkfConfig
 from slam.backends.kalman.dense_map import DenseMap

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slam.backends import BACKENDS
-from slam.backends.frame import Frame
+from slam.backends.frame.frame import Frame
 from slam.backends.kalman.config import EkfConfig
 from slam.estimation.backend import Joint
 from slam.geometry.poses import compose, inverse, to_world, wrap

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares, minimize
 
 import chainslam
 from slam.backends import BACKENDS, BackendOptions
-from slam.backends.intersection_ekf import IntersectionMap
+from slam.backends.blocks.intersection_ekf import IntersectionMap
 from slam.backends.iterated_ekf import IteratedEkf
 from slam.backends.kalman.config import EkfConfig
 from slam.backends.oc_ekf import unseen

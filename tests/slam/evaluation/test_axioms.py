@@ -8,7 +8,7 @@ import pytest
 
 import chainslam
 from slam.backends import BACKENDS
-from slam.backends.block_ekf import BlockEkf
+from slam.backends.blocks.block_ekf import BlockEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.textbook_ekf import TextbookEkf
 from slam.evaluation.axioms.broken import BrokenError

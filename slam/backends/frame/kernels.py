@@ -5,8 +5,8 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.compiled import compiled
-from ..geometry.matrix_kernels import wrapped
+from ...geometry.compiled import compiled
+from ...geometry.matrix_kernels import wrapped
 
 
 @compiled

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..estimation.backend import Observations
-from ..estimation.models import stack
-from .kalman.block_map import BlockMap
-from .kalman.ekf import Ekf
+from ...estimation.backend import Observations
+from ...estimation.models import stack
+from ..kalman.ekf import Ekf
+from .block_map import BlockMap
 
 
 class BlockEkf(Ekf[BlockMap]):

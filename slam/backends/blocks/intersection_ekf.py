@@ -8,10 +8,10 @@ need not be divided.
 import numpy as np
 from jaxtyping import Float, Int
 
-from ..estimation.backend import POSE, Observations
-from ..estimation.models import Linear
-from .kalman.block_map import BlockMap
-from .kalman.ekf import Ekf
+from ...estimation.backend import POSE, Observations
+from ...estimation.models import Linear
+from ..kalman.ekf import Ekf
+from .block_map import BlockMap
 
 ROUNDS = 30
 """Of finding weights. Any are safe; after so many the trace is within hundredths of the least."""

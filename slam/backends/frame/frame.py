@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from ..estimation.backend import Joint
-from ..estimation.models import move
-from ..robot import Odometry
-from . import frame_kernels
+from ...estimation.backend import Joint
+from ...estimation.models import move
+from ...robot import Odometry
+from . import kernels as frame_kernels
 
 
 @dataclass(frozen=True)

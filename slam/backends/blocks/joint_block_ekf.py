@@ -1,7 +1,7 @@
 """One joint update, then the correlations dropped: what that alone costs, without the relocation-fusion scheme."""
 
-from .kalman.block_map import BlockMap
-from .kalman.ekf import Ekf
+from ..kalman.ekf import Ekf
+from .block_map import BlockMap
 
 
 class JointBlockEkf(Ekf[BlockMap]):

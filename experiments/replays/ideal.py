@@ -1,0 +1,71 @@
+"""The ideal EKF: every Jacobian at the truth, which no estimator has; what a filter could reach by better ones.
+
+The yardstick of the papers on observability (Huang, Mourikis and Roumeliotis). It reads the truth of the drive that it
+is taken along, so it stands here, in no registry, and can only be ridden.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from slam.backends.kalman.dense_map import DenseMap
+from slam.backends.kalman.ekf import Ekf
+from slam.estimation.backend import Observations
+from slam.estimation.models import Initialisation, Innovations, Motion, initialise, innovations, move
+from slam.geometry.lines import directions, normals
+from slam.geometry.poses import J, rotation
+from slam.robot import Odometry
+
+from .observations import DriveObservations
+
+NAME = "ideal-ekf"
+
+
+class IdealEkf(Ekf[DenseMap]):
+    """The full filter with its Jacobians at the true poses and the true directions of the walls of a drive."""
+
+    new_map = DenseMap
+
+    def __init__(
+        self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], drive: DriveObservations
+    ) -> None:
+        """Start before the first scan of a drive, with an empty map."""
+        super().__init__(pose_world, pose_cov)
+        self._drive, self._scan = drive, 0
+        self._alpha = np.zeros(0)
+        """True direction of each line, world frame."""
+
+    def _begin_frame(self) -> None:
+        """Stay in the world's frame, where the truth is: at true Jacobians nothing is learnt of where it lies."""
+
+    @property
+    def _position(self) -> Float[np.ndarray, "2"]:
+        return self._drive.true_poses_world[self._scan, :2]
+
+    def _motion(self, odometry: Odometry) -> Motion:
+        before, F, W = self._drive.true_poses_world[self._scan], np.eye(3), np.eye(3)
+        self._scan += 1
+        F[:2, 2], W[:2, :2] = J @ (self._position - before[:2]), rotation(float(before[2]))
+        return Motion(move(self._map.pose_world, odometry.motion).pose_world, F, W)
+
+    def _innovations(
+        self,
+        rows: Int[np.ndarray, " m"],
+        seen: Observations,
+        pose_world: Float[np.ndarray, "3"],
+        means: Float[np.ndarray, "m 2"],
+    ) -> Innovations:
+        here = innovations(pose_world, self._map.anchors[rows], means, seen.lines, seen.cov)
+        pose = np.append(self._position, self._drive.true_poses_world[self._scan, 2])
+        true = np.stack([self._alpha[rows], means[:, 1]], axis=-1)
+        there = innovations(pose, self._map.anchors[rows], true, seen.lines, seen.cov)
+        return replace(there, e=here.e, R=here.R)
+
+    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
+        new, walls = initialise(self._map.pose_world, lines, centres), self._drive.first[self._scan].walls
+        alpha = np.array([self._drive.true_lines_world[wall][0] for wall in walls.tolist()])
+        n, lever = normals(alpha), np.vecdot(directions(alpha), self._position - new.anchors)
+        new.G_pose[:, 1, :2], new.G_pose[:, 1, 2] = n, lever
+        self._alpha = np.concatenate([self._alpha, alpha])
+        return new

@@ -1,0 +1,1 @@
+"""Where a map that begins in the blind lies in the world."""
