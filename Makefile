@@ -57,7 +57,7 @@ bench: setup
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
 
-.PHONY: rows apartments apartments-errorless schools-whole bundled paper-method navigation-apartments odometry-twice
+.PHONY: rivals rows apartments apartments-errorless schools-whole bundled paper-method navigation-apartments odometry-twice
 
 # What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
 rows: intervals paper paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
@@ -77,6 +77,10 @@ schools: setup
 	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --jobs 2 --out $(ROWS)/schools.jsonl
 	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --jobs 2 --out $(ROWS)/schools.jsonl \
 	    --backends full-ekf invariant-ekf graph --seeds 1 2
+
+# Every back end on the same drives of figures 8 and 9 and of a ring; begun again, it goes on where it was.
+rivals: setup
+	nice $(BIN)/python -m studies.paper.rivals --seeds 20
 
 # The same buildings, to their end.
 schools-whole: setup

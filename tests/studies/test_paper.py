@@ -6,9 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.replays.corridor import Loop, drive
+from experiments.replays.ideal import IdealEkf
+from experiments.replays.observations import ride
 from experiments.reproductions import REPRODUCTIONS, fig8, table1
 from experiments.reproductions.runs import maps
-from studies.paper import following, page, study
+from experiments.scenario import drawn_start
+from slam.evaluation.consistency import bound_margins
+from studies.paper import following, page, rivals, study
 from studies.paper.following import ROWS as FOLLOWED
 from studies.paper.following_tables import read_following
 from studies.runner.rows import fingerprint
@@ -114,3 +119,15 @@ def test_the_stored_rows_of_both_followings_are_of_todays_behaviour():
             (made,) = following._one(following.FollowingStudy.max_steps, task)
             kept = {key: value for key, value in stored[task].items() if key != "code"}
             assert alike(kept, json.loads(json.dumps(made)))
+
+
+def test_the_ideal_filter_never_learns_where_the_world_lies_and_rides_beside_the_others(tmp_path, capsys):
+    """P_k >= A P0 A' at the true positions, where all its Jacobians are."""
+    seen = drive(Loop(30.0, after_m=5.0), 3)
+    pose, cov = drawn_start(seen.chance, seen.true_poses_world[0], "large")
+    ridden = ride(IdealEkf(pose, cov, seen), seen)
+    assert bound_margins(seen.true_poses_world, ridden.estimated_cov, cov).min() > -1e-9
+    assert ridden.map_anees < 2.0
+    study = rivals.RivalStudy(rivals.PLACES[-1:], ("full-ekf", "ideal-ekf"), seeds=1, first_seed=4, out=tmp_path / "r")
+    study.run()
+    assert "ring of 60 m, P0 small, true matches, stated noise, seeds 4 to 4" in capsys.readouterr().out

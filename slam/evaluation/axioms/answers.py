@@ -6,6 +6,7 @@ import numpy as np
 
 from ...estimation.backend import Joint, Observations
 from ...geometry.poses import rotation, to_world, wrap
+from ...robot import Odometry
 from .broken import BrokenError, everything, expect, expect_same, expect_sound, volume
 from .room import P0, START, Make, Room, driven, journey, see
 
@@ -73,6 +74,26 @@ def an_observation_that_says_nothing_changes_next_to_nothing(make: Make) -> None
     after = everything(drive.backend)
     expect_same(after.mean, before.mean, "means before and after", 1e-9)
     expect_same(after.cov, before.cov, "covariances before and after", 1e-9 * float(np.abs(before.cov).max()))
+
+
+def a_heading_may_pass_half_a_turn(make: Make) -> None:
+    """Within an update: it comes out between plus and minus pi, and so do the directions of lines."""
+    for side in (1.0, -1.0):
+        rng = np.random.default_rng(22)
+        start, room = np.array([0.5, -0.3, side * (np.pi - 0.002)]), Room.random(rng)
+        backend, rows = make(start.copy(), P0.copy()), np.arange(8)
+        ids = backend.grow(*room.seen(start, rows, rng))
+        backend.predict(Odometry(np.zeros(3), np.diag([0.01, 0.01, 0.02]) ** 2))
+        true, before = start + np.array([0.0, 0.0, side * 0.02]), backend.belief
+        see(backend, ids, room.seen(true, rows, rng))
+        belief = backend.belief
+        largest = float(np.abs([belief.pose_world[2], *belief.means[:, 0]]).max())
+        expect(largest <= np.pi, "a heading and directions within half a turn", largest)
+        off = float(wrap(belief.pose_world[2] - true[2]))
+        expect(abs(off) < 0.015, "a heading within 0.015 rad of the true one", off)
+        moved = belief.means - before.means
+        moved[:, 0] = wrap(moved[:, 0])
+        expect(np.abs(moved).max() < 0.02, "lines where they were, to 0.02 m and rad", float(np.abs(moved).max()))
 
 
 def a_scan_without_matches_changes_nothing(make: Make) -> None:
@@ -191,6 +212,7 @@ ANSWERS = (
     covariances_stay_sound_over_a_long_drive,
     covariances_stay_sound_while_the_robot_stands_still,
     an_observation_that_says_nothing_changes_next_to_nothing,
+    a_heading_may_pass_half_a_turn,
     a_scan_without_matches_changes_nothing,
     moving_the_world_moves_the_answer,
     the_order_of_observations_in_a_scan_does_not_matter,

@@ -100,10 +100,18 @@ def unknown_ids_raise_key_errors(make: Make) -> None:
 
 
 def removing_lines_leaves_the_marginal_of_the_rest(make: Make) -> None:
-    """So what was learnt through a line that is forgotten stays learnt."""
+    """So what was learnt through a line that is forgotten stays learnt, were it seen only twice."""
     rng = np.random.default_rng(6)
     drive = journey(make, rng).drive(40, rng)
-    backend, gone = drive.backend, [drive.ids[0], drive.ids[3]]
+    _leaves_the_rest(drive.backend, [drive.ids[0], drive.ids[3]])
+    room, backend, rows = Room.random(rng), make(START.copy(), P0.copy()), np.arange(8)
+    ids = backend.grow(*room.seen(START, rows, rng))
+    backend.predict(Odometry(np.zeros(3), 1e-2 * np.eye(3)))
+    see(backend, ids, room.seen(START, rows, rng))
+    _leaves_the_rest(backend, ids[1:].tolist())
+
+
+def _leaves_the_rest(backend: Backend, gone: list[int]) -> None:
     rest = np.array([i for i in backend.belief.ids.tolist() if i not in gone])
     before = backend.belief.joint(rest)
     backend.remove(gone)

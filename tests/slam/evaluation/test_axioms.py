@@ -13,6 +13,7 @@ from slam.backends.full_ekf import FullEkf
 from slam.backends.textbook_ekf import TextbookEkf
 from slam.evaluation.axioms.broken import BrokenError
 from slam.evaluation.axioms.check import axioms_of, check_backend
+from slam.geometry.poses import wrap
 from slam.robot import Odometry
 
 OWED = [
@@ -119,6 +120,15 @@ class Certain(FullEkf):
         super().update(seen, seen)
 
 
+class Unwrapped(FullEkf):
+    """Lets the heading run on past half a turn."""
+
+    def update(self, first, second):
+        before = self._map.pose_world[2]
+        super().update(first, second)
+        self._map._x[2] = before + wrap(self._map.pose_world[2] - before)
+
+
 class Restless(FullEkf):
     def update(self, first, second):
         if len(second.ids):
@@ -186,6 +196,7 @@ BREAKING = {
     "covariances stay sound over a long drive": Eroding,
     "covariances stay sound while the robot stands still": Sinking,
     "an observation that says nothing changes next to nothing": Certain,
+    "a heading may pass half a turn": Unwrapped,
     "a scan without matches changes nothing": Restless,
     "moving the world moves the answer": TextbookEkf,
     "the order of observations in a scan does not matter": OneByOne,

@@ -118,6 +118,7 @@ def test_without_one_side_there_is_no_verdict(side):
         ([(0.8, MATCHES_WITHIN + 1e-9)], "undecided"),
         ([(MATCHES_WITHIN, 2.0)], "undecided"),
         ([(MATCHES_WITHIN + 1e-9, 2.0)], "does not match"),
+        ([(0.8, 1.0), (0.8, 2.0)], "undecided"),
         ([(0.8, 1.0), (None, 1.0)], "undecided"),
         ([(0.8, 1.0), (0.8, None)], "undecided"),
         ([(2.0, None), (0.8, 1.0)], "undecided"),

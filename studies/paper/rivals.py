@@ -15,9 +15,9 @@ from rich.table import Table
 from experiments.replays.corridor import Loop, drive
 from experiments.replays.ideal import NAME as IDEAL
 from experiments.replays.ideal import IdealEkf
-from experiments.replays.observations import DriveObservations, Ridden, observations_of, ride, start
+from experiments.replays.observations import DriveObservations, Ridden, observations_of, ride
 from experiments.replays.recordings import record
-from experiments.scenario import P0, P0_SIGMAS, TrialConfig
+from experiments.scenario import P0, P0_SIGMAS, TrialConfig, drawn_start
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
@@ -100,7 +100,7 @@ def rows_of(study: RivalStudy, task: tuple[str, int]) -> dict[Key, Scores]:
         seen = drive(Loop(RING_M), seed)
     else:
         seen = observations_of(record(TrialConfig(place, study.driver, seed=seed), study.recordings), True)
-    begin = start(seed, seen.true_poses_world[0], study.p0)
+    begin = drawn_start(seen.chance, seen.true_poses_world[0], study.p0)
     return {study.key(place, name, seed): scores(made(name, *begin, seen), seen) for name in study.backends}
 
 
