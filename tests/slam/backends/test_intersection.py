@@ -1,4 +1,4 @@
-"""Split covariance intersection: a bound whatever the correlations are, by weights that leave next to the least trace."""
+"""Split covariance intersection: a bound whatever the correlations are, and next to the least one."""
 
 import numpy as np
 import pytest
