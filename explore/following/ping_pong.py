@@ -5,9 +5,9 @@ from jaxtyping import Float
 
 from slam.map.chains import HEAD, TAIL, OpenEnd
 
-from ..behaviour import Behaviour
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_near
+from .behaviour import Behaviour
 from .wall_following import Errand, FollowingConfig, Surroundings
 
 ROUNDING = LOOKS[:3]

@@ -12,9 +12,9 @@ from slam.geometry.poses import to_robot, wrap
 from slam.map.chains import HEAD, TAIL
 from slam.robot import MotionCommand
 
-from ..behaviour import Behaviour
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
+from .behaviour import Behaviour
 from .driving import Ahead, ahead_of, careful
 from .safe_steps import step_away, step_towards
 from .track import Track, track_of

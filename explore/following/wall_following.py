@@ -19,12 +19,12 @@ from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
-from ..behaviour import Behaviour
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
 from ..planning.passable import PathConfig
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ViewpointsConfig, ideal_places, lane, places_beyond, places_near, places_that_see
+from .behaviour import Behaviour
 from .driving import Pilot
 from .driving_config import DrivingConfig
 

@@ -10,7 +10,7 @@ import networkx as nx
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry
 
-from ..behaviour import Behaviour
+from ..following.behaviour import Behaviour
 from ..following.wall_following import Surroundings
 from ..goal import GivenUp, Goal
 from ..outcome import Outcome

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from slam.map.chains import Chain
 from slam.robot import RobotSpec, of_robot
 
-from ..behaviour import Behaviour
+from ..following.behaviour import Behaviour
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
 from ..goal import Goal
 from ..planning.sight import cells_within

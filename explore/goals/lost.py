@@ -10,7 +10,7 @@ import numpy as np
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
-from ..behaviour import Behaviour
+from ..following.behaviour import Behaviour
 from ..following.wall_following import Surroundings
 from ..goal import GivenUp
 from ..outcome import Outcome

@@ -13,7 +13,7 @@ import numpy as np
 from slam.map.chains import HEAD, TAIL, OpenEnd
 from slam.robot import MotionCommand
 
-from ..behaviour import Behaviour
+from ..following.behaviour import Behaviour
 from ..following.wall_follower import WallFollower
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..planning.lanes import lanes_of

@@ -11,10 +11,10 @@ from jaxtyping import Float
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
-from ..behaviour import Behaviour
 from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory
 from ..floor.touches import Touches
+from ..following.behaviour import Behaviour
 from ..following.safe_steps import keeps_clear
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..outcome import Outcome

@@ -18,7 +18,7 @@ from experiments.artifacts.settings import FOLLOWING, nested, over, trial_of
 from experiments.reproductions.runs.traversals import passes
 from experiments.scenario import TrialConfig, check
 from experiments.trial import TrialResult, run_trial
-from explore.behaviour import Behaviour
+from explore.following.behaviour import Behaviour
 from explore.following.wall_following import Following
 
 from ..runner.command import run_study

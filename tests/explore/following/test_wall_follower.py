@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.behaviour import Behaviour
 from explore.floor.free_space import FreeSpace
+from explore.following.behaviour import Behaviour
 from explore.following.wall_follower import WallFollower
 from explore.following.wall_following import FollowingConfig, Surroundings
 from sim.lidar import LidarConfig, RangeFinder

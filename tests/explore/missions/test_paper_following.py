@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from explore.behaviour import Behaviour
+from explore.following.behaviour import Behaviour
 from explore.following.wall_following import EndErrand, FollowingConfig
 from explore.goals.explorer import ExplorerConfig
 from explore.limits import Limits, limited
