@@ -146,10 +146,11 @@ def _why_shorter(rows: Sequence[Row]) -> str:
 
 
 def _shortcut(rows: Sequence[Row]) -> list[str]:
+    seeds = len({row["seed"] for row in rows})
     lines = [
         "### Does following closer to the paper change what the shortcut costs?",
         "",
-        "Today's mapper in the same worlds, three strategies, the seeds above: medians of the pose ANEES, of the map"
+        f"Today's mapper in the same worlds, three strategies, {seeds} seeds: medians of the pose ANEES, of the map"
         " ANEES and of the path in metres, and the sum of walls entered twice.",
         "",
         "| figure | following | strategy | " + " | ".join(f"{name}: pose, map, m, twice" for name in BACKENDS) + " |",
