@@ -67,21 +67,23 @@ class FollowingStudy:
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
     def tasks(self) -> list[Task]:
-        """Return what each run is known by, in the order of the tables, seed by seed."""
-        seeds = range(self.first_seed, self.first_seed + self.seeds)
+        """Return what each run is known by, in the order in which they are made: without errors, then seed by seed."""
         ways = get_args(Following)
-        figures = [(seed, errorless) for seed, errorless in [(1, True), *((seed, False) for seed in seeds)]]
-        own = [
-            (BY_METHOD, figure, way, FIGURES[figure][1], METHOD.backend, errorless, seed)
-            for (seed, errorless), figure, way in product(figures, FIGURES, ways)
+        backend = METHOD.backend
+        found: list[Task] = [
+            (BY_METHOD, figure, way, FIGURES[figure][1], backend, True, 1) for figure, way in product(FIGURES, ways)
         ]
-        beside = [
-            (BY_BACKEND, figure, way, strategy, backend, False, seed)
-            for seed, figure, way, strategy, backend in product(
-                seeds[: self.compared], COMPARED, ways, STRATEGIES, BACKENDS
-            )
-        ]
-        return own + beside
+        for seed in range(self.first_seed, self.first_seed + self.seeds):
+            found += [
+                (BY_METHOD, figure, way, FIGURES[figure][1], backend, False, seed)
+                for figure, way in product(FIGURES, ways)
+            ]
+            if seed < self.first_seed + self.compared:
+                found += [
+                    (BY_BACKEND, figure, way, strategy, name, False, seed)
+                    for figure, way, strategy, name in product(COMPARED, ways, STRATEGIES, BACKENDS)
+                ]
+        return found
 
     def run(self) -> None:
         """Run what is to be run; raises UsageError for a file of something else."""
