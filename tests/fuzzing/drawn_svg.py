@@ -1,7 +1,7 @@
 """Random SVG drawings of everything that decides what a viewer shows: order, clips, masks, copies, styles, paint.
 
 A page of 10 x 8 units, a unit a metre. Dark strokes are as wide as the walls that they are read as, so that what a
-renderer rasters can be held against what the reader takes for walls.
+renderer rasters can be held against what the reader takes for walls. No corner is so sharp that a stroke is cut off.
 """
 
 from dataclasses import dataclass, field
@@ -125,7 +125,7 @@ def _shape(pen: _Pen) -> str:
         f'<rect x="{x}" y="{y}" width="{w}" height="{h}"',
         f'<circle cx="{x}" cy="{y}" r="{w / 2}"',
         f'<path d="M{x} {y}h{w}v{h}h{-w}z"',
-        f'<polygon points="{x},{y} {x + w},{y} {x},{y + h}"',
+        f'<polygon points="{x},{y} {x + w},{y} {x},{y + w}"',
     )
     fill, faint = pen.one(*DARK, *LIGHT), pen.one(*FAINT)
     wide = pen.at(0.2, 0.5)

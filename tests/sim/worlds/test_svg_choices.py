@@ -51,7 +51,7 @@ def test_a_name_that_no_part_has_is_told_with_those_there_are(tmp_path):
 
 @pytest.mark.parametrize("paint", UNKNOWN)
 def test_a_paint_that_is_not_understood_leaves_the_one_below_and_is_named(tmp_path, paint):
-    world = _load(tmp_path, f'<style>:root{{{{--white:#fff}}}}</style>{BLANK} style="fill:{paint}"/>')
+    world = _load(tmp_path, f'<style>:root{{--white:#fff}}</style>{BLANK} style="fill:{paint}"/>')
     assert world.face_rings.max() == 0
     if paint in ("blak", "#12", "rgb(1,2)", "device-cmyk(0 0 0 1)", "icc(1)", "12"):
         assert any(f"fill {paint}" in note for note in world.reading.notes)

@@ -19,8 +19,8 @@ from .winding import filled
 
 SLIVER_M = 5e-3
 """What is left of a wall narrower than this, or shorter, was meant to be hidden."""
-SHARE = 0.98
-"""Of a stroke's width: what hides so much of it hides it."""
+SHARE = 0.7
+"""Of a stroke's width: where more of it than this is hidden, nothing of it counts as seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ def _stroke(
         return [shapely.LineString(ring)], []
     # A stroke as wide as no wall is, such as one of a unit that nobody chose, says nothing of the wall's width.
     width = piece.page_width
-    half = 0.5 * SHARE * (width if width and width < BROAD_M else WALL_M)
+    half = 0.5 * (width if width and width < BROAD_M else WALL_M)
     lines: list[shapely.LineString] = []
     solids: list[shapely.Polygon] = []
     for points, cut_first, cut_last in _runs(ring, half, piece.clip, above):
@@ -189,7 +189,10 @@ def _intervals(
     seen = strip if clip is None else strip.intersection(clip)
     seen = seen if above is None else seen.difference(above)
     spans = []
-    for part in areas(seen):
+    # What is narrower than the share that counts goes, and the rest keeps its square ends.
+    least = (1 - SHARE) * half
+    core = seen.buffer(-least, join_style="mitre")
+    for part in areas(core.buffer(least, join_style="mitre")):
         reach = (shapely.get_coordinates(part) - a) @ along
         low, high = float(reach.min()), float(reach.max())
         low, high = (0.0 if low < 1e-6 else low), (size if high > size - 1e-6 else high)
