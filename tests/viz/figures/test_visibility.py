@@ -5,6 +5,7 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -91,9 +92,8 @@ def test_a_line_between_neighbours_goes_round_their_corner_on_the_free_side(turn
     ahead = np.array([np.cos(turn), np.sin(turn)])
     ends = np.array([[[-length, 0.0], [0.0, 0.0]], [[0.0, 0.0], length * ahead]])
     way = nodes_of(ends, radius).round_corner(0, 1)
-    for a, b in ends:
-        along = (b - a) / length
-        offset = np.array([-along[1], along[0]])
-        beside = (way - a) @ along
-        over = way[(beside > 0.0) & (beside < length)]
-        assert np.all((over - a) @ offset > 0.2 * radius)
+    walls = shapely.MultiLineString(list(ends))
+    assert not shapely.LineString(way).intersects(walls)
+    assert shapely.distance(shapely.points(way), walls).min() > 0.2 * radius
+    for end, normal, tip in zip(ends, free_normals(ends), (way[0], way[-1]), strict=True):
+        assert (tip - end[0]) @ normal > 0.2 * radius
