@@ -57,7 +57,7 @@ bench: setup
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
 
-.PHONY: rivals rows apartments apartments-errorless schools-whole bundled paper-method navigation-apartments odometry-twice
+.PHONY: rivals rows apartments apartments-errorless exact schools-whole bundled paper-method navigation-apartments odometry-twice
 
 # What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
 rows: intervals paper paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
@@ -71,6 +71,12 @@ apartments: setup
 apartments-errorless: setup
 	$(BIN)/python -m studies.exploration.suite --plans $(PLANS) --named 'lifull_*' --errorless \
 	    --out $(ROWS)/in_text/apartments-errorless.jsonl
+
+# What the mapper errs by where nothing is wrong with its input, and where that begins.
+exact: setup
+	$(BIN)/python -m studies.consistency.exact --plans $(PLANS) --out $(ROWS)/in_text/exact.jsonl --worlds paper-fig4 paper-fig5 \
+	    paper-fig8 paper-fig9 rooms hall $(addprefix $(PLANS)/../rasters/,nav2_depot.yaml nav2_tb3_sandbox.yaml stage_cave.png \
+	    stage_hospital_section.png willow-2010-0.10.yaml)
 
 # 39 schools and offices, 1,500 noisy steps each: every back end with one seed, and three of them with a second.
 schools: setup

@@ -48,7 +48,7 @@ class Movements:
 
     scenario: Scenario
     votes: Votes
-    moved_m: Counter[str] = field(default_factory=Counter)
+    moved_m: dict[str, float] = field(default_factory=dict)
     jumped: dict[str, Any] | None = None
     beyond_step: int | None = None
     """The first step with an error beyond `AIM_M`."""
@@ -64,7 +64,7 @@ class Movements:
             predicted = compose(self._before, step.odometry.reported.motion)
             moved = float(np.hypot(np.hypot(*(pose - predicted)[:2]), wrap(pose[2] - predicted[2])))
             told = self._worst_observation(step)
-            self.moved_m[told["cause"]] += moved
+            self.moved_m[told["cause"]] = self.moved_m.get(told["cause"], 0.0) + moved
             if moved > JUMP_M and self.jumped is None:
                 self.jumped = {"step": step.index, "moved_m": moved} | told
         if self.beyond_step is None and np.hypot(*(pose - record.poses_world[-1])[:2]) > AIM_M:
@@ -105,7 +105,7 @@ class Movements:
 
 def exact(backend: str, max_steps: int, world: str) -> list[Row]:
     """Drive through one world errorless and return its row."""
-    known = {"world": world, "backend": backend, "max_steps": max_steps}
+    known = {"world": Path(world).name, "backend": backend, "max_steps": max_steps}
     try:
         scenario = build(TrialConfig(world, backend, errorless=True, max_steps=max_steps))
     except UsageError as error:
@@ -122,7 +122,7 @@ def exact(backend: str, max_steps: int, world: str) -> list[Row]:
         "pose_rms_m": float(np.sqrt(np.mean(away**2))), "pose_worst_m": float(away.max()),
         "heading_rms_rad": float(np.sqrt(np.mean(wrap(off[:, 2]) ** 2))),
         "worst_step": int(np.argmax(grown)), "worst_step_m": float(grown.max()),
-        "beyond_step": movements.beyond_step, "jumped": movements.jumped, "moved_m": dict(movements.moved_m),
+        "beyond_step": movements.beyond_step, "jumped": movements.jumped, "moved_m": movements.moved_m,
     }  # fmt: skip
     return [row]
 
@@ -156,7 +156,7 @@ class Exact:
             if not found:
                 raise UsageError(f"expected maps in {self.plans}, found no file {self.named}: check it")
             worlds += map(str, found)
-        tasks = [(world, [(world, self.backend, self.max_steps)]) for world in worlds]
+        tasks = [(world, [(Path(world).name, self.backend, self.max_steps)]) for world in worlds]
         rows = list(rows_of(self.out, NAMES, tasks, partial(exact, self.backend, self.max_steps), self.jobs))
         plain_console(width=150).print(table(rows), causes(rows))
 
