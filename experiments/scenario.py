@@ -34,6 +34,8 @@ P0_SIGMAS: dict[str, tuple[float, float]] = {
     "large": (0.1, float(np.deg2rad(2.0))),
 }
 """Standard deviations of the start: position m (each axis), heading rad."""
+KNOWN: P0 = "zero"
+"""The start is known as well as numbers allow."""
 
 DRIVER = "graph"
 """The back end that explores unless another is named: it loses the fewest maps of schools (`make schools`)."""
@@ -170,6 +172,12 @@ def build(config: TrialConfig, world: World | None = None) -> Scenario:
     )
 
 
+def sigmas_of(p0: str) -> Float[np.ndarray, "3"]:
+    """Return the standard deviations (3,) m m rad of a start."""
+    position_m, heading_rad = P0_SIGMAS[p0]
+    return np.array([position_m, position_m, heading_rad])
+
+
 def drawn_start(
     chance: Chance | None, true_start_world: Float[np.ndarray, "3"], p0: str
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
@@ -177,8 +185,7 @@ def drawn_start(
 
     It is drawn about the true one; without chance it is the true one.
     """
-    position_m, heading_rad = P0_SIGMAS[p0]
-    sigmas = np.array([position_m, position_m, heading_rad])
+    sigmas = sigmas_of(p0)
     draw = np.zeros(3) if chance is None else chance.standard_normals(Channel.START, 0, 3)
     return np.asarray(true_start_world, dtype=np.float64) + sigmas * draw, np.diag(sigmas**2)
 

@@ -4,8 +4,10 @@ import gc
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
+
+import numpy as np
 
 from explore.certificate import Certificate, certify
 from explore.limits import limited
@@ -14,11 +16,13 @@ from explore.outcome import Outcome
 from explore.step import Step
 from sim.logs.keyframes import RecordedLog
 from sim.worlds import World
+from slam.backends import BACKENDS
 from slam.estimation.backend import Joint
+from slam.evaluation.from_start import FromStart, Start, as_it_is, from_start
 from slam.geometry.compiled import link_kernels
 from slam.mapper import Mapper
 
-from .scenario import Scenario, TrialConfig, build, heard_by
+from .scenario import KNOWN, Scenario, TrialConfig, build, heard_by, make_backend, sigmas_of
 from .scoring.association import Votes
 from .scoring.records import Log, Recorder
 from .scoring.summary import Ending, run_keys, summarise
@@ -75,7 +79,7 @@ def run_trial(
 def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mission) -> TrialResult:
     """Run a scenario to its end, whatever that is, and return all that was computed."""
     truth = truth_of(scenario.world, scenario.config.robot)
-    recorder = Recorder(scenario.robot, Votes(truth))
+    recorder = Recorder(scenario.robot, Votes(truth), relative_to_start(scenario))
     ending = ride(scenario, recorder, watch, mission)
     recorder.close()
     if recorder.last is None:
@@ -88,6 +92,17 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     summary |= {"certificate": certificate_record(certificate)}
     smoothed = smooth(scenario.backend, last.map, log.unstated_motion, scenario.config.robot.scanner)
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
+
+
+def relative_to_start(scenario: Scenario) -> FromStart:
+    """Return what tells the pose as it would be had the start been known; without noise it is as it is."""
+    config = scenario.config
+    if config.errorless or config.p0 == KNOWN:
+        return as_it_is
+    start = Start(scenario.start_estimate, scenario.start_cov, np.asarray(scenario.world.start, dtype=np.float64))
+    known, carries = start.known(sigmas_of(KNOWN)), BACKENDS[config.backend].carries_start
+    make = partial(make_backend, config)
+    return from_start(scenario.backend, carries, start, known, make, config.robot.scanner)
 
 
 def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
@@ -123,7 +138,8 @@ def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a single step: null for all that was not measured."""
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
-        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band map_anees duplicate_lines false_matches"
+        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band pose_anees_from_start map_anees duplicate_lines"
+        " false_matches"
         " false_matches_few_beams merges"
         " nis nis_in_band unstated_motions lost_steps wheel_noise_factor"
         " false_merges return_to_start certificate step_ms planning_ms"

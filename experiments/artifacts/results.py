@@ -18,7 +18,7 @@ from viz.figures.floor_plan import Dimension, floor_plan
 from ..scenario import TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
 from ..scoring.records import Log
-from ..scoring.summary import odometry_path, pose_nees
+from ..scoring.summary import odometry_path, pose_nees, pose_nees_from_start
 from ..trial import TrialResult
 from .files import csv_bytes, json_bytes, npz_bytes, write
 from .formats import CONFIG, stamp
@@ -48,6 +48,7 @@ REPLAY = "replay"
 """In `config.json`: the options of a replay; none for a run that drove."""
 STEP_COLUMNS = (
     *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
+    "pose_nees_from_start",
     *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
     *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
     *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
@@ -242,6 +243,7 @@ def steps_csv(log: Log) -> bytes:
         log.open_ends,
         log.lines,
         log.tentative,
+        pose_nees_from_start(log),
         log.closed_chains,
         log.set_aside,
         *log.estimated_world.T,

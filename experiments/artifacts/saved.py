@@ -31,6 +31,7 @@ REMEDY = "keep a run's files together, or make it anew"
 NUMBERS = (
     *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
     *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
+    *("pose_anees_from_start", "nis", "nis_in_band"),
 )
 COUNTS = (
     *("open_ends", "lines", "contours_closed", "contours_reachable", "false_matches", "duplicate_lines", "collisions"),

@@ -37,6 +37,7 @@ SUMMARY = "summary_json"
 
 NUMBERS = (
     *("path_length_m", "coverage", "swept", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band"),
+    *("pose_anees_from_start", "nis", "nis_in_band"),
     *("map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "nis_mean", "nis_whiteness", "trace_least"),
     *("trace_below", "bound_margin", "bound_first_m", "bound_worst_m"),
 )
@@ -61,6 +62,7 @@ SHAPE = {
 """Of a trial's summary, as the tables take it."""
 LAYOUTS = {
     **dict.fromkeys(("path_length_m", "pose_nees", "pose_trace", "pose_error_m"), "float s"),
+    "pose_nees_from_start": "float s",
     **dict.fromkeys(("heading_error_rad", "heading_sigma_rad"), "float s"),
     "lines": "int s",
     "map_ends": "float m 2 2",
@@ -73,6 +75,7 @@ LAYOUTS = {
 }
 """Of a trial's arrays."""
 HEARD = ("nis", "nis_dof")
+LATER = ("pose_nees_from_start",)
 """There only where innovations were listened to; the others are all there, or none of them for a trial that failed."""
 
 
@@ -139,7 +142,7 @@ def unpack(content: bytes, trial: Trial) -> TrialScores:
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
     summary = parse_json(str(arrays.pop(SUMMARY)).encode(), RECORD, SHAPE)
     arrays.pop("format", None)
-    for group in (HEARD, tuple(name for name in LAYOUTS if name not in HEARD)):
+    for group in (HEARD, LATER, tuple(name for name in LAYOUTS if name not in (*HEARD, *LATER))):
         missing = [name for name in group if name not in arrays]
         if missing and len(missing) < len(group):
             raise UnfitError(f"no {missing[0]}")

@@ -14,6 +14,7 @@ from sim.robot import chance_in
 from slam.estimation.backend import POSE, Backend, Joint, Observations
 from slam.estimation.mounting import odometry_of_scanner, scanner_poses
 from slam.evaluation.consistency import nees, pose_covariances, pose_errors
+from slam.evaluation.from_start import FromStart, as_it_is
 from slam.evaluation.own_gauge import own_gauge
 from slam.extraction.extract import extract
 from slam.extraction.segments import Segments
@@ -82,12 +83,21 @@ class Ridden:
     """Pose and all lines after the last scan."""
     true_poses_world: Float[np.ndarray, "s 3"]
     true_lines_world: Float[np.ndarray, "m 2"]
+    from_start_world: Float[np.ndarray, "s 3"]
+    """The estimates relative to the start, as `scoring/from_start.py` has them."""
+    from_start_cov: Float[np.ndarray, "s 3 3"]
 
     @property
     def pose_nees(self) -> Float[np.ndarray, " s"]:
         """NEES of the invariant pose error after each scan; raises LinAlgError where a covariance is none."""
         errors = pose_errors(self.estimated_world, self.true_poses_world)
         return nees(errors, pose_covariances(self.estimated_world, self.estimated_cov))
+
+    @property
+    def pose_nees_from_start(self) -> Float[np.ndarray, " s"]:
+        """NEES of the pose relative to the start after each scan; raises LinAlgError likewise."""
+        errors = pose_errors(self.from_start_world, self.true_poses_world)
+        return nees(errors, pose_covariances(self.from_start_world, self.from_start_cov))
 
     @property
     def map_anees(self) -> float:
@@ -138,10 +148,10 @@ def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> ScanObservations
     return ScanObservations(walls, segments.lines, segments.cov, seen_centres(segments, np.arange(len(segments))))
 
 
-def ride(backend: Backend, drive: DriveObservations) -> Ridden:
+def ride(backend: Backend, drive: DriveObservations, from_start: FromStart = as_it_is) -> Ridden:
     """Take a back end without lines along a drive and return its estimates."""
     line_of_wall: dict[int, int] = {}
-    poses, covs = [], []
+    poses, covs, relative = [], [], []
     for k, (again, first) in enumerate(zip(drive.again, drive.first, strict=True)):
         if k:
             backend.predict(Odometry(drive.odometry[k], drive.odometry_cov[k]))
@@ -154,7 +164,9 @@ def ride(backend: Backend, drive: DriveObservations) -> Ridden:
         belief = backend.belief
         poses.append(belief.pose_world)
         covs.append(belief.pose_cov)
+        relative.append(from_start(belief))
     joint = backend.belief.joint(np.array(sorted(line_of_wall.values()), dtype=np.int64))
     wall_of_line = {line: wall for wall, line in line_of_wall.items()}
     truth = np.array([drive.true_lines_world[wall_of_line[line]] for line in sorted(wall_of_line)]).reshape(-1, 2)
-    return Ridden(np.array(poses), np.array(covs), joint, drive.true_poses_world, truth)
+    known = (np.array([each[k] for each in relative]) for k in (0, 1))
+    return Ridden(np.array(poses), np.array(covs), joint, drive.true_poses_world, truth, *known)

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from explore.step import Step
 from sim.logs.recorded_robot import differing, fan_of
 from slam.estimation.backend import Joint
+from slam.evaluation.from_start import FromStart, as_it_is
 
 from ..scenario import WitnessedRobot
 from .association import Votes
@@ -53,6 +54,9 @@ class Log:
     estimated_world: Float[np.ndarray, "s 3"]
     """The estimate available at that step."""
     estimated_cov: Float[np.ndarray, "s 3 3"]
+    from_start_world: Float[np.ndarray, "s 3"]
+    """The estimate as it would be had the start been known (`from_start.py`); NaN where that could not be told."""
+    from_start_cov: Float[np.ndarray, "s 3 3"]
     true_world: Float[np.ndarray, "s 3"]
     face_of_beam: Int[np.ndarray, "s k"]
     path_length_m: Float[np.ndarray, " s"]
@@ -105,6 +109,7 @@ class Recorder:
 
     robot: WitnessedRobot
     votes: Votes
+    from_start: FromStart = as_it_is
     last: Step | None = None
     joint: Joint | None = None
     """Pose and all lines at the last step; None where the back end could no longer tell."""
@@ -127,6 +132,7 @@ class Recorder:
                 " a mission yields a step after each sense()"
             )
         belief = step.map.belief
+        from_start_world, from_start_cov = self.from_start(belief)
         self.last, self.joint = step, None
         if step.path_length_m >= EVERY_M * len(self.sketches):
             self.sketches.append(_sketch(step))
@@ -152,6 +158,8 @@ class Recorder:
                 "touched": step.odometry.touched,
                 "estimated_world": belief.pose_world,
                 "estimated_cov": belief.pose_cov,
+                "from_start_world": from_start_world,
+                "from_start_cov": from_start_cov,
                 "true_world": record.poses_world[-1],
                 "face_of_beam": record.faces_of_beams[-1],
                 "path_length_m": step.path_length_m,

@@ -62,6 +62,15 @@ def pose_nees(log: Log) -> Float[np.ndarray, " s"]:
     return nees_of_poses(log.estimated_world, log.estimated_cov, log.true_world)
 
 
+def pose_nees_from_start(log: Log) -> Float[np.ndarray, " s"]:
+    """Return the NEES at each step of the pose relative to the start; NaN where there is none."""
+    known = np.isfinite(log.from_start_cov).all(axis=(1, 2))
+    values = np.full(len(log), np.nan)
+    if known.any():
+        values[known] = nees_of_poses(log.from_start_world[known], log.from_start_cov[known], log.true_world[known])
+    return values
+
+
 def nees_of_poses(
     estimated_world: Float[np.ndarray, "s 3"],
     estimated_cov: Float[np.ndarray, "s 3 3"],
@@ -157,10 +166,13 @@ def _pose_scores(log: Log, errorless: bool) -> dict[str, Any]:
         "odometry_end_m": float(wheels[-1]),
         "pose_anees": None,
         "pose_nees_in_band": None,
+        "pose_anees_from_start": None,
     }
-    values = pose_nees(log)
+    values, relative = pose_nees(log), pose_nees_from_start(log)
     if not errorless and np.all(np.isfinite(values)):
         scores |= {"pose_anees": anees(values, 3), "pose_nees_in_band": share_in_band(values, 3)}
+    if not errorless and np.all(np.isfinite(relative)):
+        scores["pose_anees_from_start"] = anees(relative, 3)
     return scores
 
 

@@ -17,6 +17,7 @@ from rich.progress import (
 from rich.table import Column, Table
 
 from explore.step import Step
+from slam.evaluation.consistency import verdict_on_noise
 
 from .console import plain_console
 
@@ -114,9 +115,11 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("false matches", str(summary["false_matches"])),
         ("pose error, rms", f"{100 * summary['pose_rmse_m']:.2f} cm, {57.29578 * summary['heading_rmse_rad']:.3f} deg"),
         ("odometry alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
+        ("pose ANEES from the start (1 is ideal)", number(summary["pose_anees_from_start"])),
         ("pose ANEES (1 is ideal)", number(summary["pose_anees"])),
         ("pose NEES in the 95 % band", number(summary["pose_nees_in_band"])),
         ("map ANEES (1 is ideal)", number(summary["map_anees"])),
+        ("NIS (1 is ideal), scans in its band", _innovations(summary)),
         *_faults(summary),
     ]
     if home := summary["return_to_start"]:
@@ -165,6 +168,12 @@ def number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
+def _innovations(summary: dict[str, Any]) -> str:
+    """Return the NIS and its verdict."""
+    nis, share = summary["nis"], summary["nis_in_band"]
+    return "-" if nis is None else f"{nis:.3f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
+
+
 def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
     """Print one column for each of several replays of one recording on standard output."""
     _print_columns(
@@ -172,6 +181,7 @@ def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
         title,
         {
             "status": "status",
+            "ANEES from the start": "pose_anees_from_start",
             "pose ANEES": "pose_anees",
             "NEES in 95 % band": "pose_nees_in_band",
             "map ANEES": "map_anees",
@@ -222,10 +232,10 @@ def _short(value: Any) -> str:
 def print_pooled(rows: Sequence[dict[str, Any]], title: str) -> None:
     """Print one row for each back end of a campaign, pooled over its worlds and strategies, on standard output."""
     table = Table(title=title, title_justify="left")
-    for name in ("back end", "complete", "pose ANEES", "map ANEES", "walls cm", "path cm"):
+    for name in ("back end", "complete", "ANEES from the start", "map ANEES", "walls cm", "path cm"):
         table.add_column(name, justify="left" if name == "back end" else "right")
     for row in rows:
-        anees = [_short(row[name] and row[name]["mean"]) for name in ("pose_anees", "map_anees")]
+        anees = [_short(row[name] and row[name]["mean"]) for name in ("pose_anees_from_start", "map_anees")]
         errors = [_short(row[name] and 100.0 * row[name]["mean"]) for name in ("wall_rmse_m", "ate_m")]
         table.add_row(row["backend"], f"{row['complete']} of {row['trials']}", *anees, *errors)
     plain_console().print(table)

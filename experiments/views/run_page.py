@@ -8,6 +8,7 @@ import numpy as np
 
 from explore.following.wall_following import FollowingConfig
 from sim.logs.archive import regular
+from slam.evaluation.consistency import verdict_on_noise
 from viz import palette
 from viz.figures.maps import png
 from viz.figures.plots import draw_coverage
@@ -38,8 +39,12 @@ FIGURES: dict[str, tuple[str, float]] = {
     "swept": ("floor seen, %", 100.0), "contours_closed": ("contours closed", 1.0),
     "contours_reachable": ("contours there are", 1.0), "open_ends": ("open ends left", 1.0), "lines": ("walls", 1.0),
     "pose_rmse_m": ("pose error, cm rms", 100.0), "heading_rmse_rad": ("heading error, degrees rms", 180.0 / np.pi),
-    "odometry_max_m": ("odometry alone, worst, m", 1.0), "pose_anees": ("pose ANEES (1 is ideal)", 1.0),
+    "odometry_max_m": ("odometry alone, worst, m", 1.0),
+    "pose_anees_from_start": ("pose ANEES from the start (1 is ideal)", 1.0),
+    "pose_anees": ("pose ANEES (1 is ideal)", 1.0),
     "pose_nees_in_band": ("steps in the 95 % band, %", 100.0), "map_anees": ("map ANEES (1 is ideal)", 1.0),
+    "nis": ("NIS (1 is ideal)", 1.0),
+    "nis_in_band": ("scans in the 95 % band of the NIS, %", 100.0),
     "false_matches": ("false matches", 1.0), "duplicate_lines": ("duplicate walls", 1.0),
     "collisions": ("collisions", 1.0), "drive_time_s": ("driving time, s", 1.0),
     "step_ms": ("computing time of a step, ms", 1.0),
@@ -165,9 +170,20 @@ def _answer(name: str, summary: dict[str, Any]) -> str:
     if summary.get("pose_rmse_m") is None:
         return f"{words} {summary['lines']} walls, {number(summary['duplicate_lines'])} of them duplicates."
     words += f" the pose {_told(summary['pose_rmse_m'], 100.0)} cm off (rms)"
-    if summary.get("pose_anees") is None:
-        return f"{words}."
-    return f"{words}, {_honest(summary['pose_anees'])} (ANEES {number(summary['pose_anees'])}; 1 is ideal)."
+    anees = summary.get("pose_anees_from_start", summary.get("pose_anees"))
+    if anees is not None:
+        words += f", {_honest(anees)} (ANEES from the start {number(anees)}; 1 is ideal)"
+    return f"{words}{_innovations(summary)}."
+
+
+def _innovations(summary: dict[str, Any]) -> str:
+    """Return what the scans themselves say of the noise that is stated of them; nothing where none was matched."""
+    nis, share = summary.get("nis"), summary.get("nis_in_band")
+    if nis is None or share is None:
+        return ""
+    return (
+        f"; innovations are {verdict_on_noise(nis, share)} (NIS {number(nis)}, {percent(share)} % of the scans in band)"
+    )
 
 
 def _honest(anees: float) -> str:

@@ -39,6 +39,9 @@ class BackendEntry:
     """Whether its answer depends on where the world's origin lies."""
     keeps_frame: bool = False
     """Whether it never learns where the world lies, which no scan tells (docs/estimation.md)."""
+    carries_start: bool = False
+    """Whether the error of the start is in the pose's covariance as it was at first, carried along, and what was lost
+    since is added to it: nothing is ever learnt of where the world lies, exactly."""
 
     def make(
         self,
@@ -93,18 +96,21 @@ BACKENDS: dict[str, BackendEntry] = {
         "InvariantEkf",
         "full EKF with the right-invariant error: gains nothing unobservable",
         keeps_frame=True,
+        carries_start=True,
     ),
     "graph": BackendEntry(
         _lazily("graph.graph", "Graph"),
         "factor graph (GTSAM iSAM2): every pose kept and relinearised",
         GraphConfig,
         keeps_frame=True,
+        carries_start=True,
     ),
     "graph-batch": BackendEntry(
         _lazily("graph.batch", "GraphBatch"),
         "as graph, and everything optimised at the end",
         GraphConfig,
         keeps_frame=True,
+        carries_start=True,
     ),
     "textbook-ekf": BackendEntry(
         _lazily("textbook_ekf", "TextbookEkf"),

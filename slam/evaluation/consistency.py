@@ -28,6 +28,13 @@ def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"])
     return nees(innovations, covs)
 
 
+def verdict_on_noise(nis: float, in_band: float) -> str:
+    """Return in words what a NIS, and the share of steps whose last scans lie in its band, say of the stated noise."""
+    if in_band >= 0.5:
+        return "as stated"
+    return "smaller than stated" if nis < 1.0 else "larger than stated"
+
+
 def chi2_band(dof: int, confidence: float = 0.95, runs: int = 1) -> tuple[float, float]:
     """Return the two-sided band that the mean of `runs` independent chi-square variables lies in."""
     tail = 0.5 * (1.0 - confidence)

@@ -28,6 +28,7 @@ class Measure:
 
 
 MEASURES = (
+    Measure("pose_anees_from_start", True),
     Measure("pose_anees", True),
     Measure("map_anees", True),
     Measure("ate_m", True),
@@ -41,10 +42,14 @@ MEASURES = (
     Measure("double_entries", False),
 )
 MEANS = (
+    "pose_anees_from_start",
     *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "heading_rmse_rad"),
-    *("nis_mean", "nis_whiteness"),
+    *("nis", "nis_in_band", "nis_mean", "nis_whiteness"),
 )
-MAY_LACK = ("pose_anees", "map_anees", "joint_anees", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far")
+MAY_LACK = (
+    *("pose_anees_from_start", "pose_anees", "map_anees", "joint_anees", "wall_rmse_m", "wall_shape_m"),
+    "pose_anees_so_far",
+)
 """Columns that a run may lack: one covariance that is not positive definite has no NEES, a map without a wall no error.
 Means leave such runs out, and `without` beside them says how many."""
 AT_MARKS = (

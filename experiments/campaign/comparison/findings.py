@@ -35,7 +35,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
         ("trace", PAPER, "comes to claim more than at its start", _trace),
         *(("margin", name, "never below the bound", _never_below) for name in CONSISTENT),
         ("below", BASELINE, "below the bound: from where on, by how much", _below),
-        ("anees", "graph", f"interval of the mean pose ANEES within {anees}", _anees),
+        ("anees", "graph", f"interval of the mean pose ANEES from the start within {anees}", _anees),
         ("held", "graph", f"95 % intervals of distances hold the truth in {held}", _held),
         ("held", PAPER, "95 % intervals of distances hold the truth: how rarely", lambda row: (_held(row)[0], None)),
         *(("doubles", name, f"no more duplicate walls than the {refused} that its gate must refuse", _doubles)
@@ -95,8 +95,8 @@ def _below(row: Row) -> tuple[Row, bool | None]:
 
 
 def _anees(row: Row) -> tuple[Row, bool | None]:
-    pose = row["pose_anees"]
-    return dict(pose or {}) | {"without": row["without"]["pose_anees"]}, _inside(pose, ANEES_AIM)
+    pose = row["pose_anees_from_start"]
+    return dict(pose or {}) | {"without": row["without"]["pose_anees_from_start"]}, _inside(pose, ANEES_AIM)
 
 
 def _held(row: Row) -> tuple[Row, bool | None]:

@@ -27,12 +27,14 @@ TOLD: Shape = All(
     {"measure": Word(*MEASURE_WORDS), "pairs_without_value": int},
 )
 DIFFERENCE: Shape = All(TOLD, {"kind": Word("ratio", "difference"), "first_better": NUMBER})
+LATER = ("pose_anees_from_start", "nis", "nis_in_band")
+"""Means that comparisons of earlier versions lack."""
 ARM = {"arm": Word(*ARMS)}
 STATES = dict.fromkeys(("driving", "finished", "failed"), int)
 CELL: Shape = All(
     ARM,
     {"backend": str, "without": Each(int), **dict.fromkeys(("trials", "complete", "sound", "distances", *SUMS), int)},
-    dict.fromkeys(MEANS, Maybe(All(ESTIMATE, {"median": float}))),
+    {name + "?" * (name in LATER): Maybe(All(ESTIMATE, {"median": float})) for name in MEANS},
     dict.fromkeys(("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"), Maybe(ESTIMATE)),
     dict.fromkeys(("trace_least", "bound_margin", "steps_outside_band"), NUMBER),
 )

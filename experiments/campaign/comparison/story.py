@@ -11,7 +11,7 @@ from ..scores.score import END
 from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY
 from .words import ANSWERS, ARMS_SHORT, mean, within
 
-TOLD = (("wall_rmse_m", "error of the walls"), ("pose_anees", "pose ANEES"))
+TOLD = (("wall_rmse_m", "error of the walls"), ("pose_anees_from_start", "pose ANEES from the start"))
 """Ratios that a verdict names: how wrong, and how honest."""
 
 
@@ -109,10 +109,10 @@ def _states_of(campaign: Campaign, said: dict[str, Any]) -> list[str]:
     """Return how many runs of each back end are complete, and their ANEES, in the arm that decides."""
     words = []
     for row in (row for row in said["pooled"] if row["arm"] == decisive_arm(campaign)):
-        pose, walls = row["pose_anees"], row["map_anees"]
+        pose, walls = row.get("pose_anees_from_start"), row["map_anees"]
         anees = within(number(pose["mean"]), pose) if pose else NONE
         words.append(
-            f"{row['backend']}: {row['complete']} of {row['trials']} runs complete, pose ANEES {anees},"
+            f"{row['backend']}: {row['complete']} of {row['trials']} runs complete, pose ANEES from the start {anees},"
             f" map ANEES {mean(walls)}, walls off by {mean(row['wall_rmse_m'], scale=100.0)} cm."
         )
     return words

@@ -29,7 +29,7 @@ FIRST = (
     *("world", "backend", "strategy", "seed", "mode", "association", "status", "reason", "steps", "path_length_m"),
     *("drive_time_s", "open_ends", "contours_closed", "contours_reachable", "lines", "coverage", "swept"),
     *("collisions", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band", "map_anees"),
-    *("duplicate_lines", "false_matches"),
+    *("duplicate_lines", "false_matches", "pose_anees_from_start", "nis", "nis_in_band"),
 )
 """Columns that scripts rely on; the others follow in the order in which they were first met."""
 TIMINGS = "step_ms_"
@@ -107,7 +107,10 @@ def mark_rows(record: TrialScores) -> list[Row]:
 def step_rows(records: Sequence[TrialScores]) -> list[Row]:
     """Return the statistics of one cell over its trials, step by step, as long as a trial goes on."""
     longest = max((len(r.arrays.get("pose_nees", ())) for r in records), default=0)
-    names = ("path_length_m", "pose_nees", "pose_trace", "pose_error_m", "heading_error_rad", "heading_sigma_rad")
+    names = (
+        *("path_length_m", "pose_nees", "pose_nees_from_start", "pose_trace"),
+        *("pose_error_m", "heading_error_rad", "heading_sigma_rad"),
+    )
     stacked = {name: np.full((len(records), longest), np.nan) for name in names}
     for row, record in enumerate(records):
         for name in names:
@@ -118,6 +121,7 @@ def step_rows(records: Sequence[TrialScores]) -> list[Row]:
     for k in range(longest):
         column = {name: stacked[name][going[:, k], k] for name in names}
         nees = column["pose_nees"][np.isfinite(column["pose_nees"])]
+        relative = column["pose_nees_from_start"][np.isfinite(column["pose_nees_from_start"])]
         low, high = chi2_band(3, runs=max(len(nees), 1))
         anees = float(nees.mean()) / 3.0 if len(nees) else None
         rows.append(
@@ -128,6 +132,7 @@ def step_rows(records: Sequence[TrialScores]) -> list[Row]:
                 "without_nees": int(going[:, k].sum()) - len(nees),
                 "path_length_m": float(column["path_length_m"].mean()),
                 "pose_anees": anees,
+                "pose_anees_from_start": float(relative.mean()) / 3.0 if len(relative) else None,
                 "band_low": low / 3.0,
                 "band_high": high / 3.0,
                 "pose_nees_median": float(np.median(nees)) if len(nees) else None,

@@ -10,6 +10,7 @@ from ..plan import CLOSED, Campaign, is_errorless
 ANSWERS = {"matches": "Yes", "does not match": "No", "undecided": "Undecided"}
 ARMS_SHORT = {CLOSED: "closed loop", "replay-own": "replay, own gate", "replay-true": "replay, true matches"}
 MEASURE_WORDS = {
+    "pose_anees_from_start": "pose ANEES from the start",
     "pose_anees": "pose ANEES",
     "map_anees": "map ANEES",
     "ate_m": "error of the path",
@@ -58,8 +59,13 @@ def left_out(campaign: Campaign, said: dict[str, Any]) -> tuple[str, ...]:
     lines: list[str] = []
     if is_errorless(campaign):
         return ()
-    for name, what in (("pose_anees", "pose ANEES"), ("map_anees", "map ANEES"), ("wall_rmse_m", "error of the walls")):
-        count = sum(row["without"][name] for row in said["pooled"])
+    for name, what in (
+        ("pose_anees", "pose ANEES"),
+        ("pose_anees_from_start", "pose ANEES from the start"),
+        ("map_anees", "map ANEES"),
+        ("wall_rmse_m", "error of the walls"),
+    ):
+        count = sum(row["without"].get(name, 0) for row in said["pooled"])
         if count:
             complete = sum(row["complete"] for row in said["pooled"])
             why = "no wall of known truth" if name == "wall_rmse_m" else "a covariance that is not positive definite"

@@ -26,7 +26,10 @@ from ..plan import CLOSED, Campaign, Trial, drawing_of, trials, world_key
 from ..store import Store
 
 MARGIN_M = 0.5
-RATIO_LABELS = {"pose_anees": "pose ANEES over that of full-ekf", "wall_rmse_m": "error of walls over that of full-ekf"}
+RATIO_LABELS = {
+    "pose_anees_from_start": "pose ANEES from the start over that of full-ekf",
+    "wall_rmse_m": "error of walls over that of full-ekf",
+}
 
 _NAMES = ("world", "strategy", "backend", "mode", "association")
 _CURVE = ("path_length_m", "pose_anees", "band_low", "band_high")

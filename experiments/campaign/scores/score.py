@@ -20,7 +20,7 @@ from ...scoring.corners import corners
 from ...scoring.coverage import NEAR_NOISY_M, Samples, alignment, coverage, sample
 from ...scoring.measurements import corner_points, distances
 from ...scoring.records import Log
-from ...scoring.summary import joint_anees, map_error, pose_nees
+from ...scoring.summary import joint_anees, map_error, pose_nees, pose_nees_from_start
 from ...trial import TrialResult
 from .innovation import InnovationEar
 from .observer import Moment, Observer, association_counts
@@ -161,6 +161,7 @@ def _step_arrays(log: Log, nees: Float[np.ndarray, " s"]) -> dict[str, np.ndarra
     return {
         "path_length_m": log.path_length_m,
         "pose_nees": nees,
+        "pose_nees_from_start": pose_nees_from_start(log),
         "pose_trace": np.trace(log.estimated_cov, axis1=1, axis2=2),
         "pose_error_m": position_errors(log.estimated_world, log.true_world),
         "heading_error_rad": np.abs(wrap(log.estimated_world[:, 2] - log.true_world[:, 2])),

@@ -22,7 +22,7 @@ from ..truth import Truth
 WITNESSED = (
     "path_length_true_m coverage coverage_own_frame coverage_curve contours_closed contours_reachable swept"
     " pose_rmse_m heading_rmse_rad odometry_rmse_m odometry_max_m odometry_end_m pose_anees pose_nees_in_band map_anees"
-    " map_anees_straight map_frame_anees map_frame_m map_frame_rad lines_unlabelled false_matches"
+    " pose_anees_from_start map_anees_straight map_frame_anees map_frame_m map_frame_rad lines_unlabelled false_matches"
     " false_matches_few_beams false_merges collisions map_began_step return_to_start"
 )
 """The keys of summary.json that only the truth tells."""
