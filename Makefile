@@ -74,7 +74,7 @@ apartments-errorless: setup
 
 # What the mapper errs by where nothing is wrong with its input, and where that begins.
 exact: setup
-	$(BIN)/python -m studies.consistency.exact --plans $(PLANS) --out $(ROWS)/in_text/exact.jsonl --worlds paper-fig4 paper-fig5 \
+	$(BIN)/python -m studies.results.exact --plans $(PLANS) --out $(ROWS)/in_text/exact.jsonl --worlds paper-fig4 paper-fig5 \
 	    paper-fig8 paper-fig9 rooms hall $(addprefix $(PLANS)/../rasters/,nav2_depot.yaml nav2_tb3_sandbox.yaml stage_cave.png \
 	    stage_hospital_section.png willow-2010-0.10.yaml)
 

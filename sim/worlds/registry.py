@@ -10,9 +10,9 @@ import shapely
 from jaxtyping import Float
 
 from .drawing import Drawing, WorldError, as_pose, numbers, shorten
-from .foreign import check_foreign
 from .options import AS_DRAWN, DrawingOptions
 from .readers.files import read_bytes, read_json_map
+from .readers.foreign import check_foreign
 from .solid import build
 from .world import World
 

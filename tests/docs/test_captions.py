@@ -11,8 +11,8 @@ from experiments.artifacts.formats import FORMATS
 from experiments.artifacts.results import config_record
 from experiments.scenario import TrialConfig
 from experiments.usage import UsageError
-from studies import captions
-from studies.captions import CAPTIONS, KEPT, PICTURES, Caption, checksum, read_captions, shown, with_caption
+from studies.results import captions
+from studies.results.captions import CAPTIONS, KEPT, PICTURES, Caption, checksum, read_captions, shown, with_caption
 
 ROOT = Path(__file__).parents[2]
 PAGES = [page for pattern in captions.PAGES for page in sorted(ROOT.glob(pattern))]

@@ -15,7 +15,7 @@ from studies.exploration.courts import CourtsStudy, is_premature
 def test_a_court_is_one_building_in_whose_middle_no_wall_is_in_sight(seed, tmp_path):
     file = tmp_path / "court.json"
     file.write_text(json.dumps(court(seed)))
-    world = load(str(file), None, None)
+    world = load(str(file))
     assert distance_to_segments(world.start[None, :2], world.faces).min() > 2 * 3.5
     assert world.reachable().area > 0.85 * world.free.area > 500.0
     assert court(seed) == court(seed) != court(seed + 1)

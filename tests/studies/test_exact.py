@@ -8,7 +8,7 @@ from experiments.scenario import TrialConfig, build
 from experiments.scoring.association import Votes
 from experiments.scoring.truth import truth_of
 from experiments.trial import default_mission, run_scenario
-from studies.consistency.exact import JUMP_M, Movements, causes, exact, table
+from studies.results.exact import JUMP_M, Movements, causes, exact, table
 
 
 def test_a_room_of_straight_walls_is_mapped_exactly_and_nothing_jumps():

@@ -6,7 +6,7 @@ import pytest
 
 from experiments.scoring import statistics
 from experiments.scoring.statistics import estimate, holm
-from studies.consistency.levels import DRAWS_OF, FAMILY, LevelStudy, held, of_buildings, of_runs, outside_band
+from studies.results.levels import DRAWS_OF, FAMILY, LevelStudy, held, of_buildings, of_runs, outside_band
 
 CASES = 400
 

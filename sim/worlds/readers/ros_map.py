@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..drawing import Drawing, WorldError, numbers, shorten
-from ..foreign import check_yaml
 from ..options import AS_DRAWN, DrawingOptions
 from ..text import printable
 from .files import read_bytes
+from .foreign import check_yaml
 from .outlines import outlines
 from .picture import Picture, read_picture
 from .plain_yaml import as_number, plain_mapping

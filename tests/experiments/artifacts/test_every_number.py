@@ -17,7 +17,10 @@ BY_HAND = (
     *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations")),
     "artifacts/test_products",
     *(f"campaign/scores/test_{name}" for name in ("score", "path_scores")),
-    *(f"campaign/comparison/test_{name}" for name in ("tables", "comparison", "findings", "hypothesis", "left_out")),
+    *(
+        f"campaign/comparison/test_{name}"
+        for name in ("tables", "comparison", "findings", "hypothesis", "left_out", "families")
+    ),
 )
 """The tests that hold each number against another way to work it out."""
 

@@ -35,7 +35,13 @@ def another(value):
     if isinstance(value, list):
         return [another(each) for each in value]
     if isinstance(value, str):
-        return {"small": "large", "floor": "visibility", "joint": "paper", "wheels": "scans"}.get(value, value + "x")
+        return {
+            "small": "large",
+            "floor": "visibility",
+            "joint": "paper",
+            "wheels": "scans",
+            "viewpoints": "paper",
+        }.get(value, value + "x")
     return 1.5 if value is None else value + 1
 
 
@@ -46,6 +52,7 @@ NAMED = {
     "mission.free_space.fence": FENCE,
     "drawing.level": "1",
     "drawing.threshold": 0.5,
+    "robot.faults.people.standing": [1.0, 2.0],
     **{f"drawing.{name}": ["walls", "doors"] for name in ("layers", "ids", "without")},
 }
 """Settings whose default does not say what they hold."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.scoring.columns import Columns
+from experiments.scoring.records import Columns
 
 
 def rows(count):

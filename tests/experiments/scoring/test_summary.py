@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from experiments.scoring.coverage import alignment
 from experiments.scoring.records import Sketch
-from experiments.scoring.summary import Ending, nees_of_poses
+from experiments.scoring.summary import Ending, nees_of_poses, pose_nees_from_start
 from explore.goal import GivenUp, SetAside
 from explore.outcome import Outcome
 from slam.geometry.lines import through
@@ -117,6 +117,21 @@ def test_the_nees_of_poses_is_that_of_the_logarithm_of_matrices(run):
     assert inside == [False, False, True], "expected values on both sides of the band and in it"
     assert [value < low for value in values] == [False, True, False]
     assert found["pose_nees_in_band"] == pytest.approx(1 / 3)
+
+
+def test_the_score_from_the_start_is_that_of_the_pose_told_beside_the_estimate(run):
+    """The estimate as it would be had the start been known has poses and covariances of its own."""
+    other, covs = TRUE + 0.5 * OFF, 2.0 * COVS
+    log = log_of(from_start_world=other, from_start_cov=covs)
+    values = [nees_of(*rows) for rows in zip(other, TRUE, covs, strict=True)]
+    found = replace(run, log=log).summary()
+    assert found["pose_anees_from_start"] == pytest.approx(np.mean(values) / 3.0, rel=1e-4)
+    assert found["pose_anees"] == pytest.approx(run.summary()["pose_anees"])
+    np.testing.assert_allclose(pose_nees_from_start(log), values, rtol=1e-4)  # "pose_nees_from_start" of steps.csv
+    covs = covs.copy()
+    covs[1] = np.nan
+    lacking = replace(run, log=log_of(from_start_world=other, from_start_cov=covs)).summary()
+    assert lacking["pose_anees_from_start"] is None
 
 
 def test_one_covariance_that_is_none_leaves_no_mean_and_spoils_no_other_step(run):

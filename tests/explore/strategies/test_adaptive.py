@@ -125,7 +125,7 @@ class Listener(NearestRobot):
 
 
 def test_a_watchful_strategy_is_told_what_every_step_sees():
-    world, listener = load("paper-fig4", None, None), Listener()
+    world, listener = load("paper-fig4"), Listener()
     backend = BACKENDS["full-ekf"].make(np.array(world.start), np.diag([0.01, 0.01, 0.002]) ** 2)
     steps = list(islice(explore_mission(SimulatedRobot(world, 1), Mapper(backend), listener), 15))
     assert len(listener.heard) == len(steps)

@@ -5,7 +5,7 @@ import pytest
 from ezdxf import units
 
 from sim.worlds import DrawingOptions, World, WorldError, load
-from sim.worlds.foreign import FORMATS
+from sim.worlds.readers.foreign import FORMATS
 
 UNITS = {
     "metres": (units.M, 1.0), "millimetres": (units.MM, 1e3), "centimetres": (units.CM, 1e2),

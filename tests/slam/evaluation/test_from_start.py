@@ -13,7 +13,7 @@ from slam.backends import BACKENDS
 from slam.evaluation.consistency import nees, pose_covariances, pose_errors
 from slam.evaluation.from_start import Start, as_it_is, from_start
 from slam.robot import Odometry, ScannerSpec
-from studies.consistency.teeth import TeethStudy, rejected, round_a_room, scores
+from studies.results.teeth import TeethStudy, rejected, round_a_room, scores
 
 ONLINE = [name for name in BACKENDS if name != "graph-batch"]
 

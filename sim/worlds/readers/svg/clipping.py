@@ -12,10 +12,9 @@ from tinycss2 import serialize
 from .cascade import Style
 from .document import kind
 from .paint import url_of
-from .pieces import leaves
+from .pieces import filled, leaves
 from .place import DEEPEST, Place, Walk, both, box_around, is_gone, overlaid
 from .shapes import SHAPES, length, matrix, placed
-from .winding import filled
 
 SHOWN = 0.5
 """A mask lets through what it paints lighter than this."""

@@ -14,8 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from ...rooms import BROAD_M, WALL_M, areas
-from .pieces import Group, Piece
-from .winding import filled
+from .pieces import Group, Piece, filled
 
 SLIVER_M = 5e-3
 """What is left of a wall narrower than this, or shorter, was meant to be hidden."""

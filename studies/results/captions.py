@@ -1,7 +1,7 @@
 """The caption of each picture in docs/pictures, made from what the run behind the picture left.
 
-.venv/bin/python -m studies.captions fig9.png --of results/docs/run     # after the picture is made; docs/make-pictures
-.venv/bin/python -m studies.captions intel.png --words "Intel: ..."     # a picture of a log that is not here
+.venv/bin/python -m studies.results.captions fig9.png --of results/docs/run      # by docs/make-pictures
+.venv/bin/python -m studies.results.captions intel.png --words "Intel: ..."      # of a log that is not here
 
 The caption is kept in docs/pictures/captions.json with the checksum of the picture that it is of, and stands on every
 page that shows the picture. A test holds all three against each other (tests/docs/test_captions.py).

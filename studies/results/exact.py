@@ -3,8 +3,8 @@
 Whatever moves the pose is then an error of its own, or the mending of one. Each such movement is put down to the
 observation that lies farthest, by what is stated of it, from the true line of the wall that it was fused into.
 
-.venv/bin/python -m studies.consistency.exact --plans ../shared/data/plans   # goes on where it was interrupted
-.venv/bin/python -m studies.consistency.exact --worlds paper-fig5 depot.yaml --backend graph
+.venv/bin/python -m studies.results.exact --plans ../shared/data/plans   # goes on where it was interrupted
+.venv/bin/python -m studies.results.exact --worlds paper-fig5 depot.yaml --backend graph
 """
 
 from collections import Counter

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from .drawing import WorldError
+from ..drawing import WorldError
 
 SVG = "export it as SVG or DXF"
 STOREY = "export a plan of one storey as SVG or DXF"

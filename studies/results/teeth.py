@@ -3,7 +3,7 @@
 A robot stands still for a while in a room and then drives round. The back ends run alone, with the true association and
 the stated noise. A campaign rejects where the 95 % interval of its mean ANEES leaves out 1.
 
-.venv/bin/python -m studies.consistency.teeth
+.venv/bin/python -m studies.results.teeth
 """
 
 import itertools

@@ -1,6 +1,6 @@
 """Do the intervals and tests hold their level? Campaigns of values of known mean, drawn thousands of times.
 
-.venv/bin/python -m studies.consistency.levels
+.venv/bin/python -m studies.results.levels
 """
 
 from collections.abc import Callable
