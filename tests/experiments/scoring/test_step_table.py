@@ -32,7 +32,8 @@ def test_each_column_is_that_of_its_name():
     expected = {
         "step": [0, 1, 2], "time_s": [0, 1, 2], "path_length_m": [0.0, 0.1, 0.25],
         "pose_nees": nees_of_poses(estimated, COVS, TRUE),
-        "pose_nees_from_start": nees_of_poses(estimated, COVS, TRUE), "pose_trace": COVS[:, 0, 0] + COVS[:, 1, 1] + COVS[:, 2, 2],
+        "pose_nees_from_start": nees_of_poses(estimated, COVS, TRUE),
+        "pose_trace": COVS[:, 0, 0] + COVS[:, 1, 1] + COVS[:, 2, 2],
         "open_ends": [1, 2, 4], "lines": [3, 3, 3], "lines_tentative": [0, 0, 1], "closed_chains": [0, 0, 1],
         "set_aside": [0, 1, 2], "x_m": estimated[:, 0], "y_m": estimated[:, 1], "heading_rad": estimated[:, 2],
         "true_x_m": TRUE[:, 0], "true_y_m": TRUE[:, 1], "true_heading_rad": TRUE[:, 2], "error_heading_rad": OFF[:, 2],

@@ -16,7 +16,7 @@ import shapely
 from jaxtyping import Float
 
 from ...drawing import Drawing, WorldError, counted, shorten
-from ...limits import check_labels, check_size
+from ...limits import check_count, check_labels, check_size
 from ...options import AS_DRAWN, DrawingOptions
 from ...rooms import WALL_M, Outline, areas, plan_of
 from .doors import at_point, opening, shared_walls
@@ -193,6 +193,9 @@ def _add_line(found: _Found, line: shapely.LineString, about: About) -> None:
 
 
 def _add_polygon(found: _Found, polygon: shapely.Polygon, about: About) -> None:
+    check_count(
+        int(shapely.get_num_coordinates(polygon))
+    )  # before it is mended, which takes minutes for a tangled ring
     if about.kind == "outline":
         found.shells.append(polygon)
         return
