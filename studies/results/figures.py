@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slam.evaluation.consistency import verdict_on_noise
+
 from ..runner.rows import Row
 
 Table = list[list[str]]
@@ -45,6 +47,15 @@ def median_of(rows: Sequence[Row], name: str, digits: int = 3) -> str:
 def typical(rows: Sequence[Row], name: str) -> str:
     """Return their mean and their median, in words."""
     return f"{mean_of(rows, name):.3g}, {median_of(rows, name)}"
+
+
+def innovations(rows: Sequence[Row]) -> str:
+    """Return the mean NIS, the share of scans in its band, and what both say of the stated noise; "-" without any."""
+    told = [row for row in rows if row.get("nis") is not None]
+    if not told:
+        return "-"
+    nis, share = mean_of(told, "nis"), mean_of(told, "nis_in_band")
+    return f"{nis:.2f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
 
 
 def total(rows: Sequence[Row], name: str) -> int:

@@ -12,6 +12,7 @@ from .figures import (
     completed,
     false_matches,
     grouped,
+    innovations,
     mean_of,
     median_of,
     numbers,
@@ -20,6 +21,7 @@ from .figures import (
 )
 
 WRONG = "false matches of five beams or more"
+NOISE = "NIS, scans in its band: the noise is"
 LOST = 3.0
 """A run whose mean NEES is this many times what the estimator expects no longer knows where it is."""
 
@@ -37,6 +39,7 @@ def apartments(rows: Sequence[Row]) -> Found:
         "collisions": lambda mine: str(total(mine, "collisions")),
         "pose ANEES: mean, median": lambda mine: typical(mine, "pose_anees"),
         "map ANEES: mean, median": lambda mine: typical(mine, "map_anees"),
+        NOISE: innovations,
         "maps with an ANEES above 3": lambda mine: str(sum(value > LOST for value in numbers(mine, "map_anees"))),
         "false matches a plan: of five beams or more, of fewer": lambda mine: (
             f"{np.mean(false_matches(mine)):.2f}, {mean_of(mine, 'false_matches_few_beams'):.2f}"
@@ -62,7 +65,7 @@ def _anees(rows: Sequence[Row]) -> str:
 def real_plans(rows: Sequence[Row]) -> Found:
     """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones."""
     head = ["back end", "pose ANEES: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
-    table: Table = [["matches", *head, WRONG, "duplicate walls"]]
+    table: Table = [["matches", *head, WRONG, "duplicate walls", NOISE]]
     for stage in dict.fromkeys(row["stage"] for row in rows):
         for backend, mine in grouped([row for row in rows if row["stage"] == stage], "backend").items():
             pairs = np.array([row["pairs"] for row in mine])
@@ -75,7 +78,8 @@ def real_plans(rows: Sequence[Row]) -> Found:
                 f"{100 * held:.1f} %",
             ]
             wrong = float(np.mean(false_matches(mine)))
-            table.append([*cells, f"{wrong:.2f}", f"{mean_of(mine, 'duplicate_lines'):.2f}"])
+            doubles = f"{mean_of(mine, 'duplicate_lines'):.2f}"
+            table.append([*cells, f"{wrong:.2f}", doubles, innovations(mine)])
     own = grouped([row for row in rows if row["stage"] == "own"], "backend")
     plans = len({row["world"] for row in rows})
     maps = ", ".join(f"`{name}` {mean_of(mine, 'map_anees'):.3g}" for name, mine in own.items())
@@ -86,7 +90,7 @@ def schools(rows: Sequence[Row]) -> Found:
     """Return how back ends fare in schools over a limited number of steps, and which of them loses fewest maps."""
     head = ["back end", "runs", "exceptions", "pose ANEES: median", "map ANEES: median"]
     lost = f"lost: pose ANEES above {LOST:g}"
-    table: Table = [[*head, lost, "coverage by then: mean", f"{WRONG} a run", "collisions"]]
+    table: Table = [[*head, lost, "coverage by then: mean", f"{WRONG} a run", "collisions", NOISE]]
     shares = {}
     for backend, mine in grouped(rows, "backend").items():
         medians = [median_of(mine, name) for name in ("pose_anees", "map_anees")]
@@ -94,7 +98,8 @@ def schools(rows: Sequence[Row]) -> Found:
         shares[backend] = f"`{backend}` {gone} of {len(mine)}"
         cells = [f"`{backend}`", str(len(mine)), str(failed), *medians, str(gone)]
         covered, wrong = mean_of(mine, "coverage_own_frame"), np.mean(false_matches(mine))
-        table.append([*cells, f"{covered:.3f}", f"{wrong:.1f}", str(total(mine, "collisions"))])
+        cells += [f"{covered:.3f}", f"{wrong:.1f}", str(total(mine, "collisions"))]
+        table.append([*cells, innovations(mine)])
     failed = sum(bool(row["raised"]) for row in rows)
     verdict = "No run ended by an exception." if not failed else f"Ended by an exception: {failed} runs."
     return Found(table, f"{verdict} Maps lost: {'; '.join(shares.values())}.")
@@ -103,13 +108,13 @@ def schools(rows: Sequence[Row]) -> Found:
 def whole_schools(rows: Sequence[Row]) -> Found:
     """Return what exploring schools to their end came to, by back end."""
     head = ["back end", "complete", "coverage: mean, least", "own frame: mean", "pose ANEES: median"]
-    table: Table = [[*head, "map ANEES: mean, median", f"{WRONG} a run", "steps: mean", "collisions"]]
+    table: Table = [[*head, "map ANEES: mean, median", f"{WRONG} a run", "steps: mean", "collisions", NOISE]]
     for backend, mine in grouped(rows, "backend").items():
         coverage = numbers(mine, "coverage")
         cells = [f"`{backend}`", completed(mine), f"{np.mean(coverage):.4f}, {min(coverage):.3f}"]
         cells += [f"{mean_of(mine, 'coverage_own_frame'):.4f}", median_of(mine, "pose_anees")]
         cells += [typical(mine, "map_anees"), f"{np.mean(false_matches(mine)):.1f}", f"{mean_of(mine, 'steps'):.0f}"]
-        table.append([*cells, str(total(mine, "collisions"))])
+        table.append([*cells, str(total(mine, "collisions")), innovations(mine)])
     by = grouped(rows, "backend")
     return Found(table, " ".join(f"`{name}`: {completed(mine)} complete, {_anees(mine)}." for name, mine in by.items()))
 

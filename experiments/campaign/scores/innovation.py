@@ -9,7 +9,7 @@ from slam.association.matching import KnownWalls, Matches, MatchingConfig
 from slam.association.methods import Matcher
 from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
-from slam.evaluation.consistency import nis
+from slam.evaluation.consistency import chi2_band, nis
 from slam.extraction.segments import Segments
 from slam.extraction.straightness import cov_of_faces
 from slam.map.reliability import ReliabilityConfig, are_clear
@@ -39,6 +39,16 @@ class InnovationEar:
             return matches
 
         return overheard
+
+    def mean(self) -> float | None:
+        """Return the NIS over its degrees of freedom, all scans together: 1 is ideal."""
+        return float(np.sum(self.values) / np.sum(self.dofs)) if self.values else None
+
+    def in_band(self) -> float | None:
+        """Return the share of scans whose NIS lies in the 95 % band of its own chi-square."""
+        bands = {dof: chi2_band(dof) for dof in set(self.dofs)}
+        inside = [bands[dof][0] <= value <= bands[dof][1] for value, dof in zip(self.values, self.dofs, strict=True)]
+        return float(np.mean(inside)) if inside else None
 
     def whiteness(self) -> float | None:
         """Return the correlation of a wall's normalised innovations in two scans running: 0 for a right filter."""

@@ -85,7 +85,7 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
     arrays["coverage"] = np.array([scorer.coverage(moment) for moment in moments])
     if ear is not None and ear.values:
         arrays |= {"nis": np.array(ear.values), "nis_dof": np.array(ear.dofs)}
-        summary["nis_mean"] = float(np.sum(ear.values) / np.sum(ear.dofs))
+        summary["nis_mean"] = ear.mean()
         summary["nis_whiteness"] = ear.whiteness()
     return TrialScores(summary, arrays)
 
