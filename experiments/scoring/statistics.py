@@ -2,7 +2,7 @@
 
 By run: a studentised bootstrap of whole runs within each building (Efron and Tibshirani, An Introduction to the
 Bootstrap, 1993, section 12.5). By building: Student's t over the buildings' means. Both hold their level with ten
-skewed values (`studies.consistency.levels`); below five values there is none.
+skewed values (`studies.results.levels`); below five values there is none.
 """
 
 from collections.abc import Mapping, Sequence

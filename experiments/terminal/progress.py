@@ -115,7 +115,7 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("false matches", str(summary["false_matches"])),
         ("pose error, rms", f"{100 * summary['pose_rmse_m']:.2f} cm, {57.29578 * summary['heading_rmse_rad']:.3f} deg"),
         ("odometry alone: rms, worst", f"{summary['odometry_rmse_m']:.2f} m, {summary['odometry_max_m']:.2f} m"),
-        ("pose ANEES from the start (1 is ideal)", number(summary["pose_anees_from_start"])),
+        ("pose ANEES from the start (1 is ideal)", number(summary.get("pose_anees_from_start"))),
         ("pose ANEES (1 is ideal)", number(summary["pose_anees"])),
         ("pose NEES in the 95 % band", number(summary["pose_nees_in_band"])),
         ("map ANEES (1 is ideal)", number(summary["map_anees"])),
@@ -170,7 +170,7 @@ def number(value: float | None) -> str:
 
 def _innovations(summary: dict[str, Any]) -> str:
     """Return the NIS and its verdict."""
-    nis, share = summary["nis"], summary["nis_in_band"]
+    nis, share = summary.get("nis"), summary.get("nis_in_band")
     return "-" if nis is None else f"{nis:.3f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
 
 

@@ -29,10 +29,25 @@ def test_a_table_has_means_and_medians_over_plans_and_intervals_weighed_by_pairs
         row("graph", "true matches", "a"),
     ]
     first, second = cells(table_of_backends(rows))
-    assert first == ("graph", "own", "3", "1.00", "1.00", "3.00", "3.00", "0.900", "10.0", "3.00", "0.00")
+    assert first == (
+        "graph",
+        "own",
+        "3",
+        "1.00",
+        "1.00",
+        "3.00",
+        "3.00",
+        "0.900",
+        "10.0",
+        "3.00",
+        "0.00",
+        "-",
+        "-",
+        "-",
+    )
     assert second[:3] == ("graph", "true matches", "1")
     stages = cells(table_of_stages(rows, "graph"))
     assert [each[0] for each in stages] == ["nothing", "true matches"]
     found = real_plans(rows)
-    assert found.table[1] == ["own", "`graph`", "1, 1", "3, 3", "90.0 %", "3.00", "0.00"]
+    assert found.table[1] == ["own", "`graph`", "1, 1", "3, 3", "90.0 %", "3.00", "0.00", "-"]
     assert found.verdict == "The mean map ANEES over 3 apartments: `graph` 3."

@@ -84,4 +84,4 @@ def test_schools_count_the_runs_of_each_back_end_that_lost_their_map():
 
 def test_schools_to_their_end_have_means_over_the_runs():
     found = whole_schools([run("graph", coverage=0.8, status="stopped", steps=300), run("graph")])
-    assert found.table[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0"]
+    assert found.table[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0", "-"]

@@ -51,7 +51,12 @@ def test_the_page_answers_first_and_fetches_nothing(folder):
 
 def test_every_number_carries_its_name_for_a_phone_and_claims_come_first(folder):
     page = (folder / "report.html").read_text()
-    for name in ("pose ANEES (95 % interval)", "steps outside the band %", "entered twice"):
+    for name in (
+        "pose ANEES from the start (95 % interval)",
+        "pose ANEES",
+        "steps outside the band %",
+        "entered twice",
+    ):
         assert f'data-name="{name}"' in page
     assert page.index("Claims") < page.index("Does it know how wrong it is?")
 

@@ -11,11 +11,12 @@ from experiments.commands.cli import main
 from experiments.replays.oracles import true_odometry
 from experiments.replays.recordings import recorded
 from experiments.replays.replay import ReplayOptions, read_run, replay
-from experiments.scenario import TrialConfig
+from experiments.scenario import TrialConfig, sigmas_of
 from experiments.trial import run_trial
 from sim.logs.recorded_robot import RecordedRobot
-from slam.backends import BackendOptions
+from slam.backends import BACKENDS, BackendOptions
 from slam.backends.kalman.config import EkfConfig
+from slam.evaluation.from_start import Start
 from slam.extraction.config import ExtractionConfig
 from slam.geometry.poses import compose, wrap
 from slam.robot import MotionCommand
@@ -57,6 +58,22 @@ def test_a_log_on_disk_replays_like_the_run_in_memory(made):
     on_disk = replay(read_run(folder / "log.npz"), "invariant-ekf").log
     in_memory = replay(recorded(result), "invariant-ekf").log
     np.testing.assert_array_equal(on_disk.estimated_world, in_memory.estimated_world)
+
+
+@pytest.mark.parametrize("name", ["full-ekf", "graph"])
+def test_the_pose_relative_to_the_start_is_scored_as_had_the_start_been_known(made, name):
+    """By the true association, which no estimate can sway, the replay with `--p0 zero` tells the same number."""
+    run = recorded(made[0])
+    true = run.true_poses_world[0]
+    known = Start(run.start_pose, run.start_cov, true).known(sigmas_of("zero"))
+    trial = replace(run.trial, p0="zero")
+    zero = replace(run, trial=trial, start_pose=known.estimate_world, start_cov=known.cov)
+    options = ReplayOptions("true", perfect_extraction=True)
+    found, expected = (replay(each, name, options).summary for each in (run, zero))
+    assert expected["pose_anees_from_start"] == expected["pose_anees"]
+    exact = not BACKENDS[name].carries_start
+    assert found["pose_anees_from_start"] == pytest.approx(expected["pose_anees"], rel=1e-9 if exact else 0.02)
+    assert found["pose_anees"] != pytest.approx(expected["pose_anees"], rel=0.1)
 
 
 def test_the_true_association_makes_one_line_of_each_wall_and_no_false_match(made):
