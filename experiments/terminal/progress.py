@@ -171,7 +171,7 @@ def number(value: float | None) -> str:
 def _innovations(summary: dict[str, Any]) -> str:
     """Return the NIS and its verdict."""
     nis, share = summary.get("nis"), summary.get("nis_in_band")
-    return "-" if nis is None else f"{nis:.3f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
+    return "-" if nis is None or share is None else f"{nis:.3f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
 
 
 def print_comparison(summaries: Sequence[dict[str, Any]], title: str) -> None:
