@@ -58,10 +58,14 @@ def columns(path):
         return set(next(csv.reader(file)))
 
 
+SOMETIMES = {"fans"}
+"""Arrays of `log.npz` that only some logs have: of scans that differ in their beams."""
+
+
 @pytest.mark.parametrize("name", ["log.npz", "map.npz"])
 def test_every_array_is_told(runs, name):
     with np.load(runs / "home" / name) as arrays:
-        assert told(f"`{name}`") == set(arrays)
+        assert told(f"`{name}`") - SOMETIMES == set(arrays) - SOMETIMES
 
 
 @pytest.mark.parametrize(
