@@ -56,7 +56,7 @@ def log_of(estimated=None, **changes):
         "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": np.full(BEAMS, 0.01), "sigma_share": 0.0, "range_max_m": 4.0,
         "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
         "touched": np.zeros(3, bool),
-        "estimated_world": estimated, "estimated_cov": COVS, "from_start_world": estimated, "from_start_cov": COVS,
+        "estimated_world": estimated, "estimated_cov": COVS,
         "true_world": TRUE,
         "face_of_beam": np.full((3, BEAMS), -1), "path_length_m": np.array([0.0, 0.1, 0.25]),
         "open_ends": np.array([1, 2, 4]), "lines": np.array([3, 3, 3]), "tentative": np.array([0, 0, 1]),
@@ -66,6 +66,7 @@ def log_of(estimated=None, **changes):
         "route_walls": np.zeros(3, int), "reasons": ("", "", ""), "behaviours": ("look", "look", "look"),
     }  # fmt: skip
     kept |= changes
+    kept = {"from_start_world": kept["estimated_world"], "from_start_cov": kept["estimated_cov"]} | kept
     heard = {"heard": kept["odometry"], "heard_cov": kept["odometry_cov"]}
     return Log(scan_start_s=kept["time_s"] - 0.1, **heard, **kept)
 

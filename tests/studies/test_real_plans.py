@@ -50,4 +50,7 @@ def test_a_table_has_means_and_medians_over_plans_and_intervals_weighed_by_pairs
     assert [each[0] for each in stages] == ["nothing", "true matches"]
     found = real_plans(rows)
     assert found.table[1] == ["own", "`graph`", "1, 1", "3, 3", "90.0 %", "3.00", "0.00", "-"]
+    noise = {"nis": 0.7, "nis_in_band": 0.2, "pose_anees_from_start": 1.5}
+    (told,) = cells(table_of_backends([row("graph", "own", "a") | noise]))
+    assert told[-3:] == ("1.50", "1.50", "0.70, 20 %: smaller than stated")
     assert found.verdict == "The mean map ANEES over 3 apartments: `graph` 3."

@@ -146,8 +146,8 @@ def test_one_covariance_that_is_none_leaves_no_mean_and_spoils_no_other_step(run
 
 def test_without_noise_there_is_no_nees(run):
     found = without_noise(run).summary()
-    nees = ("pose_anees", "pose_nees_in_band", "map_anees", "map_anees_straight")
-    assert [found[key] for key in nees] == 4 * [None]
+    nees = ("pose_anees", "pose_anees_from_start", "pose_nees_in_band", "map_anees", "map_anees_straight")
+    assert [found[key] for key in nees] == 5 * [None]
     assert found["pose_rmse_m"] > 0.0
 
 

@@ -29,7 +29,7 @@ def made(world, make_map, make_chains):
     log = replace(
         run.log, **columns, time_s=np.arange(float(N)), scan_start_s=np.arange(float(N)) - 0.1,
         estimated_world=TRUE + OFF, estimated_cov=COVS, true_world=TRUE,
-        from_start_world=TRUE + OFF, from_start_cov=COVS,
+        from_start_world=TRUE + 0.5 * OFF, from_start_cov=COVS,
         path_length_m=PATH, lines=np.arange(N), reasons=("",) * N, behaviours=("look",) * N,
     )  # fmt: skip
     return replace(run, log=log, step=replace(run.step, index=N - 1, path_length_m=12.0))

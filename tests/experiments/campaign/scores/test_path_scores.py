@@ -89,5 +89,7 @@ def test_the_arrays_of_the_steps_are_what_each_step_knew(made):
     np.testing.assert_allclose(arrays["heading_error_rad"], np.abs(OFF[:, 2]))
     np.testing.assert_allclose(arrays["heading_sigma_rad"], np.sqrt(0.003 * (1.0 + 0.1 * np.arange(N))))
     np.testing.assert_allclose(arrays["pose_nees"], nees_of_poses(TRUE + OFF, COVS, TRUE))
+    relative = nees_of_poses(TRUE + 0.5 * OFF, COVS, TRUE)
+    np.testing.assert_allclose(arrays["pose_nees_from_start"], relative)
     turned = replace(made.log, estimated_world=TRUE + OFF + [0.0, 0.0, 2.0 * np.pi])
     np.testing.assert_allclose(kept(replace(made, log=turned)).arrays["heading_error_rad"], np.abs(OFF[:, 2]))
