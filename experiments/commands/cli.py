@@ -141,8 +141,17 @@ def _run(arguments: Sequence[str] | None) -> int:
         _tell("expected an input that fits into memory, found one that does not: take a smaller one")
         return FAILED
     except KeyboardInterrupt:
-        _tell("interrupted; files that were written are whole")
-        return INTERRUPTED
+        return _interrupted()
+    except ImportError as error:
+        # What interrupts a compiled module while it loads comes out of it as this.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            return _interrupted()
+        raise
+
+
+def _interrupted() -> int:
+    _tell("interrupted; files that were written are whole")
+    return INTERRUPTED
 
 
 def _tell(message: object) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import networkx as nx
 import numpy as np
@@ -51,8 +51,11 @@ def neighbours(chain: Chain) -> list[tuple[int, int]]:
     return [(a, b) for a, b in zip(chain.walls, following, strict=False) if a != b]
 
 
-def followed_wall(walls: StochasticMap, reach_m: float = 1.0) -> int | None:
-    """Return the id of the wall that the robot drives along: the nearest one whose free side it is on."""
+def followed_wall(walls: StochasticMap, reach_m: float = 1.0, rather: Collection[int] = ()) -> int | None:
+    """Return the id of the wall that the robot drives along: the nearest one whose free side it is on.
+
+    Round an outer corner two walls are equally near: the one in `rather` counts there.
+    """
     rows = np.flatnonzero(~walls.tentative)
     if not len(rows):
         return None
@@ -60,5 +63,6 @@ def followed_wall(walls: StochasticMap, reach_m: float = 1.0) -> int | None:
     along, offset = ends[:, 1] - ends[:, 0], walls.belief.pose_world[:2] - ends[:, 0]
     is_behind = along[:, 0] * offset[:, 1] < along[:, 1] * offset[:, 0]
     distance = np.where(is_behind, np.inf, walls.distances_m[rows])
-    best = int(np.argmin(distance))
+    tied = np.flatnonzero(np.isclose(distance, distance.min()))
+    best = int(tied[np.lexsort((distance[tied], ~np.isin(walls.ids[rows[tied]], list(rather))))[0]])
     return int(walls.ids[rows[best]]) if distance[best] <= reach_m else None

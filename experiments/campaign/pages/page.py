@@ -101,16 +101,18 @@ def _counts(said: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _estimators(campaign: Campaign, said: dict[str, Any]) -> list[Section]:
-    honesty, errors = [], []
+    honesty, innovations, errors = [], [], []
     for arm in campaign.arms:
         rows, title = [row for row in said["pooled"] if row["arm"] == arm], f"{ARMS_SHORT[arm]}: {ARM_WORDS[arm]}"
         listens = any(row["nis_mean"] is not None for row in rows)
-        header = _HONESTY_HEADER + (_NIS_HEADER if listens else ())
-        told = (_honesty_row(row) + (_nis_row(row) if listens else ()) for row in rows)
-        honesty.append(PageTable(title, header, tuple(told)))
+        header = _INNOVATION_HEADER + (_NIS_HEADER if listens else ())
+        told = (_innovation_row(row) + (_nis_row(row) if listens else ()) for row in rows)
+        honesty.append(PageTable(title, _HONESTY_HEADER, tuple(map(_honesty_row, rows))))
+        innovations.append(PageTable(title, header, tuple(told)))
         errors.append(PageTable(title, _ERROR_HEADER, tuple(map(_error_row, rows))))
     return [
         Section("Does it know how wrong it is?", _HONESTY_WORDS, tuple(honesty)),
+        Section("Innovations, and what no scan can tell", _INNOVATION_WORDS, tuple(innovations)),
         Section("How wrong is it?", _ERROR_WORDS, tuple(errors)),
     ]
 
@@ -118,20 +120,23 @@ def _estimators(campaign: Campaign, said: dict[str, Any]) -> list[Section]:
 _HONESTY_HEADER = (
     *("back end", "complete", "pose ANEES from the start (95 % interval)", "median", "pose ANEES", "map ANEES"),
     "without: from the start, pose, map",
-    "steps outside the band %",
-    *("distances held % (95 % interval)", "least trace", "bound margin", "NIS", "in its band %", "noise"),
+    *("steps outside the band %", "distances held % (95 % interval)"),
 )
+_INNOVATION_HEADER = ("back end", "NIS", "in its band %", "noise", "least trace", "bound margin")
 _NIS_HEADER = ("NIS of true matches", "whiteness")
 _HONESTY_WORDS = (
     "Over all worlds and strategies. ANEES: mean squared error over what the estimator expects; 1 is ideal, above it"
     " is overconfident. From the start: the pose relative to the start, whose own error nothing can observe and which"
     " drowns all other in the plain pose ANEES. Without: complete runs that have no such ANEES, since a covariance was"
     " not positive definite (or the map has no wall): they are in no mean of it. Distances held: share of the 95 %"
-    " intervals of corner distances that hold the truth. Least trace: of the pose's covariance, over the initial one."
-    " Bound margin: negative where an estimator claims to know where the world lies, which no scan tells. NIS: squared"
-    " innovations of the matches over what is expected, ideally 1, and the share of scans that lie in its 95 % band"
-    " with those before them; noise: what that says of the noise that is stated. A gate cuts off the tail of it. On"
-    " true matches also the NIS before any gate, and its correlation from scan to scan, ideally 1 and 0.",
+    " intervals of corner distances that hold the truth.",
+)
+_INNOVATION_WORDS = (
+    "NIS: squared innovations of the matches over what is expected, ideally 1, and the share of scans that lie in its"
+    " 95 % band with those before them; noise: what that says of the noise that is stated. A gate cuts off the tail of"
+    " it. On true matches also the NIS before any gate, and its correlation from scan to scan, ideally 1 and 0. Least"
+    " trace: of the pose's covariance, over the initial one. Bound margin: negative where an estimator claims to know"
+    " where the world lies, which no scan tells.",
 )
 _ERROR_HEADER = (
     *("back end", "walls, cm", "shape, cm", "without", "path, cm", "heading, degrees", "entered twice"),
@@ -146,7 +151,7 @@ _ERROR_WORDS = (
 
 
 def _honesty_row(row: dict[str, Any]) -> tuple[str, ...]:
-    pose, nis, in_band = (row.get(name) for name in ("pose_anees_from_start", "nis", "nis_in_band"))
+    pose = row.get("pose_anees_from_start")
     return (
         row["backend"],
         f"{row['complete']} of {row['trials']}",
@@ -156,11 +161,18 @@ def _honesty_row(row: dict[str, Any]) -> tuple[str, ...]:
         ", ".join(number(row["without"].get(name, 0)) for name in ("pose_anees_from_start", "pose_anees", "map_anees")),
         percent(row["steps_outside_band"]),
         share(row["distances_in_95"]),
-        number(row["trace_least"]),
-        number(row["bound_margin"], 2),
+    )
+
+
+def _innovation_row(row: dict[str, Any]) -> tuple[str, ...]:
+    nis, in_band = row.get("nis"), row.get("nis_in_band")
+    return (
+        row["backend"],
         mean(nis),
         mean(in_band, scale=100.0),
         verdict_on_noise(nis["mean"], in_band["mean"]) if nis and in_band else NONE,
+        number(row["trace_least"]),
+        number(row["bound_margin"], 2),
     )
 
 

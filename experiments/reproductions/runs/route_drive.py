@@ -83,7 +83,7 @@ class RouteDrive:
     steps: tuple[int, int, int]
     """At which the exploration ended, the first wall was reached, and the last one."""
     followed: tuple[int, ...]
-    """Ids of the walls that the robot was nearest to on the way, in order."""
+    """Ids of the walls that the robot was nearest to on the way, in order; round a corner of two, that of the plan."""
     has_arrived: bool
     """Whether the robot ends within `ARRIVED_M` of the goal."""
 
@@ -97,7 +97,7 @@ def drive_route(config: TrialConfig, ends: tuple[str, str]) -> RouteDrive:
     def watch(step: Step) -> None:
         taken.append(found[0].taken)
         if taken[-1] > 1:
-            followed.append(followed_wall(step.map))
+            followed.append(followed_wall(step.map, rather=found[0].plan))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
         assert scenario.strategy is not None, "expected a strategy to explore by"

@@ -183,6 +183,20 @@ def test_what_an_interrupt_leaves_half_built_says_nothing(monkeypatch):
     said.clear()
 
 
+@pytest.mark.parametrize(("cause", "status"), [(KeyboardInterrupt("SIGHUP"), 130), (None, None)])
+def test_an_interrupt_while_a_compiled_module_loads_is_one(monkeypatch, capsys, cause, status):
+    def load(_):
+        raise ImportError("initialization failed") from cause
+
+    monkeypatch.setattr(cli, "_parse", load)
+    if status is None:
+        with pytest.raises(ImportError):
+            main(["backends"])
+    else:
+        assert main(["backends"]) == status
+        assert capsys.readouterr().err == "chainslam: interrupted; files that were written are whole\n"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_that_comes_when_all_is_done_changes_no_status(number):
     code = (

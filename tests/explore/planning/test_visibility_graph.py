@@ -113,3 +113,11 @@ def test_the_wall_followed_is_the_nearest_whose_free_side_the_robot_is_on():
                 gaps[wall] = np.hypot(max(-x, x - 4.0, 0.0), y - low)
         nearest = min(gaps, key=gaps.get, default=None)
         assert found == (nearest if nearest is not None and gaps[nearest] <= 1.0 else None)
+
+
+def test_round_an_outer_corner_the_wall_that_is_wanted_counts():
+    corner = np.array([[[0, 4], [0, 0]], [[0, 0], [4, 0]]], dtype=float)[:, ::-1]
+    walls = map_of(corner, pose=(-0.3, -0.2, 0.0))
+    assert [followed_wall(walls, rather=(wall,)) for wall in (0, 1)] == [0, 1]
+    beside = map_of(corner, pose=(1.0, -0.2, 0.0))
+    assert [followed_wall(beside, rather=(wall,)) for wall in (0, 1)] == [1, 1]
