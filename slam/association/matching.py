@@ -27,7 +27,7 @@ class MatchingConfig:
 
     shared: SharedConfig = of_shared()
     method: MatchingMethod = "joint"
-    """All segments of a scan together, or each alone by `gate` and `shared.short_m`, as in the paper, or assigned
+    """All segments of a scan together, or each alone by `gate` and `shared.within_m`, as in the paper, or assigned
     by the weights of hypotheses (`methods`)."""
     gate: float = 0.99
     """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to

@@ -2,8 +2,9 @@
 
 Each segment is judged alone. Its squared Mahalanobis distance in model space from each line must stay below a level of
 the chi-square distribution with two degrees of freedom, and the least distance between segment and wall below a
-threshold in metres, so that the walls on both sides of a door stay two. Of the walls that pass it takes the best. No
-segment is in doubt: one that nothing passes is a new wall.
+threshold in metres, so that the walls on both sides of a door stay two. The paper names no threshold; here it is less
+than a wall is thick, so that the walls on both sides of one that joins them stay two as well. Of the walls that pass it
+takes the best. No segment is in doubt: one that nothing passes is a new wall.
 """
 
 import numpy as np
@@ -39,7 +40,7 @@ def match_alone(
     cov = np.ascontiguousarray(joint.cov)
     d2 = pair_distances(seen.e, seen.H_pose, seen.H_line, seen.R, line, cov).reshape(count, lines)
     apart = segment_distances(to_world(segments.ends, pose), _ends_world(walls.extents, anchors, means))
-    passes = (d2 <= gate_level(config.gate, 2)) & (apart <= config.shared.short_m)
+    passes = (d2 <= gate_level(config.gate, 2)) & (apart <= config.shared.within_m)
     matched = passes.any(axis=1)
     rows = np.flatnonzero(matched)
     best = _nearest(d2[rows], passes[rows])
@@ -89,7 +90,7 @@ def _refusals(
     """Return why the likeliest wall of each segment that has none was refused."""
     level, reasons = gate_level(config.gate, 2), {}
     for row in unmatched.tolist():
-        near = apart[row] <= config.shared.short_m
+        near = apart[row] <= config.shared.within_m
         best = int(np.argmin(np.where(near, d2[row], np.inf) if near.any() else d2[row]))
         wall = ids[best]
         reasons[row] = (

@@ -19,7 +19,7 @@ from slam.geometry.poses import wrap
 from slam.mapper import Mapper
 
 PAPER = MatchingConfig(method="paper")
-NEAR_M = PAPER.shared.short_m
+NEAR_M = PAPER.shared.within_m
 IDS = np.array([2, 3, 5, 8, 13, 21])
 
 
@@ -97,7 +97,7 @@ def by_hand(segments, walls, joint, config):
 def test_each_segment_takes_the_nearest_wall_that_passes_both_gates(seed):
     rng = np.random.default_rng(seed)
     met = {"far": 0, "gate": 0, "rivals": 0, "shared": 0}
-    for _ in range(6):
+    for _ in range(12):
         segments, walls, joint = scene(rng, correlated=seed % 2 == 0)
         found = match_alone(segments, walls, joint, PAPER)
         d2, apart = by_hand(segments, walls, joint, PAPER)
