@@ -97,6 +97,26 @@ def _campaign(runs: Sequence[Path]) -> str:
     return f"A campaign of {len(list(runs[0].glob('trials/**/*.npz')))} trials in the viewer"
 
 
+def _looked(runs: Sequence[Path]) -> str:
+    said = read_summary(runs[0])
+    metres, walls = said["path_length_m"], said["second_looks"]["lines"]
+    errors = said.get("relations_smoothed")
+    error = "" if errors is None else f", {errors['at_scans']['all']['translation_m']['mean']:.3f} m off on average"
+    return f"{_log(runs[0])}: {walls} walls and a path of {metres:.0f} m after second looks{error}; grey: wheel odometry"
+
+
+def _floor(runs: Sequence[Path]) -> str:
+    return f"{_log(runs[0])}: the floor that {read_summary(runs[0])['steps']} scans show, at the poses of second looks"
+
+
+def _log_view(runs: Sequence[Path]) -> str:
+    return f"{_log(runs[0])} in the viewer, by {_name(runs[0])}: map and wheel odometry, model space, visibility graph, NIS"
+
+
+def _log(run: Path) -> str:
+    return Path(read_summary(run)["world"]).name.partition(".")[0].capitalize()
+
+
 def _record(runs: Sequence[Path], name: str) -> dict[str, Any]:
     record: dict[str, Any] = json.loads((runs[0] / f"{name}.json").read_text())
     return record
@@ -118,6 +138,7 @@ CAPTIONS: Mapping[str, Callable[[Sequence[Path]], str]] = {
     "fig9.png": _map, "exploration.gif": _growing, "nees.png": _nees, "paths.png": _paths, "model.png": _model,
     "traversals.png": _traversals, "timeline-run.png": _one_run, "timeline-three.png": _side_by_side,
     "timeline-campaign.png": _campaign, "fig4.png": _figure_4, "fig10.png": _figure_10,
+    "intel.png": _looked, "seattle.png": _looked, "intel-floor.png": _floor, "timeline-intel.png": _log_view,
 }  # fmt: skip
 """By picture: what makes its caption from the folders of the runs that it shows."""
 

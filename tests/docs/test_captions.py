@@ -40,8 +40,8 @@ def test_the_script_that_makes_a_picture_makes_its_caption_from_a_run():
         word for names, body in re.findall(r"for name in ([^;]+); do (.*?)done", script, flags=re.S)
         if "caption $name.png" in body for word in names.split()
     }  # fmt: skip
-    made = {f"{name}.png" for name in loops} | set(re.findall(r"^caption (\S+)", script, flags=re.M))
-    made |= {f"timeline-{name}.png" for name in re.findall(r"^shot (\S+)", script, flags=re.M)}
+    made = {f"{name}.png" for name in loops} | set(re.findall(r"^ *caption ([\w.-]+)", script, flags=re.M))
+    made |= {f"timeline-{name}.png" for name in re.findall(r"^ *shot ([\w-]+)", script, flags=re.M)}
     assert made == set(CAPTIONS)
 
 
