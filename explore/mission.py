@@ -17,7 +17,8 @@ from .floor.free_space import FreeSpace, FreeSpaceConfig
 from .following.wall_following import Surroundings
 from .goal import GivenUp
 from .goals.decider import Driver
-from .goals.explorer import Explorer, ExplorerConfig
+from .goals.explorer import Explorer
+from .goals.explorer_config import ExplorerConfig
 from .goals.homing import Homing, HomingConfig
 from .goals.lost import Lost, LostConfig
 from .goals.replay_driver import ReplayDriver

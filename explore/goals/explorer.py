@@ -2,71 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
-from slam.robot import MotionCommand, RobotSpec, of_robot
+from slam.robot import MotionCommand
 
+from ..following.end_errand import EndErrand
 from ..following.ping_pong import WallErrand
-from ..following.wall_following import EndErrand, Errand, FollowingConfig, PlaceErrand, Surroundings
+from ..following.wall_following import Errand, PlaceErrand, Surroundings
 from ..goal import Goal
 from ..outcome import Outcome
 from ..planning.wall_routes import route
 from ..strategies import Choice, Place, Situation, Strategy, Watchful
+from ..strategies.nearest import straight_to_nearest_end
 from ..survey.frontiers import known_floor
-from ..survey.moving_things import moving_returns
-from ..survey.round_things import RoundConfig, is_round
+from ..survey.round_things import is_round
 from .decider import Decision
+from .explorer_config import ExplorerConfig
 from .ledger import Event, Key, Ledger
 from .paper_errand import PaperErrand
-from .sweep import Sweep, SweepConfig
-
-
-@dataclass(frozen=True)
-class ExplorerConfig:
-    """When an end is given up, and for how long."""
-
-    robot: RobotSpec = of_robot()
-    following: FollowingConfig = field(default_factory=FollowingConfig)
-    near_beyond_m: float = 0.1
-    """Ends, and places to be visited, no farther apart than the radius and this, the errors of a map, are one."""
-    moved_m: float = 0.2
-    """An end that was set aside is tried again when it has moved this far."""
-    attempts: int = 3
-    """So many ends set aside at one place (as above) are enough: it is not tried again."""
-    returns: int = 8
-    """An end that was gone so often while the robot was about it, and came back, is set aside."""
-    grown: float = 0.1
-    """An end that could not be looked at is tried again when so much more of the floor around it is known."""
-    round_things: RoundConfig = field(default_factory=RoundConfig)
-    """Ends on these are set aside without a look of their own."""
-    patience_m: float = 60.0
-    """A goal that takes more steps than so long a way is set aside."""
-    wait_s: float = 10.0
-    """Where something moved, what was given up is tried again so long after the last of it was, ..."""
-    again: int = 3
-    """... at most so often in a run, ..."""
-    moving_scans: int = 3
-    """... and something moved if so many scans show it."""
-    second_looks: int = 4
-    """Before it ends, the robot turns on the spot this often while there are tentative walls."""
-    sweep: bool = True
-    """After the last chain, visit what is reachable and unseen."""
-    sweeping: SweepConfig = field(default_factory=SweepConfig)
-
-    @property
-    def near_m(self) -> float:
-        """Ends, and places to be visited, this near to each other are one."""
-        return self.robot.beyond(self.near_beyond_m)
-
-    @property
-    def patience_steps(self) -> int:
-        """A goal that takes more steps is set aside."""
-        return self.robot.steps_of(self.patience_m)
+from .second_tries import SecondTries
+from .sweep import Sweep
 
 
 @dataclass
@@ -93,7 +53,8 @@ class Explorer:
     def __init__(self, strategy: Strategy, start_world: Float[np.ndarray, 2], config: ExplorerConfig) -> None:
         self.strategy = strategy
         self._start, self._config = start_world, config
-        self._step, self._moving_scans = -1, 0
+        self._step = -1
+        self._tries = SecondTries(config)
         self.start_over()
 
     def start_over(self) -> None:
@@ -101,8 +62,8 @@ class Explorer:
         self._task: _Task | None = None
         self._ledger = Ledger(self._config.near_m)
         self._sweep = Sweep(self._config.sweeping, self._ledger, self._config.sweep)
+        self._tries.start_over(self._ledger)
         self._looked_again = 0
-        self._gave_up_s, self._tried_again = -np.inf, 0
 
     @property
     def strategy(self) -> Strategy:
@@ -120,10 +81,9 @@ class Explorer:
         self._step += 1
         if self._watchful is not None:
             self._watchful.watch(around)
-        moving = moving_returns(around.scan, around.free_space, around.walls, self._config.robot.scanner)
-        self._moving_scans += bool(len(moving))
+        self._tries.watch(around)
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
-        self._revive(ends)
+        self._tries.take_up_moved(ends)
         self._keep_within(around, ends)
         self._abandon(around, ends)
         command = self._command(around, chains, ends, graph)
@@ -137,15 +97,11 @@ class Explorer:
         left, unseen = len(given_up.keys & ends.keys()), sum(bool(place.trouble) for place in given_up.places)
         words = "every chain is closed" if not left else f"no reachable open end is left; {left} cannot be closed"
         outcome = Outcome.NONE_REACHABLE if left else Outcome.ALL_CLOSED
-        if self._has_seen_moving and (left or unseen):
+        if self._tries.has_seen_moving and (left or unseen):
             outcome = Outcome.ENDS_LEFT
             words = f"ends-left: {left} open ends and {unseen} borders of unseen floor are blocked by something that"
-            words += f" moves or that is no wall, after {self._tried_again + 1} tries"
+            words += f" moves or that is no wall, after {self._tries.used + 1} tries"
         return Decision(None, words, given_up=given_up, outcome=outcome)
-
-    @property
-    def _has_seen_moving(self) -> bool:
-        return self._moving_scans >= self._config.moving_scans
 
     def _command(
         self, around: Surroundings, chains: tuple[Chain, ...], ends: dict[Key, OpenEnd], graph: nx.DiGraph[int]
@@ -163,20 +119,10 @@ class Explorer:
                 self._looked_again = 0
                 return command
             self._task = self._give_up(task, around, ends)
-            self._gave_up_s = around.scan.time_s
-        if self._may_try_again(ends):
-            if around.scan.time_s >= self._gave_up_s + self._config.wait_s:
-                self._tried_again += 1
-                self._ledger.take_up_all()
-                around.free_space.forget_too_tight()
+            self._tries.gave_up_s = around.scan.time_s
+        if self._tries.take_up_all(around, ends):
             return MotionCommand(0.0, self._config.robot.turn_rad)
         return self._look_again(around, len(self._ledger.set_aside) > known)
-
-    def _may_try_again(self, ends: dict[Key, OpenEnd]) -> bool:
-        """Return whether what was given up is worth another try: something moved, and may no longer be in the way."""
-        given_up = self._ledger.given_up
-        is_left = bool(given_up.keys & ends.keys()) or any(place.trouble for place in given_up.places)
-        return self._has_seen_moving and is_left and self._tried_again < self._config.again
 
     def interrupt(self, around: Surroundings) -> None:
         """Look for another way to the present goal: something stands in this one."""
@@ -193,16 +139,6 @@ class Explorer:
         if not again and not gave_up:
             return None
         return MotionCommand(0.0, self._config.robot.turn_rad)
-
-    def _revive(self, ends: dict[Key, OpenEnd]) -> None:
-        """Forget what was set aside where the end is gone or has moved: there it may be tried again."""
-        for key, aside in self._ledger.set_aside.items():
-            end = ends.get(key)
-            if end is None:
-                continue
-            moved_m = np.hypot(*(end.position_world - aside.position_world))
-            if moved_m > self._config.moved_m and not self._is_hopeless(end.position_world):
-                self._ledger.take_up(key)
 
     def _abandon(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Drop a goal that is no open end any longer or no longer holds; a sweep, as soon as there is an end."""
@@ -233,7 +169,7 @@ class Explorer:
         if self._config.following.method == "viewpoints":
             self._pass_round(around, ends)
         if not self._candidates(ends):
-            self._retry(around, ends)
+            self._tries.take_up_known(around, ends)
         situation = Situation(
             around=around,
             chains=chains,
@@ -247,7 +183,7 @@ class Explorer:
         choice = self.strategy.choose(situation)
         is_sweep = choice is None and not situation.open_ends
         if choice is None:
-            choice = self._sweep.choose(situation) if is_sweep else _straight_to_nearest(situation)
+            choice = self._sweep.choose(situation) if is_sweep else straight_to_nearest_end(situation)
         return None if choice is None else self._set_out(choice, situation, is_sweep)
 
     def _keep_within(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
@@ -315,22 +251,3 @@ class Explorer:
             self._ledger.put_aside(end, errand.trouble, known)
         self._ledger.note(Event.SET_ASIDE, end.position_world)
         return None
-
-    def _retry(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
-        """Forget that no look at an end was possible where the floor has become known since."""
-        reach = self._config.following.viewpoints.near_m
-        for key, before in self._ledger.unlooked():
-            if key not in ends or self._is_hopeless(ends[key].position_world):
-                continue
-            if known_floor(around.free_space, ends[key].position_world, reach) > (1.0 + self._config.grown) * before:
-                self._ledger.take_up_unlooked(key)
-
-    def _is_hopeless(self, place: Float[np.ndarray, 2]) -> bool:
-        return self._ledger.count(Event.SET_ASIDE, place) >= self._config.attempts
-
-
-def _straight_to_nearest(situation: Situation) -> Choice:
-    """No way to stand before any open end is known yet: go where the straight way is shortest and see."""
-    gaps = [np.hypot(*(end.position_world - situation.around.pose_world[:2])) for end in situation.open_ends]
-    end = situation.open_ends[int(np.argmin(gaps))]
-    return Choice(end, "no way to stand before any open end is known; nearest")

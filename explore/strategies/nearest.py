@@ -29,6 +29,13 @@ def nearest_end(
     return int(rows[np.argmin(metres[rows])]) if len(rows) else None
 
 
+def straight_to_nearest_end(situation: Situation) -> Choice:
+    """Return the open end to which the straight way is shortest: no way to stand before any is known yet."""
+    gaps = [np.hypot(*(end.position_world - situation.around.pose_world[:2])) for end in situation.open_ends]
+    end = situation.open_ends[int(np.argmin(gaps))]
+    return Choice(end, "no way to stand before any open end is known; nearest")
+
+
 def nearest_place(
     situation: Situation, places: Sequence[Place], within_m: float = np.inf
 ) -> tuple[Place, float] | None:

@@ -24,7 +24,7 @@ from experiments.scenario import MappingMissionConfig, TrialConfig
 from experiments.scoring.summary import TIMED
 from experiments.terminal.interrupts import STOPS, first_interrupt_waits, nothing_half_built_speaks
 from experiments.usage import UsageError
-from explore.goals.explorer import ExplorerConfig
+from explore.goals.explorer_config import ExplorerConfig
 
 ROOT = Path(__file__).parents[3]
 

@@ -10,7 +10,8 @@ import shapely
 from explore.floor.free_space import FreeSpace
 from explore.following.ping_pong import WallErrand
 from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.goals.explorer import Explorer
+from explore.goals.explorer_config import ExplorerConfig
 from explore.strategies.nearest_robot import NearestRobot
 from sim.lidar import LidarConfig, RangeFinder
 from slam.geometry.poses import arc, compose

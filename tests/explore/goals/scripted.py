@@ -6,7 +6,8 @@ import networkx as nx
 import numpy as np
 
 from explore.following.wall_following import Errand
-from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.goals.explorer import Explorer
+from explore.goals.explorer_config import ExplorerConfig
 from explore.strategies import Choice
 from slam.map.chains import Chain, OpenEnd
 from slam.robot import MotionCommand

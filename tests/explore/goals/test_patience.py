@@ -6,7 +6,8 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.goals.explorer import Explorer
+from explore.goals.explorer_config import ExplorerConfig
 from explore.strategies import STRATEGIES
 
 NO_SWEEP = replace(ExplorerConfig(), sweep=False)

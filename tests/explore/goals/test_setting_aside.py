@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.goals import explorer as module
+from explore.goals import explorer as explorer_module
+from explore.goals import second_tries
 from explore.outcome import Outcome
 from slam.robot import MotionCommand
 from tests.explore.goals.scripted import NO_SWEEP, ask, ends_at, explorer_at
@@ -44,7 +45,8 @@ def test_an_end_that_could_not_be_looked_at_is_tried_again_where_the_floor_has_b
 ):
     _, made = scripted
     known = [100]
-    monkeypatch.setattr(module, "known_floor", lambda *_: known[0])
+    for module in (explorer_module, second_tries):
+        monkeypatch.setattr(module, "known_floor", lambda *_: known[0])
     explorer = explorer_at(scene)
     ends = ends_at((1, 2))
     ask(explorer, scene, ends)
@@ -70,7 +72,7 @@ def test_what_lies_beyond_the_fence_is_set_aside_without_a_look(scripted, scene)
 def test_what_lies_on_something_round_is_set_aside_without_a_look(scripted, scene, monkeypatch):
     kinds, made = scripted
     kinds["EndErrand"].steps = 99
-    monkeypatch.setattr(module, "is_round", lambda end, walls, config: end.wall == 0)
+    monkeypatch.setattr(explorer_module, "is_round", lambda end, walls, config: end.wall == 0)
     decision = ask(explorer_at(scene), scene, ends_at((5, 2), (2, 2)))
     assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "on something round")]
     assert decision.goal.wall == 1

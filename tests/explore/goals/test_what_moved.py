@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.goals import explorer as module
+from explore.goals import second_tries as module
 from explore.outcome import Outcome
 from slam.robot import Scan
 from tests.explore.goals.scripted import NO_SWEEP, ask, ends_at, explorer_at

@@ -13,7 +13,8 @@ from explore.certificate import certify, contours, floor_of, unseen_area
 from explore.floor.free_space import FreeSpace
 from explore.following.wall_following import Surroundings
 from explore.goal import GivenUp, LeftPlace
-from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.goals.explorer import Explorer
+from explore.goals.explorer_config import ExplorerConfig
 from explore.goals.homing import Homing, HomingConfig
 from explore.limits import Limits, limited
 from explore.mission import MissionConfig, explore_mission

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from explore.following.wall_following import FollowingConfig
-from explore.goals.explorer import ExplorerConfig
+from explore.goals.explorer_config import ExplorerConfig
 from explore.mission import MissionConfig, explore_mission
 from explore.outcome import Outcome
 from explore.planning.navigators import FloorNavigator

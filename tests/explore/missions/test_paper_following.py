@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from explore.following.behaviour import Behaviour
-from explore.following.wall_following import EndErrand, FollowingConfig
-from explore.goals.explorer import ExplorerConfig
+from explore.following.end_errand import EndErrand
+from explore.following.wall_following import FollowingConfig
+from explore.goals.explorer_config import ExplorerConfig
 from explore.limits import Limits, limited
 from explore.mission import MissionConfig, explore_mission
 from explore.outcome import Outcome

@@ -7,7 +7,8 @@ import shapely
 from explore.floor.free_space import FreeSpace
 from explore.following.wall_following import Surroundings
 from explore.goal import GivenUp
-from explore.goals.explorer import Explorer, ExplorerConfig
+from explore.goals.explorer import Explorer
+from explore.goals.explorer_config import ExplorerConfig
 from explore.limits import Limits, limited
 from explore.mission import explore_mission
 from explore.planning.visibility_graph import VisibilityGraph
