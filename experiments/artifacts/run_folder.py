@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import PART, json_bytes, write
 from .formats import CONFIG, FORMATS
@@ -155,3 +156,24 @@ def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return few
     return f"another run (other {', '.join(different)})" if different else ""
+
+
+def default_folder(world: str, trial: TrialConfig, preset: str | None = None) -> Path:
+    """Return the folder for a run that names none: the same run comes to the same place."""
+    parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
+    parts += [preset] if preset else []
+    parts += [trial.p0] if trial.p0 != "small" else []
+    parts += ["errorless"] if trial.errorless else []
+    parts += ["scans"] if trial.odometry == "scans" else []
+    return Path("results") / "-".join(parts)
+
+
+def point_latest_at(folder: Path) -> None:
+    """Let results/latest lead to the newest run; file systems without links go without."""
+    link = folder.parent / "latest"
+    try:
+        if link.is_symlink():
+            link.unlink()
+        link.symlink_to(folder.name, target_is_directory=True)
+    except OSError:
+        return

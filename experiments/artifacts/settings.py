@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from sim.worlds import WorldError
+from sim.worlds import DrawingOptions, WorldError
 from slam.robot import STATED, RobotError
 
 from ..scenario import TrialConfig
@@ -22,8 +22,8 @@ from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
-DRAWING = {name: f"drawing.{name}" for name in ("scale", "layers", "ids", "without", "level", "threshold", "negate")}
-"""Options that say how a world's file is read, and their keys."""
+DRAWING = tuple(each.name for each in fields(DrawingOptions))
+"""Options that say how a world's file is read."""
 SEE = "config.json of any run names all"
 Record = dict[str, Any]
 
@@ -105,6 +105,20 @@ def differing(trial: TrialConfig) -> list[tuple[str, Any]]:
 def options_of(settings: Iterable[tuple[str, Any]]) -> list[str]:
     """Return the words of a command that ask for some settings."""
     return [word for key, value in settings for word in ("--set", f"{key}={json.dumps(value)}")]
+
+
+def drawing_said(**said: Any) -> DrawingOptions:
+    """Return the options of a drawing; raises UsageError for a value that means nothing."""
+    try:
+        return DrawingOptions(**said)
+    except WorldError as error:
+        raise UsageError(str(error)) from error
+
+
+def drawing_settings(said: DrawingOptions, typed: Collection[str] = ()) -> Record:
+    """Return, by their dotted keys, the options of a drawing that are said, and those typed with whatever value."""
+    record = plain(own(said))
+    return {f"drawing.{name}": record[name] for name in DRAWING if name in typed or name in said.given}
 
 
 def over(base: Record, *changes: Mapping[str, Any]) -> Record:

@@ -10,9 +10,10 @@ import tyro
 
 from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
+from sim.worlds import AS_DRAWN, DrawingOptions
 
 from ..artifacts.presets import against_methods, robot_of
-from ..artifacts.settings import DRAWING, FOLLOWING, NAVIGATION, asked, differing, nested, over, trial_of
+from ..artifacts.settings import FOLLOWING, NAVIGATION, asked, differing, drawing_settings, nested, over, trial_of
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.story import decisive_arm, story_of
 from ..campaign.comparison.tables import write_tables
@@ -78,20 +79,8 @@ class Compare:
     following: Following = "viewpoints"
     """How the robot explores an open end in every trial: from viewpoints, or by following its wall to and fro. Preset
     paper-method follows walls."""
-    scale: float | None = None
-    """Metres per pixel or drawing unit of the worlds that are files."""
-    layers: tuple[str, ...] = ()
-    """Layers, groups or classes of SVG and DXF files that are drawn, and no others; * stands for any letters."""
-    ids: tuple[str, ...] = ()
-    """Shapes and groups of SVG files that are drawn, by their id, beside those of --layers."""
-    without: tuple[str, ...] = ()
-    """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
-    level: str | None = None
-    """The storey, of GeoJSON files with several."""
-    threshold: float | None = None
-    """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
-    negate: bool = False
-    """In a bare picture, light is wall and dark is free."""
+    drawing: tyro.conf.OmitArgPrefixes[DrawingOptions] = AS_DRAWN
+    """What the files of the worlds leave open."""
     robot: str | None = None
     """The robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file (docs/robots.md).
     --config and --set go before it."""
@@ -124,8 +113,7 @@ class Compare:
             settings = over(settings, nested([(NAVIGATION, self.navigation)]))
         if "following" in self.given or self.following != Compare.following:
             settings = over(settings, nested([(FOLLOWING, self.following)]))
-        drawing = {key: getattr(self, name) for name, key in DRAWING.items() if self._is_given(name)}
-        settings = over(settings, nested((k, list(v) if isinstance(v, tuple) else v) for k, v in drawing.items()))
+        settings = over(settings, nested(drawing_settings(self.drawing, self.given).items()))
         if self.errorless:
             settings = over(settings, {"errorless": True})
         ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
@@ -146,9 +134,6 @@ class Compare:
             first_seed=self.first_seed,
             settings=tuple(sorted(dict(changed).items())),
         )
-
-    def _is_given(self, name: str) -> bool:
-        return name in self.given or getattr(self, name) != getattr(Compare, name)
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

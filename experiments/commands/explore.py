@@ -9,15 +9,32 @@ import tyro
 from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 from explore.step import Step
-from sim.worlds import World
+from sim.worlds import AS_DRAWN, DrawingOptions, World
 
 from ..artifacts.fences import fence_of
 from ..artifacts.presets import PresetName, preset_of, robot_of
 from ..artifacts.results import config_record, write_results
-from ..artifacts.run_folder import clear_leftovers, held, prepare, refuse_others, settle
+from ..artifacts.run_folder import (
+    clear_leftovers,
+    default_folder,
+    held,
+    point_latest_at,
+    prepare,
+    refuse_others,
+    settle,
+)
 from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
-from ..artifacts.settings import DRAWING, FOLLOWING, NAVIGATION, nested, parse_setting, read_settings, trial_of
+from ..artifacts.settings import (
+    DRAWING,
+    FOLLOWING,
+    NAVIGATION,
+    drawing_settings,
+    nested,
+    parse_setting,
+    read_settings,
+    trial_of,
+)
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -31,7 +48,6 @@ MAX_STEPS = TrialConfig.max_steps
 KEYS = {
     **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
     "odometry": "odometry",
-    **DRAWING,
     "max_path": "max_path_m",
     "time_limit": "time_limit_s",
     "sweep": "mission.explorer.sweep",
@@ -102,20 +118,8 @@ class Explore:
     fence: Annotated[str | None, tyro.conf.arg(metavar="BOX|FILE")] = None
     """Stay within a box, X0,Y0,X1,Y1 in metres of the world, or within the polygon of a GeoJSON file. What lies beyond
     is not explored: an outdoor or unbounded world ends there."""
-    scale: float | None = None
-    """Metres per pixel or drawing unit, for files that do not say."""
-    layers: tuple[str, ...] = ()
-    """Layers, groups or classes of an SVG or DXF file that are drawn, and no others; * stands for any letters."""
-    ids: tuple[str, ...] = ()
-    """Shapes and groups of an SVG file that are drawn, by their id, beside those of --layers."""
-    without: tuple[str, ...] = ()
-    """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
-    level: str | None = None
-    """The storey, of a GeoJSON file with several."""
-    threshold: float | None = None
-    """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
-    negate: bool = False
-    """In a bare picture, light is wall and dark is free."""
+    drawing: tyro.conf.OmitArgPrefixes[DrawingOptions] = AS_DRAWN
+    """What the world's file leaves open."""
     out: Path | None = None
     """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. One that holds anything but the same run
     is refused."""
@@ -152,6 +156,7 @@ class Explore:
         defaults.
         """
         given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
+        given |= drawing_settings(self.drawing, self.given)
         if self.fence is not None:
             given["mission.free_space.fence"] = fence_of(self.fence)
         options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
@@ -165,7 +170,8 @@ class Explore:
         return trial
 
     def _is_given(self, name: str) -> bool:
-        return name in self.given or getattr(self, name) != getattr(Explore, name)
+        said, default = (self.drawing, AS_DRAWN) if name in DRAWING else (self, Explore)
+        return name in self.given or getattr(said, name) != getattr(default, name)
 
     def continued(self, saved: TrialConfig) -> TrialConfig:
         """Return a saved run with the limits given now; raises UsageError where anything else is given, too."""
@@ -198,7 +204,7 @@ class Explore:
             settle(folder, config)
             status = self._drive(trial, world, folder, config)
         if self.out is None:
-            _point_latest_at(folder)
+            point_latest_at(folder)
         return status
 
     def _go_on(self, source: Path) -> int:
@@ -288,24 +294,3 @@ def _why(saved: SavedRun) -> str:
     assert saved.outcome is not None
     words = f"{saved.outcome.status}: {saved.outcome}"
     return words if saved.outcome.status == "complete" else f"{words}; raise the limit to go on"
-
-
-def default_folder(world: str, trial: TrialConfig, preset: str | None = None) -> Path:
-    """Return the folder for a run that names none: the same run comes to the same place."""
-    parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
-    parts += [preset] if preset else []
-    parts += [trial.p0] if trial.p0 != "small" else []
-    parts += ["errorless"] if trial.errorless else []
-    parts += ["scans"] if trial.odometry == "scans" else []
-    return Path("results") / "-".join(parts)
-
-
-def _point_latest_at(folder: Path) -> None:
-    """Let results/latest lead to the newest run; file systems without links go without."""
-    link = folder.parent / "latest"
-    try:
-        if link.is_symlink():
-            link.unlink()
-        link.symlink_to(folder.name, target_is_directory=True)
-    except OSError:
-        return

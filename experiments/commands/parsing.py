@@ -7,7 +7,7 @@ import re
 import types
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr
-from dataclasses import Field, fields, make_dataclass
+from dataclasses import Field, field, fields, is_dataclass, make_dataclass
 from itertools import dropwhile, pairwise, takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
@@ -45,17 +45,39 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> An
             raise
         raise UsageError(_told(_first_words(said.getvalue()), words, asked)) from leaving
     assert asked is not None
-    return asked(**{each.name: getattr(made, each.name) for each in fields(asked)})
+    try:
+        return _as(asked, made)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def _as(kind: type, made: Any) -> Any:
+    """Return a command, or a group of its options, as its own class in place of the readable one."""
+    groups, values = _groups(kind), {each.name: getattr(made, each.name) for each in fields(kind)}
+    return kind(**{name: _as(groups[name], value) if name in groups else value for name, value in values.items()})
+
+
+def _groups(command: type) -> dict[str, type]:
+    """Return the fields of a command that are options of their own, which stand beside its others."""
+    hints = get_type_hints(command)
+    return {each.name: hints[each.name] for each in fields(command) if is_dataclass(hints[each.name])}
 
 
 def readable(command: type) -> type:
     """Return a class of the same command whose help has N for a whole number, and no word for what is not set."""
-    hints = get_type_hints(command, include_extras=True)
+    hints, groups = get_type_hints(command, include_extras=True), _groups(command)
     about = _about(command) if hints else {}
-    shown = [(each.name, _shown(each, hints[each.name], about.get(each.name)), each) for each in fields(command)]
-    return make_dataclass(
-        command.__name__, shown, bases=(command,), frozen=True, namespace={"__doc__": command.__doc__}
-    )
+    shown: list[tuple[str, Any, Any]] = [
+        (each.name, _shown(each, hints[each.name], about.get(each.name)), each)
+        for each in fields(command)
+        if each.name not in groups
+    ]
+    for name, group in groups.items():
+        kind, beside = readable(group), cast(Any, tyro.conf.OmitArgPrefixes)
+        shown.append((name, beside[kind], field(default=kind())))
+    # What a group checks when it is made is told by the group itself, in our form.
+    own = {"__doc__": command.__doc__, "__post_init__": lambda self: None}
+    return make_dataclass(command.__name__, shown, bases=(command,), frozen=True, namespace=own)
 
 
 def _about(command: type) -> dict[str, str]:
@@ -105,6 +127,9 @@ def options_of(command: Any) -> list[str]:
     named: list[str] = []
     for each in fields(command):
         parts = get_args(hints[each.name])
+        if parts and is_dataclass(parts[0]):
+            named += options_of(parts[0])
+            continue
         if tyro.conf.Suppress in parts or tyro.conf.Positional in parts:
             continue
         option = each.name.replace("_", "-")

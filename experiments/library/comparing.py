@@ -12,7 +12,7 @@ from explore.following.wall_following import Following
 from explore.planning.navigators import Navigation
 
 from ..artifacts.reading import read_json
-from ..artifacts.settings import options_of
+from ..artifacts.settings import drawing_said, options_of
 from ..campaign.cluster import on_dask
 from ..campaign.comparison.story import story_of
 from ..campaign.comparison.tables import write_tables
@@ -107,8 +107,11 @@ def compare(
         out=Path(out), worlds=tuple(map(str, worlds)), backends=tuple(backends), strategies=tuple(strategies),
         trials=trials, first_seed=first_seed, modes=tuple(modes), association=tuple(association), driver=driver, p0=p0,
         max_steps=max_steps, navigation=navigation, following=following,
-        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
-        threshold=threshold, negate=negate, robot=None if robot is None else str(robot),
+        drawing=drawing_said(
+            scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
+            threshold=threshold, negate=negate,
+        ),
+        robot=None if robot is None else str(robot),
         set=tuple(options_of((settings or {}).items())[1::2]), jobs=jobs,
     )  # fmt: skip
     campaign = command.campaign

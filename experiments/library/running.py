@@ -16,7 +16,7 @@ from slam.robot import Robot, RobotSpec
 
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
-from ..artifacts.settings import options_of
+from ..artifacts.settings import drawing_said, options_of
 from ..commands.explore import Explore
 from ..commands.replay import Replay
 from ..replays.real_log import RealOptions
@@ -77,8 +77,11 @@ def explore(
         world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
         following=following, sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path,
         time_limit=time_limit, return_to_start=return_to_start, start=start,
-        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
-        threshold=threshold, negate=negate, fence=fence,
+        drawing=drawing_said(
+            scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
+            threshold=threshold, negate=negate,
+        ),
+        fence=fence,
         robot=None if robot is None or spec is not None else str(robot),
         set=tuple(_words(settings or {})),
     )  # fmt: skip

@@ -12,19 +12,19 @@ class DrawingOptions:
     """How to read a drawing; what is not said is as the file says, or as it is assumed where the file is silent."""
 
     scale: float | None = None
-    """Metres per unit of the drawing, or per pixel."""
+    """Metres per pixel or drawing unit, for files that do not say."""
     layers: tuple[str, ...] = ()
-    """Only these layers are drawn: names of layers, groups or classes; * stands for any letters."""
+    """Layers, groups or classes of an SVG or DXF file that are drawn, and no others; * stands for any letters."""
     ids: tuple[str, ...] = ()
-    """Only the shapes and groups of these ids are drawn, beside those of `layers`."""
+    """Shapes and groups of an SVG file that are drawn, by their id, beside those of --layers."""
     without: tuple[str, ...] = ()
-    """Layers, groups, classes and ids that are left out."""
+    """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
     level: str | None = None
-    """The storey, of a file with several."""
+    """The storey, of a GeoJSON file with several."""
     threshold: float | None = None
-    """In a picture, lightness below which a pixel is a wall, 0 to 1."""
+    """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
     negate: bool = False
-    """In a picture, light is wall and dark is free."""
+    """In a bare picture, light is wall and dark is free."""
 
     def __post_init__(self) -> None:
         """Refuse what means nothing; raises WorldError."""
