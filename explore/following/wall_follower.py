@@ -27,10 +27,13 @@ ON_TRACK = 0.3
 PROGRESS_M, PATIENCE_STEPS = 0.02, 30
 """A motion is no longer possible, too, where so many steps led no farther along the track than this: a turn on the
 spot takes up to 18 of them."""
+IN_VAIN = 4
+"""No motion is possible either way where the robot turned back so often and came no farther: each way is tried twice,
+since right after a turn the noise of one scan may leave no safe step."""
 
 
 class WallFollower:
-    """Follows one wall to and fro until another is given; it never ends by itself.
+    """Follows one wall to and fro until another is given; it ends only where no motion leads along it either way.
 
     The wall is followed at the stand-off, which yields where the body would not fit otherwise; round an end the robot
     goes on until no motion free of collision is left. Then it changes the driving direction (paper, section 3.1).
@@ -43,7 +46,7 @@ class WallFollower:
         self._approach: PlaceErrand | None = None
         self._is_on_track, self._is_turning = False, False
         self._farthest_m, self._since, self._failed = -np.inf, 0, False
-        self._turns = 0
+        self._turns, self._in_vain = 0, 0
         self.behaviour = Behaviour.APPROACH
         self.trouble = ""
 
@@ -64,7 +67,7 @@ class WallFollower:
         }[self.behaviour]
 
     def command(self, around: Surroundings) -> MotionCommand | None:
-        """Return the next step; None where the wall is not in the map or no way leads to it, told in `trouble`."""
+        """Return the next step; None where the wall is not in the map or no way leads to or along it (`trouble`)."""
         if self.wall not in around.walls.ids:
             self.trouble = f"wall {self.wall} is no longer in the map"
             return None
@@ -111,10 +114,14 @@ class WallFollower:
                 self._approach, self._is_on_track = None, True
         return command
 
-    def _follow(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand:
+    def _follow(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand | None:
         """Return the next step along the track; where none is safe in two scans in a row, the robot turns back."""
+        if self._in_vain == IN_VAIN:
+            self.trouble = f"no motion along wall {self.wall} in either direction"
+            return None
         ahead_m = position_m if self._side == HEAD else -position_m
         if ahead_m > self._farthest_m + PROGRESS_M:
+            self._in_vain = 0 if np.isfinite(self._farthest_m) else self._in_vain
             self._farthest_m, self._since = ahead_m, 0
         self._since += 1
         command = self._along(track, position_m, around) if self._since <= PATIENCE_STEPS else None
@@ -124,10 +131,12 @@ class WallFollower:
         if not self._failed:  # in a tight place the noise of one scan may leave no safe step
             self._failed = True
             return MotionCommand(0.0, 0.0)
-        self._reverse()
         points = self._ahead(np.zeros(2), around).points_robot
-        command = self._along(track, position_m, around) or step_away(points, self._config.driving)
-        return command or MotionCommand(0.0, 0.0)
+        away = step_away(points, self._config.driving)
+        if self._in_vain and self._since <= PATIENCE_STEPS and away is not None:
+            return away  # it turned back so near to a wall that neither way along the track is safe
+        self._reverse()
+        return self._along(track, position_m, around) or away or MotionCommand(0.0, 0.0)
 
     def _along(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand | None:
         """Return a safe step along the track, as near to the stand-off as there is one; None where there is none."""
@@ -138,11 +147,20 @@ class WallFollower:
             seen = self._ahead(aim_robot, around)
             command = step_towards(seen.aim_robot, seen.points_robot, self._config.driving, seen.fits)
             if command is not None:
+                command = self._off_the_wall(command, seen.points_robot)
                 turn_rad = abs(float(wrap(np.arctan2(aim_robot[1], aim_robot[0]))))
                 self._is_turning = self._is_turning and turn_rad > self._config.driving.spin_rad
                 self.behaviour = self._word(track, position_m)
                 return careful(command, around.pose_world, around.free_space, self._config.driving)
         return None
+
+    def _off_the_wall(self, command: MotionCommand, points_robot: Float[np.ndarray, "m 2"]) -> MotionCommand:
+        """Return a step away from a return within the margin in place of a turn on the spot, which slips aside."""
+        driving = self._config.driving
+        gap_m = np.hypot(points_robot[:, 0], points_robot[:, 1]).min(initial=np.inf)
+        if command.forward_m != 0.0 or gap_m > driving.radius_m + driving.margin_m:
+            return command
+        return step_away(points_robot, driving) or command
 
     def _word(self, track: Track, position_m: float) -> Behaviour:
         if self._is_turning:
@@ -155,7 +173,7 @@ class WallFollower:
 
     def _reverse(self) -> None:
         self._side = TAIL + HEAD - (HEAD if self._side is None else self._side)
-        self._turns += 1
+        self._turns, self._in_vain = self._turns + 1, self._in_vain + 1
         self._is_turning, self._failed = True, False
         self._farthest_m, self._since = -np.inf, 0
         self.behaviour = Behaviour.REVERSE
