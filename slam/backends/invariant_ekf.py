@@ -9,6 +9,9 @@ from .kalman.dense_map import DenseMap
 from .kalman.ekf import Ekf
 from .kalman.linear import carry
 
+Point = tuple[Float[np.ndarray, "2"], Float[np.ndarray, " n"]]
+"""A position and the directions of all lines: where errors are linearised."""
+
 
 class InvariantEkf(Ekf[DenseMap]):
     """The full filter, with P carried along after each correction: P <- D P D'."""
@@ -17,8 +20,8 @@ class InvariantEkf(Ekf[DenseMap]):
 
     def _begin(self) -> None:
         super()._begin()
-        self._carried_to: tuple[np.ndarray, np.ndarray] | None = None
-        """Position (2,) and directions (n,) at which P holds its errors while an update is on its way."""
+        self._carried_to: Point | None = None
+        """Where P holds its errors while an update is on its way."""
 
     def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Linearise a scan where it takes the estimate (one Gauss-Newton iteration), and carry P there first.
@@ -39,37 +42,31 @@ class InvariantEkf(Ekf[DenseMap]):
 
     def _carry_to(self, rows: Int[np.ndarray, " u"], ahead: Float[np.ndarray, " s"]) -> None:
         """Carry P to other means of the pose and these rows."""
-        position, alpha = self._point()
-        turned = alpha.copy()
+        before = self._point()
+        turned = before[1].copy()
         turned[rows] = ahead[POSE::2]
-        self._carry(position, ahead[:2], alpha, turned)
+        self._carry(before, (ahead[:2], turned))
         self._carried_to = ahead[:2], turned
 
     def _condition(self, model: Linear) -> None:
-        position, alpha = self._point()
+        before = self._point()
         super()._condition(model)
         self._carried_to = None
-        self._carry(position, self._map.pose_world[:2], alpha, self._map.means[:, 0])
+        self._carry(before, self._point())
 
-    def _point(self) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, " n"]]:
+    def _point(self) -> Point:
         """Return the position and directions at which P holds its errors."""
         return self._carried_to or (self._map.pose_world[:2], self._map.means[:, 0])
 
-    def _carry(
-        self,
-        position: Float[np.ndarray, "2"],
-        moved: Float[np.ndarray, "2"],
-        alpha: Float[np.ndarray, " n"],
-        turned: Float[np.ndarray, " n"],
-    ) -> None:
+    def _carry(self, before: Point, after: Point) -> None:
         """Carry P from one position and directions to others."""
+        (position, alpha), (moved, turned) = before, after
         self._map.shear(*carry(position, moved, alpha, turned, self._map.anchors))
 
     def _align(self, rows: Int[np.ndarray, "2"]) -> float:
         """Take the line dropped to the direction of the line kept: else their equality says where the world lies."""
-        alpha = self._map.means[:, 0]
+        position, alpha = self._point()
         turned = alpha.copy()
         turned[rows[1]] = turned[rows[0]]
-        position = self._map.pose_world[:2]
-        self._carry(position, position, alpha, turned)
+        self._carry((position, alpha), (position, turned))
         return float(turned[rows[0]])

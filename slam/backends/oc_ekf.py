@@ -12,28 +12,22 @@ from ..estimation.backend import POSE
 from ..geometry.lines import normals
 from ..geometry.numerics import LEAST_SIGMA
 from ..geometry.poses import J
-from .invariant_ekf import InvariantEkf
+from .invariant_ekf import InvariantEkf, Point
 
 
 class OcEkf(InvariantEkf):
     """The invariant filter but for how P is carried: by what all errors have in common, not by the pose's alone."""
 
-    def _carry(
-        self,
-        position: Float[np.ndarray, "2"],
-        moved: Float[np.ndarray, "2"],
-        alpha: Float[np.ndarray, " n"],
-        turned: Float[np.ndarray, " n"],
-    ) -> None:
+    def _carry(self, before: Point, after: Point) -> None:
         """Carry P along: P <- D P D', D N = N+, D = I + (N+ - N) (N' W N)^-1 N' W nearest to I.
 
         W holds one over the variances, so that errors count in units of their sigmas.
         """
-        before, after = unseen(position, alpha, self._map.anchors), unseen(moved, turned, self._map.anchors)
+        unseen_before, unseen_after = (unseen(*point, self._map.anchors) for point in (before, after))
         variances = self._map.variances
         variances[:2] = variances[:2].mean()  # As they are in a world that is turned.
-        weighted = before / np.maximum(variances, LEAST_SIGMA**2)[:, None]
-        self._map.follow(after - before, np.linalg.solve(before.T @ weighted, weighted.T).T)
+        weighted = unseen_before / np.maximum(variances, LEAST_SIGMA**2)[:, None]
+        self._map.follow(unseen_after - unseen_before, np.linalg.solve(unseen_before.T @ weighted, weighted.T).T)
 
 
 def unseen(

@@ -66,8 +66,8 @@ def page_of(rows: Sequence[Row], followed: Sequence[Row] = ()) -> str:
         parts.append(f"## {_title(name)}\n")
         note = " ".join(filter(None, [NOTES.get(name, ""), strategies_in_words(followed) if name == "fig6" else ""]))
         parts += [f"{note}\n"] if note else []
-        made = ", ".join(sorted({row["commit"] for row in own}))
-        parts.append(f"Drives with seeds {own[0]['seed']} to {own[-1]['seed']}, made at {made}.\n")
+        seeds = [row["seed"] for row in own]
+        parts.append(f"Drive of seed {seeds[0]}.\n" if len(own) == 1 else f"Drives of seeds {seeds[0]} to {seeds[-1]}.\n")
         header, *lines = table_of([row["numbers"] for row in own], REPRODUCTIONS[name].paper)
         parts += map(_line, (header, ["---"] * len(header), *lines))
         parts.append("")

@@ -3,7 +3,6 @@
 .venv/bin/python -m studies.paper.study --seeds 20      # goes on where it was interrupted
 """
 
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,16 +54,7 @@ class PaperStudy:
 def numbers_of(task: tuple[tuple[str, ...], int]) -> Sequence[Row]:
     """Return a row for each figure of a group: the numbers of one drive by each back end."""
     group, seed = task
-    return [
-        {"figure": name, "seed": seed, "commit": _commit(), "numbers": REPRODUCTIONS[name].numbers(seed)}
-        for name in group
-    ]
-
-
-def _commit() -> str:
-    """Return the commit of the checkout, with a plus where files differ from it; empty outside of one."""
-    said = subprocess.run(("git", "describe", "--always", "--dirty=+"), capture_output=True, text=True, check=False)
-    return said.stdout.strip()
+    return [{"figure": name, "seed": seed, "numbers": REPRODUCTIONS[name].numbers(seed)} for name in group]
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ page that shows the picture. A test holds all three against each other (tests/do
 import hashlib
 import json
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +24,11 @@ from experiments.reproductions import fig4
 from experiments.usage import UsageError, choose
 from experiments.views.pictures import read_steps
 
+from ..runner.command import run_study
+
 PICTURES = Path("docs/pictures")
 KEPT = "captions.json"
 PAGES = ("README.md", "docs/*.md", "docs/*/*.md")
-BAD_USAGE = 2
 
 
 def _where(run: Path) -> str:
@@ -196,15 +196,5 @@ def with_caption(text: str, picture: str, caption: str) -> str:
     return re.sub(place, lambda found: f"![{caption}]{found[1]}", text)
 
 
-def main() -> int:
-    """Run the command and return its exit status."""
-    try:
-        tyro.cli(Caption).run()
-    except UsageError as error:
-        print(f"captions: {error}", file=sys.stderr)
-        return BAD_USAGE
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(Caption)

@@ -5,14 +5,14 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
 from ..runner.rows import Row, fingerprint
-from .headlines import HEADLINES, STORED, Headline
+from .headlines import HEADLINES, Headline
 
 DOCS = Path("docs")
 BEGIN, END = "<!-- made by `make results` -->", "<!-- end -->"
@@ -60,15 +60,9 @@ def section(headline: Headline, rows: Sequence[Row]) -> str:
     head, *lines = ["| " + " | ".join(cells) + " |" for cells in found.table]
     rule = "|" + "---|" * len(found.table[0])
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
-    made = f"{count}, made at {made_at().get(rows[0]['code'], 'a commit not recorded')}: `{headline.command}`."
+    made = f"{count}, made by `{headline.command}`."
     parts = [f"## {headline.title}", f"**Aim.** {headline.aim}", "\n".join([head, rule, *lines])]
     return "\n\n".join([*parts, f"**Verdict.** {found.verdict}", made]) + "\n"
-
-
-def made_at() -> Mapping[str, str]:
-    """Return the commit of each fingerprint of code that rows were made by."""
-    stored: dict[str, str] = json.loads((STORED / "commits.json").read_text())
-    return stored
 
 
 if __name__ == "__main__":

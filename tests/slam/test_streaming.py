@@ -8,22 +8,9 @@ from hypothesis import strategies as st
 from slam.geometry.poses import arc, compose, inverse
 from slam.robot import MotionCommand, Odometry, RobotError, Scan
 from slam.robot.streaming import SteppedRobot, TimedScan, Twist, de_skewed
+from tests.slam.streaming_base import COV, ranges_from
 
-ROOM = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 3.5], [3.0, 3.5], [3.0, 2.0], [0.0, 2.0]])
 BEARINGS = np.linspace(-np.pi, np.pi, 360, endpoint=False)
-COV = np.diag([0.004, 0.004, 0.006]) ** 2
-
-
-def ranges_from(poses, bearings=BEARINGS):
-    """Return the range of each beam, each from a pose of its own, by crossing every ray with every wall."""
-    heading = bearings + poses[:, 2]
-    beam = np.stack([np.cos(heading), np.sin(heading)], axis=-1)[:, None]
-    a, ab = ROOM[None] - poses[:, None, :2], np.roll(ROOM, -1, axis=0) - ROOM
-    cross = beam[..., 0] * ab[:, 1] - beam[..., 1] * ab[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (a[..., 0] * ab[:, 1] - a[..., 1] * ab[:, 0]) / cross
-        share = (a[..., 0] * beam[..., 1] - a[..., 1] * beam[..., 0]) / cross
-    return np.where((along > 0) & (share >= 0) & (share <= 1), along, np.inf).min(axis=1)
 
 
 class Streaming:
@@ -88,7 +75,7 @@ def test_without_it_a_turning_robot_sees_its_walls_bent():
     robot = Streaming((1.6, 1.1, 0.3))
     robot.send(Twist(0.0, 1.5))
     taken = robot.scan()
-    true = ranges_from(np.tile(robot.pose, (360, 1)))
+    true = ranges_from(np.tile(robot.pose, (360, 1)), BEARINGS)
     assert np.quantile(np.abs(taken.ranges_m - true), 0.9) > 0.1
     assert np.nanquantile(np.abs(de_skewed(taken, robot.odometry).ranges_m - true), 0.9) < 0.005
 
@@ -125,7 +112,7 @@ def test_a_command_is_driven_to_its_end_and_the_robot_stands_after_it(command):
     scan = stepped.sense()
     assert scan.time_s > first.time_s
     assert stepped.sense().time_s == scan.time_s, "one scan a step"
-    np.testing.assert_allclose(scan.ranges_m, ranges_from(np.tile(robot.pose, (360, 1))), atol=1e-9)
+    np.testing.assert_allclose(scan.ranges_m, ranges_from(np.tile(robot.pose, (360, 1)), BEARINGS), atol=1e-9)
     assert max(abs(t.speed_m_s) for t in robot.sent) <= 0.2 + 1e-9
 
 

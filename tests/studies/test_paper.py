@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def row(figure, seed, **numbers):
-    return {"code": "none", "figure": figure, "seed": seed, "commit": "abc", "numbers": numbers}
+    return {"code": "none", "figure": figure, "seed": seed, "numbers": numbers}
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_a_section_has_aim_table_verdict_and_command(tmp_path):
     assert "## Halls\n\n**Aim.** All.\n" in made
     assert "| `hall` | 1 of 2 | 0.8000 | 2 of 4 | 10.0 m |" in made
     assert "**Verdict.** 1 of 2 complete, 2 of 4 contours closed, 2 collisions." in made
-    assert "made at a commit not recorded: `make halls`" in made
+    assert "made by `make halls`" in made
 
 
 def run(backend, seed=1, **more):

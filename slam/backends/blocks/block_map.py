@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...estimation.backend import POSE, Joint
-from ...estimation.models import Linear
+from ...estimation.models import Initialisation, Linear, Motion
 from ...geometry.poses import wrap
 
 
@@ -28,27 +28,19 @@ class BlockMap:
         cov[:POSE, :POSE], cov[POSE:, POSE:] = self.pose_cov, lines.reshape(2 * m, 2 * m)
         return Joint(np.concatenate([self.pose_world, self.means[rows].ravel()]), cov, self.anchors[rows])
 
-    def move(
-        self, pose_world: Float[np.ndarray, "3"], F: Float[np.ndarray, "3 3"], Q: Float[np.ndarray, "3 3"]
-    ) -> None:
-        """Put the pose elsewhere: its error becomes F times what it was, and noise of covariance Q."""
-        self.pose_world = pose_world
-        self.pose_cov = _symmetric(F @ self.pose_cov @ F.T + Q)
+    def move(self, motion: Motion, Q: Float[np.ndarray, "3 3"]) -> None:
+        """Take the pose along a motion: its error becomes F times what it was, and noise of covariance Q."""
+        self.pose_world = motion.pose_world
+        self.pose_cov = _symmetric(motion.F @ self.pose_cov @ motion.F.T + Q)
 
-    def append(
-        self,
-        anchors: Float[np.ndarray, "m 2"],
-        means: Float[np.ndarray, "m 2"],
-        G_pose: Float[np.ndarray, "m 2 3"],
-        noise: Float[np.ndarray, "m 2 2"],
-    ) -> Int[np.ndarray, " m"]:
+    def append(self, new: Initialisation, noise: Float[np.ndarray, "m 2 2"]) -> Int[np.ndarray, " m"]:
         """Add lines whose error is G_pose times the pose's, and noise, and forget that it is the pose's."""
-        covs = _symmetric(G_pose @ self.pose_cov @ G_pose.swapaxes(1, 2) + noise)
-        ids = np.arange(self._next_id, self._next_id + len(anchors))
-        self._next_id += len(anchors)
+        covs = _symmetric(new.G_pose @ self.pose_cov @ new.G_pose.swapaxes(1, 2) + noise)
+        ids = np.arange(self._next_id, self._next_id + len(covs))
+        self._next_id += len(covs)
         self.ids = np.concatenate([self.ids, ids])
-        self.anchors = np.concatenate([self.anchors, anchors])
-        self.means, self.covs = np.concatenate([self.means, means]), np.concatenate([self.covs, covs])
+        self.anchors = np.concatenate([self.anchors, new.anchors])
+        self.means, self.covs = np.concatenate([self.means, new.means]), np.concatenate([self.covs, covs])
         return ids
 
     def drop(self, rows: Int[np.ndarray, " m"]) -> None:

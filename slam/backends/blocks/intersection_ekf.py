@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...estimation.backend import POSE, Observations
-from ...estimation.models import Linear
+from ...estimation.models import Initialisation, Linear, Motion
 from ..kalman.ekf import Ekf
 from .block_map import BlockMap
 
@@ -28,23 +28,15 @@ class IntersectionMap(BlockMap):
         self._fresh: Float[np.ndarray, "3 3"] = np.zeros((POSE, POSE))
         """What the wheels have added to the pose's error since anything else came to share it."""
 
-    def move(
-        self, pose_world: Float[np.ndarray, "3"], F: Float[np.ndarray, "3 3"], Q: Float[np.ndarray, "3 3"]
-    ) -> None:
-        """Put the pose elsewhere: its error becomes F times what it was, and noise of covariance Q."""
-        super().move(pose_world, F, Q)
-        self._fresh = F @ self._fresh @ F.T + Q
+    def move(self, motion: Motion, Q: Float[np.ndarray, "3 3"]) -> None:
+        """Take the pose along a motion: its error becomes F times what it was, and noise of covariance Q."""
+        super().move(motion, Q)
+        self._fresh = motion.F @ self._fresh @ motion.F.T + Q
 
-    def append(
-        self,
-        anchors: Float[np.ndarray, "m 2"],
-        means: Float[np.ndarray, "m 2"],
-        G_pose: Float[np.ndarray, "m 2 3"],
-        noise: Float[np.ndarray, "m 2 2"],
-    ) -> Int[np.ndarray, " m"]:
+    def append(self, new: Initialisation, noise: Float[np.ndarray, "m 2 2"]) -> Int[np.ndarray, " m"]:
         """Add lines whose error is G_pose times the pose's, and noise: they share the wheels' error, too."""
         self._fresh = np.zeros((POSE, POSE))
-        return super().append(anchors, means, G_pose, noise)
+        return super().append(new, noise)
 
     def condition(self, model: Linear) -> None:
         """Take in a measurement, for each part by the gain and the weights that leave the least trace of its own block.

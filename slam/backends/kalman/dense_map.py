@@ -11,7 +11,7 @@ from scipy.linalg.blas import dsymm, dsyr2k, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from ...estimation.backend import POSE, Joint, columns_of
-from ...estimation.models import Linear
+from ...estimation.models import Initialisation, Linear, Motion
 from ...geometry.poses import wrap
 
 SPARE = 16
@@ -56,28 +56,20 @@ class DenseMap:
         columns = self._columns(rows)
         return Joint(self._x[columns], self._block(columns), self.anchors[rows])
 
-    def move(
-        self, pose_world: Float[np.ndarray, "3"], F: Float[np.ndarray, "3 3"], Q: Float[np.ndarray, "3 3"]
-    ) -> None:
-        """Put the pose elsewhere: its error becomes F times what it was, and noise of covariance Q."""
-        block = F @ self.pose_cov @ F.T + Q
-        self._P[POSE:, :POSE] = self._P[POSE:, :POSE] @ F.T
+    def move(self, motion: Motion, Q: Float[np.ndarray, "3 3"]) -> None:
+        """Take the pose along a motion: its error becomes F times what it was, and noise of covariance Q."""
+        block = motion.F @ self.pose_cov @ motion.F.T + Q
+        self._P[POSE:, :POSE] = self._P[POSE:, :POSE] @ motion.F.T
         self._P[:POSE, :POSE] = 0.5 * (block + block.T)
-        self._x[:POSE] = pose_world
+        self._x[:POSE] = motion.pose_world
 
-    def append(
-        self,
-        anchors: Float[np.ndarray, "m 2"],
-        means: Float[np.ndarray, "m 2"],
-        G_pose: Float[np.ndarray, "m 2 3"],
-        noise: Float[np.ndarray, "m 2 2"],
-    ) -> Int[np.ndarray, " m"]:
+    def append(self, new: Initialisation, noise: Float[np.ndarray, "m 2 2"]) -> Int[np.ndarray, " m"]:
         """Add lines whose error is G_pose times the pose's, and noise; return their ids."""
-        m = len(anchors)
+        m = len(new.means)
         self._reserve(m)
         slots = np.array([self._free.pop() for _ in range(m)], dtype=np.int64)
         columns = (POSE + 2 * slots[:, None] + np.arange(2)).ravel()
-        G = G_pose.reshape(2 * m, POSE)
+        G = new.G_pose.reshape(2 * m, POSE)
         across = G @ self._across(np.arange(POSE))
         block = (across[:, :POSE] @ G.T).reshape(m, 2, m, 2)
         each = np.arange(m)
@@ -86,11 +78,11 @@ class DenseMap:
         across[:, columns] = 0.5 * (block + block.T)
         for j, values in zip(columns.tolist(), across, strict=True):
             self._P[j, :j], self._P[j:, j] = values[:j], values[j:]
-        self._x[columns] = means.ravel()
+        self._x[columns] = new.means.ravel()
         ids = np.arange(self._next_id, self._next_id + m)
         self._next_id += m
         self.ids, self._slots = np.concatenate([self.ids, ids]), np.concatenate([self._slots, slots])
-        self.anchors = np.concatenate([self.anchors, anchors])
+        self.anchors = np.concatenate([self.anchors, new.anchors])
         return ids
 
     def drop(self, rows: Int[np.ndarray, " m"]) -> None:

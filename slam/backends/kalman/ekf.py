@@ -42,20 +42,12 @@ class GaussianMap(Protocol):
         """Return the Gaussian of the pose and some lines."""
         ...
 
-    def move(
-        self, pose_world: Float[np.ndarray, "3"], F: Float[np.ndarray, "3 3"], Q: Float[np.ndarray, "3 3"]
-    ) -> None:
-        """Put the pose elsewhere."""
+    def move(self, motion: Motion, Q: Float[np.ndarray, "3 3"]) -> None:
+        """Take the pose along a motion that adds noise of covariance Q."""
         ...
 
-    def append(
-        self,
-        anchors: Float[np.ndarray, "m 2"],
-        means: Float[np.ndarray, "m 2"],
-        G_pose: Float[np.ndarray, "m 2 3"],
-        noise: Float[np.ndarray, "m 2 2"],
-    ) -> Int[np.ndarray, " m"]:
-        """Add lines and return their ids."""
+    def append(self, new: Initialisation, noise: Float[np.ndarray, "m 2 2"]) -> Int[np.ndarray, " m"]:
+        """Add lines with what noise adds to the pose's part in their covariance; return their ids."""
         ...
 
     def drop(self, rows: Int[np.ndarray, " m"]) -> None:
@@ -106,7 +98,7 @@ class Ekf(Generic[M]):
         self._move_on()
         self._has_driven = True
         motion, noise = self._moved(odometry)
-        self._map.move(motion.pose_world, motion.F, noise)
+        self._map.move(motion, noise)
         self._odometry_cov = motion.F @ self._odometry_cov @ motion.F.T + noise
 
     def update(self, first: Observations, second: Observations) -> None:
@@ -125,7 +117,7 @@ class Ekf(Generic[M]):
             self._begin_frame()
         self._move_on()
         new, noise = self._grown(lines, cov, centres)
-        return self._map.append(new.anchors, new.means, new.G_pose, noise)
+        return self._map.append(new, noise)
 
     def merge(self, keep: int, drop: int) -> None:
         """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
@@ -151,7 +143,8 @@ class Ekf(Generic[M]):
     def _begin_frame(self) -> None:
         """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
         self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
-        self._map.move(np.zeros(POSE), np.zeros((POSE, POSE)), np.zeros((POSE, POSE)))
+        nothing = np.zeros((POSE, POSE))
+        self._map.move(Motion(np.zeros(POSE), nothing, nothing), nothing)
         self._begin()
 
     def _moved(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:

@@ -13,7 +13,7 @@ from slam.backends.full_ekf import FullEkf
 from slam.backends.kalman.config import EkfConfig
 from slam.backends.kalman.dense_map import DenseMap
 from slam.estimation.backend import Observations
-from slam.estimation.models import Linear
+from slam.estimation.models import Initialisation, Linear, Motion
 from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
@@ -53,7 +53,7 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
             noise = np.zeros((size, size))
             noise[:3, :3] = Q
             slow.x[:3] = fast.pose_world
-            fast.move(fast.pose_world, F, Q)
+            fast.move(Motion(fast.pose_world, F, np.eye(3)), Q)
             slow.apply(A, noise)
         elif verb == "append":
             m = int(rng.integers(1, 9))
@@ -62,7 +62,7 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
                 np.tile(1e-4 * np.eye(2), (m, 1, 1)),
                 rng.uniform(-1, 1, (m, 2)),
             )
-            new = fast.append(rng.uniform(-1, 1, (m, 2)), means, G, R)
+            new = fast.append(Initialisation(rng.uniform(-1, 1, (m, 2)), means, G, np.zeros((m, 2, 2))), R)
             assert new.tolist() == list(range(ids, ids + m))
             ids += m
             A, noise = np.zeros((size + 2 * m, size)), np.zeros((size + 2 * m, size + 2 * m))

@@ -219,7 +219,7 @@ def test_the_constrained_filter_leads_what_is_unseen_over_by_the_least_change(se
     N, after = unseen(position, alpha, map_.anchors), unseen(moved, turned, map_.anchors)
     sigmas, taken = np.sqrt(map_.variances), []
     map_.follow = lambda moves, common: taken.append(np.eye(len(N)) + moves @ common.T)
-    backend._carry(position, moved, alpha, turned)
+    backend._carry((position, alpha), (moved, turned))
     np.testing.assert_allclose(taken[0] @ N, after, atol=1e-9)
     # The least D - I by Lagrange: rows in the span of N' W.
     change = (taken[0] - np.eye(len(N))) * sigmas

@@ -11,6 +11,7 @@ from slam.backends import BACKENDS
 from slam.backends.blocks.block_ekf import BlockEkf
 from slam.backends.full_ekf import FullEkf
 from slam.backends.textbook_ekf import TextbookEkf
+from slam.estimation.models import Motion
 from slam.evaluation.axioms.broken import BrokenError
 from slam.evaluation.axioms.check import axioms_of, check_backend
 from slam.geometry.poses import wrap
@@ -87,7 +88,7 @@ class Forgetful(FullEkf):
 
     def remove(self, ids):
         super().remove(ids)
-        self._map.move(self._map.pose_world, np.eye(3), 1e-6 * np.eye(3))
+        self._map.move(Motion(self._map.pose_world, np.eye(3), np.eye(3)), 1e-6 * np.eye(3))
 
 
 class Unsymmetric(Shown):

@@ -79,8 +79,8 @@ def _colour(token: Any) -> Paint | None:
             return Paint(0.299 * red + 0.587 * green + 0.114 * blue, alpha)
         # The L of CIE Lab is within 0.03 of the value of a grey of sRGB.
         return Paint(min(max(float(colour.to("lab").coordinates[0]) / 100, 0.0), 1.0), alpha)
-    except (NotImplementedError, ValueError, TypeError, AttributeError, IndexError, OverflowError):
-        # The parser meets whatever stands between the brackets.
+    except (ValueError, NotImplementedError, OverflowError):
+        # `color()` of no space, a space that the parser cannot convert, numbers beyond all bounds.
         return None
 
 
