@@ -102,7 +102,7 @@ bundled: setup
 	$(BIN)/python -m studies.exploration.suite --errorless --out $(ROWS)/bundled-errorless.jsonl
 	$(BIN)/python -m studies.exploration.suite --seeds 10 --out $(ROWS)/bundled-noisy.jsonl
 
-# A wall entered twice by the paper's own method.
+# A duplicate wall by the paper's own method.
 paper-method: setup
 	$(BIN)/python -m studies.consistency.paper_method --max-steps 200 --out $(ROWS)/paper-method.jsonl
 

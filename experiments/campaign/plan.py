@@ -107,7 +107,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "backends": ("paper-method", "block-ekf", "full-ekf", "invariant-ekf"),
         "strategies": ("nearest-robot",),
         "trials": 20,
-        # Twice what today's mapper takes; a robot lost among walls entered twice would go round to the default limit.
+        # Twice what today's mapper takes; a robot lost among duplicate walls would go round to the default limit.
         "max_steps": 1000,
         "settings": METHODS["paper-method"].driving,
     },

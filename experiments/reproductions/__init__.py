@@ -10,7 +10,7 @@ _FIGURES = (
     (fig6, "how often each stretch is driven, nearest open end from the start"),
     (fig8, "the map of the cyclic environment of 7 m x 7 m"),
     (fig9, "the map around a big obstacle, the loop closed, the farthest corners"),
-    (fig10, "the pose's uncertainty below its initial value, walls entered twice"),
+    (fig10, "the pose's uncertainty below its initial value, duplicate walls"),
     (fig11, "the uncertainty on coming back to the start"),
     (eq4, "what the distance from the world's origin does to r"),
     (standing, "a robot that stands still and looks learns nothing of where it is (Julier and Uhlmann)"),

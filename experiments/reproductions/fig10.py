@@ -18,8 +18,8 @@ from .runs.standing import stand
 
 COMPARED = (PAPER, "full-ekf", "fej-ekf", "invariant-ekf", "graph")
 LOOKS = 200
-LEAST, TWICE, AWAY = "least trace over the start's", "walls entered twice", "A* from A, in standard deviations of A"
-LEFT, TRIED = "of these left in the last map", "seeds tried until a wall stands twice"
+LEAST, TWICE, AWAY = "least trace over the start's", "duplicate walls", "A* from A, in standard deviations of A"
+LEFT, TRIED = "of these left in the last map", "seeds tried until there is a duplicate wall"
 SAID: Said = {LEAST: "below 1", TWICE: "A and A*, among others", AWAY: "outside the ellipse of A"}
 
 
@@ -30,12 +30,12 @@ def numbers(seed: int) -> Numbers:
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9 with an uncertain start and drive back there, until a wall is entered twice."""
+    """Explore the world of figure 9 with an uncertain start and drive back there, until there is a duplicate wall."""
     search = first_double(there_and_back(seed))
     ours = {name: _numbers(name, search.config) for name in COMPARED}
     ours[PAPER] |= {TRIED: search.tried, AWAY: None if search.double is None else search.double.sigmas_away}
     return Reproduction(
-        "Figure 10: optimistic estimates, and a wall entered twice",
+        "Figure 10: optimistic estimates, and a duplicate wall",
         SAID,
         ours,
         _figure(search),
@@ -79,7 +79,7 @@ def _figure(search: Search) -> Figure:
     points = np.concatenate([small.ends_world.reshape(-1, 2), *small.true_floor])
     paint_map(place, small, points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M)
     if double is None:
-        place.set_title(f"(c) the map of {PAPER}: no wall stands twice", fontsize=8, loc="left")
+        place.set_title(f"(c) the map of {PAPER}: no duplicate wall", fontsize=8, loc="left")
         space.text(0.5, 0.5, f"no A*: {search.tried} seeds tried", ha="center", transform=space.transAxes, size=9)
         return figure
     mark_double(place, small, step.map.belief.rows(double.ids), "A")

@@ -15,12 +15,12 @@ from .runs.maps import compared, map_numbers, map_words, mark
 STAGES_M = (4.0, 12.0)
 """Path driven at the pictures before the obstacle's chain is closed."""
 
-TRIED = "seeds tried until a wall stands twice"
+TRIED = "seeds tried until there is a duplicate wall"
 SAID: Said = {
     "first chain closed after, m": "16 (around the obstacle)",
     "contours closed": "the obstacle's; open ends left elsewhere",
     "error of named corners' distances, worst, cm": "less than 20",
-    "double entries": "1 visible",
+    "duplicate walls": "1 visible",
 }
 
 
@@ -30,7 +30,7 @@ def numbers(seed: int) -> Numbers:
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9 until a wall stands twice, show the map as it grows, and by each back end."""
+    """Explore the world of figure 9 until there is a duplicate wall, show the map as it grows, and by each back end."""
     search = first_double(drive_by_walls("paper-fig9", seed=seed))
     config, double = search.config, search.double
     results = compared(config)
@@ -58,12 +58,12 @@ def reproduce(seed: int) -> Reproduction:
 
 
 def _stages(config: TrialConfig, double: Double | None) -> list[tuple[SmallMap, Step]]:
-    """Return the map at some places of the path, where the first chain was closed, and where a wall stands twice."""
+    """Return the map at some places of the path, where the first chain was closed, and where a wall has a duplicate."""
     drive = watched(config)
     log = log_of(drive.made)
     wanted = {int(np.searchsorted(log.path_length_m, at)): "" for at in STAGES_M if at < log.path_length_m[-1]}
     wanted |= dict.fromkeys(np.flatnonzero(log.closed_chains > 0)[:1].tolist(), ", the first chain is closed")
-    wanted |= {} if double is None else {double.standing[-1]: ", wall W stands twice"}
+    wanted |= {} if double is None else {double.standing[-1]: ", a duplicate of wall W"}
     found = []
     for index, words in sorted(wanted.items()):
         step = drive.steps[index]

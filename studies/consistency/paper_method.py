@@ -1,4 +1,4 @@
-"""How often the paper's method enters a wall twice (figure 9), beside today's mapper, driven by the same rules.
+"""How often the paper's method enters a duplicate wall (figure 9), beside today's mapper, driven by the same rules.
 
 .venv/bin/python -m studies.consistency.paper_method      # goes on where it was interrupted
 """
@@ -90,10 +90,10 @@ def _short(value: Any) -> Any:
 
 
 def table(rows: Sequence[Row]) -> Table:
-    """Return, for each method, how its runs ended, how many walls stand twice, and how honest it is."""
+    """Return, for each method, how its runs ended, how many duplicate walls, and how honest it is."""
     found = Table(
-        *("method", "runs", "complete", "with a wall twice", "twice: median (range)", "merged", "false matches"),
-        *("pose ANEES, median", "map ANEES, median", "m, median", "steps, median"),
+        *("method", "runs", "complete", "with a duplicate wall", "duplicates: median (range)", "merged"),
+        *("false matches", "pose ANEES, median", "map ANEES, median", "m, median", "steps, median"),
     )
     for name in dict.fromkeys(row["method"] for row in rows):
         mine = [row for row in rows if row["method"] == name]

@@ -24,7 +24,7 @@ NAMES = ("world", "p0", "backend", "strategy", "seed", "max_path_m")
 MEASURES = {
     "wall_rmse_m": "error of the walls",
     "wall_shape_m": "error of the map's shape",
-    "double_entries": "walls entered twice",
+    "double_entries": "duplicate walls",
     "pose_anees": "pose ANEES",
     "map_anees": "map ANEES",
     "coverage": "coverage",
@@ -98,7 +98,7 @@ def returns_table(rows: Sequence[Row], strategy: str) -> Table:
     shown = Table(title=f"{strategy}: returns per 100 m, beside the median pose ANEES", title_justify="left")
     for column in ("world", "p0", "back end"):
         shown.add_column(column)
-    for column in ("runs", "metres", "returns", "per 100 m", "pose ANEES", "walls entered twice"):
+    for column in ("runs", "metres", "returns", "per 100 m", "pose ANEES", "duplicate walls"):
         shown.add_column(column, justify="right")
     own = [row for row in rows if row["strategy"] == strategy]
     for world, p0, backend in dict.fromkeys((row["world"], row["p0"], row["backend"]) for row in own):

@@ -112,7 +112,7 @@ _QUANTITIES: dict[str, Callable[[Sequence[Row]], str]] = {
     "steps: approach, follow, round, reverse": _spent,
     "longest route of walls": lambda rows: f"{max(row['longest_route'] for row in rows)}",
     "coverage": _median("coverage"),
-    "walls entered twice": lambda rows: f"{sum(row['duplicate_lines'] or 0 for row in rows)}",
+    "duplicate walls": lambda rows: f"{sum(row['duplicate_lines'] or 0 for row in rows)}",
     "collisions": lambda rows: f"{sum(row['collisions'] or 0 for row in rows)}",
 }
 
@@ -151,7 +151,7 @@ def _shortcut(rows: Sequence[Row]) -> list[str]:
         "### Does following closer to the paper change what the shortcut costs?",
         "",
         f"Today's mapper in the same worlds, three strategies, {seeds} seeds: medians of the pose ANEES, of the map"
-        " ANEES and of the path in metres, and the sum of walls entered twice.",
+        " ANEES and of the path in metres, and the sum of duplicate walls.",
         "",
         "| figure | following | strategy | " + " | ".join(f"{name}: pose, map, m, twice" for name in BACKENDS) + " |",
         "| --- | --- | --- |" + " --- |" * len(BACKENDS),

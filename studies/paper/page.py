@@ -38,10 +38,10 @@ NOTES = {
     "fig5": "In the paper motion and perception are without error. Here they have noise, a drive for each seed."
     " Sigmas are of each back end on the same observations, with the true association.",
     "fig6": "As figure 5. The ratio is that of two drives with one seed.",
-    "fig9": "A wall counts as a double entry where the last map holds it twice."
-    " `chainslam reproduce fig9` tries seeds until a wall stands twice for 30 steps, and marks it.",
+    "fig9": "A wall counts as a duplicate where the last map holds it twice."
+    " `chainslam reproduce fig9` tries seeds until a duplicate wall lasts 30 steps, and marks it.",
     "fig10": "The robot starts with an uncertainty of 0.1 m and 2 degrees, and drives back to its start in the end."
-    " A wall is entered twice where the map of any step holds it twice.",
+    " A wall is a duplicate where the map of any step holds it twice.",
     "fig11": "The drives of figure 10.",
     "eq4": "`wall` attaches r to the wall, `origin` to the world's origin, as the paper does. A ring of 40 m is driven"
     " twice, the second time 100 m away from the origin. A drive that broke down is left out.",
@@ -66,8 +66,8 @@ def page_of(rows: Sequence[Row], followed: Sequence[Row] = ()) -> str:
         parts.append(f"## {_title(name)}\n")
         note = " ".join(filter(None, [NOTES.get(name, ""), strategies_in_words(followed) if name == "fig6" else ""]))
         parts += [f"{note}\n"] if note else []
-        seeds = [row["seed"] for row in own]
-        parts.append(f"Drive of seed {seeds[0]}.\n" if len(own) == 1 else f"Drives of seeds {seeds[0]} to {seeds[-1]}.\n")
+        first, last = own[0]["seed"], own[-1]["seed"]
+        parts.append(f"Drive of seed {first}.\n" if first == last else f"Drives of seeds {first} to {last}.\n")
         header, *lines = table_of([row["numbers"] for row in own], REPRODUCTIONS[name].paper)
         parts += map(_line, (header, ["---"] * len(header), *lines))
         parts.append("")

@@ -43,8 +43,8 @@ HEADLINES = (
         paper,
     ),
     Headline(
-        "A wall entered twice, as in the paper's figure 9",
-        "The paper's method enters a wall twice, or the reason why not (`paper-fig9`, the first 200 steps).",
+        "A duplicate wall, as in the paper's figure 9",
+        "The paper's method enters a duplicate wall, or the reason why not (`paper-fig9`, the first 200 steps).",
         "make paper-method",
         STORED / "paper-method.jsonl",
         paper_method,

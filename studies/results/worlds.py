@@ -96,8 +96,8 @@ def bundled(rows: Sequence[Row]) -> Found:
 
 
 def paper_method(rows: Sequence[Row]) -> Found:
-    """Return how often the paper's method enters a wall twice, beside today's mapper with two filters."""
-    head = ["method", "runs", "with a wall entered twice", "walls entered twice", "pose ANEES: median"]
+    """Return how often the paper's method enters a duplicate wall, beside today's mapper with two filters."""
+    head = ["method", "runs", "with a duplicate wall", "duplicate walls", "pose ANEES: median"]
     table: Table = [[*head, "map ANEES: median"]]
     by = grouped(rows, "method")
     twice = {name: sum(row["duplicate_lines"] > 0 for row in mine) for name, mine in by.items()}
@@ -105,4 +105,4 @@ def paper_method(rows: Sequence[Row]) -> Found:
         cells = [f"`{name}`", str(len(mine)), f"{twice[name]} of {len(mine)}", str(total(mine, "duplicate_lines"))]
         table.append([*cells, median_of(mine, "pose_anees"), median_of(mine, "map_anees")])
     shares = "; ".join(f"`{name}` in {count} of {len(by[name])}" for name, count in twice.items())
-    return Found(table, f"The wall entered twice appears, by {shares} runs ([why](exploration.md#the-papers-method)).")
+    return Found(table, f"The duplicate wall appears, by {shares} runs ([why](exploration.md#the-papers-method)).")

@@ -86,7 +86,7 @@ LOOKS = (
     Switch("second_looks.held", WHOLE, "kept = «held(search.closures, unknowns.poses, c)»",
            "search.closures", "after each round of walls closures are judged anew"),
     Switch("second_looks.merged", WHOLE, ", «None»]:",
-           "config.gates_m[-1]", "walls that stand twice are one in the end"),
+           "config.gates_m[-1]", "duplicate walls are one in the end"),
     Switch("second_looks.refuted", WHOLE,
            "gone = «refuted(unknowns, spans(unknowns, seen, of), rays, config.gates_m[-1])»[of]",
            "np.zeros(len(unknowns.lines), dtype=bool)", "a wall that more scans see through than see is none"),

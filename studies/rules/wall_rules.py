@@ -88,7 +88,7 @@ UPKEEP = (
            NO, "segments of few beams stretch no wall"),
     Switch("mapper.merging", "slam.map_keeper",
            "twice := «duplicate_of(walls, touched, one_wall, self.config.merging, sides.cut)»",
-           "None", "one wall entered twice is merged"),
+           "None", "a duplicate wall is merged"),
     Switch("merging.hidden", "slam.map.merging", "and («is_hidden» or",
            "False", "also where the one hides the other"),
     Switch("merging.turn_known", "slam.map.merging", "if «turn <= config.shared.known_rad**2» and",

@@ -1,4 +1,4 @@
-"""How often the paper's method enters a wall twice: what is compared, and how a table counts it."""
+"""How often the paper's method enters a duplicate wall: what is compared, and how a table counts it."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def test_a_variant_of_the_papers_method_differs_in_what_its_name_says_alone(name
     assert trial_of(METHODS[name]) == trial
 
 
-def test_runs_with_a_wall_twice_are_counted_by_method():
+def test_runs_with_a_duplicate_wall_are_counted_by_method():
     row = dict.fromkeys(KEPT, 1.0) | {"status": "stopped", "method": "a"}
     shown = table([row | {"duplicate_lines": 2}, row | {"duplicate_lines": 0}, row | {"method": "b"}])
     assert [list(column.cells) for column in shown.columns[:5]] == [

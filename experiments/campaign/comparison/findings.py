@@ -31,7 +31,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
     refused = f"{100 * (1 - gate):g} %"
     claims: list[tuple[str, str, str, Judge]] = [
         ("outside", PAPER, "outside its 95 % band for most of the run", _outside),
-        ("wrong", PAPER, "more false matches and double entries than any other", lambda row: _wrong(row, pooled)),
+        ("wrong", PAPER, "more false matches and duplicate walls than any other", lambda row: _wrong(row, pooled)),
         ("trace", PAPER, "comes to claim more than at its start", _trace),
         *(("margin", name, "never below the bound", _never_below) for name in CONSISTENT),
         ("below", BASELINE, "below the bound: from where on, by how much", _below),

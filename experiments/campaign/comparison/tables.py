@@ -57,10 +57,10 @@ def trial_row(record: TrialScores, gate: float = GATE) -> Row:
 
 
 def doubles(summary: Row, gate: float = GATE) -> Row:
-    """Return how many observations of known walls there were, and how many walls were entered twice (merged or not).
+    """Return how many observations of known walls there were, and how many duplicate walls (merged or not).
 
     A gate at level g refuses 1 - g of the observations of a calibrated estimate, each of which may enter a wall anew:
-    `doubles_beyond_gate` is the number of double entries less that.
+    `doubles_beyond_gate` is the number of duplicate walls less that.
     """
     names = ("matches_true", "matches_missed", "matches_false", "duplicate_lines", "merges", "false_merges")
     found: dict[str, int] = {name: summary[name] for name in names if summary.get(name) is not None}

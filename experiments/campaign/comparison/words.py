@@ -19,7 +19,7 @@ MEASURE_WORDS = {
     "heading_rmse_rad": "error of the heading",
     "path_length_m": "way driven",
     "duplicate_lines": "walls left twice in the map",
-    "double_entries": "walls entered twice",
+    "double_entries": "duplicate walls",
     "false_matches": "false matches",
     "matches_missed": "missed matches",
 }

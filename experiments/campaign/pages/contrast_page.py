@@ -130,7 +130,7 @@ def _trials(rows: Sequence[Row]) -> list[Section]:
     most = sorted(rows, key=_apart, reverse=True)[:MOST_ROWS]
     header = (
         *("world", "strategy", "back end", "arm", "seed", "status", "way, m", "pose ANEES", "walls, cm"),
-        "walls entered twice",
+        "duplicate walls",
     )
     told = tuple(
         (

@@ -96,7 +96,7 @@ def _counts(said: dict[str, Any]) -> tuple[str, ...]:
     return (
         f"{counts['trials']} trials: {counts['complete']} complete, {counts['stopped']} stopped by a limit,"
         f" {counts['failed']} failed. A trial that is not complete is in no mean and is counted beside it;"
-        " wrong matches, walls entered twice and the extremes are those of stopped runs, too.",
+        " wrong matches, duplicate walls and the extremes are those of stopped runs, too.",
     )
 
 
@@ -139,7 +139,7 @@ _INNOVATION_WORDS = (
     " where the world lies, which no scan tells.",
 )
 _ERROR_HEADER = (
-    *("back end", "walls, cm", "shape, cm", "without", "path, cm", "heading, degrees", "entered twice"),
+    *("back end", "walls, cm", "shape, cm", "without", "path, cm", "heading, degrees", "duplicates"),
     "of these merged",
     *("false matches", "missed matches %", "observations"),
 )

@@ -22,8 +22,8 @@ from .drives import PAPER, driven
 SIGMAS = 3.0
 """Ellipses are drawn at so many."""
 LASTING = 30
-"""A wall that stands twice for so many steps, some three metres, is no passing doubt of the filter's."""
-STANDS = f"a wall stands twice for {LASTING} steps or more, A* entered outside A's ellipse"
+"""A duplicate wall that lasts so many steps, some three metres, is no passing doubt of the filter's."""
+STANDS = f"a duplicate wall lasts {LASTING} steps or more, A* entered outside A's ellipse"
 SEEDS = 40
 """So many drives are searched for a wall that stands in the map twice."""
 
@@ -139,7 +139,7 @@ class Search:
 
 @lru_cache(maxsize=8)
 def first_double(config: TrialConfig, most: int = SEEDS) -> Search:
-    """Drive with the seed of a trial, the next one and so on, `most` of them, until a wall stands twice.
+    """Drive with the seed of a trial, the next one and so on, `most` of them, until there is a duplicate wall.
 
     It does so for `LASTING` steps or more, and A* is outside the 3 sigma ellipse of A when it is entered.
     """

@@ -44,7 +44,7 @@ def replayed(config: TrialConfig, backend: str) -> TrialResult:
 
 
 MAX_STEPS = 6000
-"""A drive is stopped after this many scans: among walls entered twice the paper's robot may find no end."""
+"""A drive is stopped after this many scans: among duplicate walls the paper's robot may find no end."""
 
 
 def drive_by_walls(world: str, **settings: Any) -> TrialConfig:

@@ -32,7 +32,7 @@ def map_numbers(result: TrialResult) -> dict[str, Value]:
         "contours closed": f"{summary['contours_closed']} of {summary['contours_reachable']}",
         "error of named corners' distances, worst, cm": 100.0 * max(errors) if errors else None,
         "coverage, %": 100.0 * summary["coverage"],
-        "double entries": summary["duplicate_lines"],
+        "duplicate walls": summary["duplicate_lines"],
         "pose error rms, cm": 100.0 * summary["pose_rmse_m"],
         "odometry alone, worst, m": summary["odometry_max_m"],
         "pose ANEES (1 is ideal)": summary["pose_anees"],

@@ -67,7 +67,7 @@ def second_looks(
 
 
 def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig, rays: Rays = NO_RAYS) -> Survey:
-    """Return poses and walls after all rounds of association and solution; at last, walls that stand twice are one."""
+    """Return poses and walls after all rounds of association and solution; at last, duplicate walls are one."""
     c, drive = config.closures, search.drive.links(config.doubt, config)
     unknowns = without_lines(settled(search.poses, search.drive, search.closures, config))
     seen, of = sightings, np.zeros(0, dtype=np.int64)

@@ -32,7 +32,7 @@ class Reach(NamedTuple):
     beside_m: float
     """... where it lies no farther than this from the other."""
     least_bend_cosine: float
-    """What such a bend turns: less, and it may be one wall entered twice; ..."""
+    """What such a bend turns: less, and it may be a duplicate; ..."""
     most_bend_cosine: float
     """... more, and beams tell where it is."""
 

@@ -21,8 +21,8 @@ from .kernels import vertex_kernels
 from .kernels.vertex_kernels import Bends, Bounds
 
 LEAST_RAD = float(np.deg2rad(0.2))
-"""Smaller turns are no bends: over thousands of beams every real wall shows one, and walls that overlap may be one that
-was entered twice."""
+"""Smaller turns are no bends: over thousands of beams every real wall shows one, and walls that overlap may be
+duplicates."""
 SLIGHT_RAD = float(np.deg2rad(2.0))
 """Larger ones a scan may show."""
 LARGEST_RAD = float(np.deg2rad(10.0))

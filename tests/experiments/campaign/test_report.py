@@ -55,7 +55,7 @@ def test_every_number_carries_its_name_for_a_phone_and_claims_come_first(folder)
         "pose ANEES from the start (95 % interval)",
         "pose ANEES",
         "steps outside the band %",
-        "entered twice",
+        "duplicates",
     ):
         assert f'data-name="{name}"' in page
     assert page.index("Claims") < page.index("Does it know how wrong it is?")

@@ -7,7 +7,7 @@ from slam.backends import BACKENDS
 from slam.geometry.poses import wrap
 from slam.robot import Odometry
 
-pytestmark = pytest.mark.parametrize("name", list(BACKENDS))
+every_back_end = pytest.mark.parametrize("name", list(BACKENDS))
 START, P0 = np.array([12.0, -7.0, 0.4]), np.diag([0.02, 0.02, 0.004]) ** 2
 
 
@@ -69,6 +69,7 @@ def test_merging_is_conditioning_on_equality_and_reports_the_line_about_the_anch
     np.testing.assert_allclose((after.cov - cov[:7, :7]) / np.outer(sigma, sigma), 0.0, atol=close)
 
 
+@every_back_end
 def test_merging_leaves_the_covariance_sound_and_its_volume_smaller(name):
     backend, keep, other, drop = two_of_one_wall(name)
     before = backend.belief.joint([keep, other]).cov
@@ -82,6 +83,7 @@ def test_merging_leaves_the_covariance_sound_and_its_volume_smaller(name):
         assert np.linalg.slogdet(after)[1] < np.linalg.slogdet(before)[1]
 
 
+@every_back_end
 def test_merging_a_line_with_its_twin_again_and_again_stays_sound(name):
     """Two entries of one observation are equal but for its noise; after many merges nothing becomes indefinite."""
     rng = np.random.default_rng(22)

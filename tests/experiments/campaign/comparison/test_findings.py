@@ -106,7 +106,7 @@ def test_the_rate_tells_how_many_computed_at_a_time():
 
 WORDS = {
     ("outside", "block-ekf"): "outside its 95 % band for most of the run",
-    ("wrong", "block-ekf"): "more false matches and double entries than any other",
+    ("wrong", "block-ekf"): "more false matches and duplicate walls than any other",
     ("trace", "block-ekf"): "comes to claim more than at its start",
     ("margin", "fej-ekf"): "never below the bound",
     ("margin", "invariant-ekf"): "never below the bound",
