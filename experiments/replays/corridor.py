@@ -128,8 +128,12 @@ def look(
     lines: Float[np.ndarray, "n 2"],
     pose: Float[np.ndarray, "3"],
     standard_normals: Float[np.ndarray, "n 2"],
+    share: float = 1.0,
 ) -> ScanObservations:
-    """Return the walls within range whose free side the robot is on, each with the noise of the beams that it takes."""
+    """Return the walls within range whose free side the robot is on, each with the noise of the beams that it takes.
+
+    A beam's sigma is this share of what it is.
+    """
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
     r = lines[:, 1] - n @ pose[:2]
     along = np.sort(np.sum((walls - pose[:2]) * t[:, None], axis=-1), axis=1)
@@ -140,9 +144,10 @@ def look(
     length = along[:, 1] - along[:, 0]
     seen = (r > 0.05) & (r < RANGE_M) & (beams >= LEAST_BEAMS)
     beams, t0 = np.maximum(beams, 1.0), along.mean(axis=1)
-    a = BEAM_SIGMA_M**2 * 12.0 / (beams * np.maximum(length, 1e-3) ** 2)
-    cov = np.stack([np.stack([a, t0 * a], -1), np.stack([t0 * a, BEAM_SIGMA_M**2 / beams + t0**2 * a], -1)], -2)
-    rows = np.flatnonzero(seen & (a < FIRM_RAD**2))
+    sigma_m = share * BEAM_SIGMA_M
+    a = sigma_m**2 * 12.0 / (beams * np.maximum(length, 1e-3) ** 2)
+    cov = np.stack([np.stack([a, t0 * a], -1), np.stack([t0 * a, sigma_m**2 / beams + t0**2 * a], -1)], -2)
+    rows = np.flatnonzero(seen & (a < (share * FIRM_RAD) ** 2))
     true = np.stack([lines[rows, 0] - pose[2], r[rows]], axis=-1)
     bearings_rad = true[:, 0] + np.arctan2(t0[rows], r[rows])
     drawn, stated = as_stated(true, bearings_rad, cov[rows], standard_normals[rows])

@@ -17,21 +17,31 @@ from experiments.replays.ideal import NAME as IDEAL
 from experiments.replays.ideal import IdealEkf
 from experiments.replays.observations import DriveObservations, Ridden, observations_of, ride
 from experiments.replays.recordings import record
-from experiments.scenario import P0, P0_SIGMAS, TrialConfig, drawn_start
+from experiments.scenario import KNOWN, P0, P0_SIGMAS, TrialConfig, drawn_start, sigmas_of
+from experiments.scoring.measurements import Z_95
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.estimation.backend import POSE, Backend, Observations
 from slam.estimation.models import innovations, stack
-from slam.evaluation.consistency import anees, nis
+from slam.evaluation.consistency import anees, chi2_band, nis
+from slam.evaluation.from_start import FromStart, Start, from_start
+from slam.geometry.poses import wrap
+from slam.robot import ScannerSpec
 
 from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill
 
 KEY = ("place", "p0", "backend", "seed")
-SCORES = ("pose_anees", "map_anees", "nis", "pose_rms_m", "pose_sigma_m", "line_sigma_m")
-RING_M = 60.0
-PLACES = ("paper-fig8", "paper-fig9", f"ring of {RING_M:g} m")
+SCORES = (
+    *("pose_anees_from_start", "pose_anees", "map_anees", "nis", "nis_in_band", "held"),
+    *("pose_rms_m", "pose_sigma_m"),
+)
+SHOWN = "from the start", "pose ANEES", "map ANEES", "NIS", "in band", "held", "rms, mm", "sigma, mm"
+"""What the table calls them; error and sigma are of the position from the start."""
+RINGS_M = {f"ring of {length:g} m": length for length in (60.0, 200.0)}
+"""The long one closes beyond what the wheels alone would find again."""
+PLACES = ("paper-fig8", "paper-fig9", *RINGS_M)
 EVERY = (*(name for name in BACKENDS if name != "graph-batch"), IDEAL)
 """What rides along; until the end `graph-batch` is `graph`."""
 
@@ -84,11 +94,11 @@ class RivalStudy:
 
 def show(title: str, runs: dict[str, Float[np.ndarray, "r c"]]) -> None:
     """Print the mean of each score over the drives and, in brackets, its median; sigmas and errors in mm."""
-    columns = ("pose ANEES", "map ANEES", "NIS", "pose rms, mm", "pose sigma, mm", "line sigma, mm")
-    table = Table("back end", *columns, "without a score", title=title, caption="mean (median) over the drives")
+    table = Table("back end", *SHOWN, "without a score", title=title, caption="mean (median) over the drives")
+    in_mm = np.where([name.endswith("_m") for name in SCORES], 1e3, 1.0)
     for name, values in runs.items():
-        sound = values[np.isfinite(values).all(axis=1)] * [1.0, 1.0, 1.0, 1e3, 1e3, 1e3]
-        cells = [f"{each.mean():.3g} ({np.median(each):.3g})" for each in sound.T] if len(sound) else ["-"] * 6
+        sound = values[np.isfinite(values).all(axis=1)] * in_mm
+        cells = [f"{each.mean():.3g} ({np.median(each):.3g})" for each in sound.T] if len(sound) else ["-"] * len(SHOWN)
         table.add_row(name, *cells, str(len(values) - len(sound)))
     plain_console(width=max(plain_console().width, 130)).print(table)
 
@@ -96,24 +106,33 @@ def show(title: str, runs: dict[str, Float[np.ndarray, "r c"]]) -> None:
 def rows_of(study: RivalStudy, task: tuple[str, int]) -> dict[Key, Scores]:
     """Make one drive and ride it with every back end; raises UsageError for a bad recording."""
     place, seed = task
-    if place == PLACES[-1]:
-        seen = drive(Loop(RING_M), seed)
+    if place in RINGS_M:
+        seen = drive(Loop(RINGS_M[place]), seed)
     else:
         seen = observations_of(record(TrialConfig(place, study.driver, seed=seed), study.recordings), True)
-    begin = drawn_start(seen.chance, seen.true_poses_world[0], study.p0)
-    return {study.key(place, name, seed): scores(made(name, *begin, seen), seen) for name in study.backends}
+    return {study.key(place, name, seed): scores(*made(name, study.p0, seen), seen) for name in study.backends}
 
 
-def made(name: str, pose: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"], seen: DriveObservations) -> Backend:
-    """Return a back end, or the ideal filter of this drive."""
-    return IdealEkf(pose.copy(), cov.copy(), seen) if name == IDEAL else BACKENDS[name].make(pose.copy(), cov.copy())
+def made(name: str, p0: P0, seen: DriveObservations) -> tuple[Backend, FromStart]:
+    """Return a back end, or the ideal filter of this drive, at its start, and what tells its pose from there."""
+    true = seen.true_poses_world[0]
+    start = Start(*drawn_start(seen.chance, true, p0), true)
+
+    def make(pose: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> Backend:
+        return IdealEkf(pose.copy(), cov.copy(), seen) if name == IDEAL else entry.make(pose.copy(), cov.copy())
+
+    entry = BACKENDS["full-ekf" if name == IDEAL else name]
+    backend, carries = make(start.estimate_world, start.cov), entry.carries_start
+    return backend, from_start(backend, carries, start, start.known(sigmas_of(KNOWN)), make, ScannerSpec())
 
 
 class Listening:
     """A back end of which every scan's NIS is taken before it is told of it."""
 
     def __init__(self, backend: Backend) -> None:
-        self.squared, self.dof = 0.0, 0
+        self.values: list[float] = []
+        """NIS of each scan that showed a known wall."""
+        self.dofs: list[int] = []
         self._backend = backend
 
     def __getattr__(self, name: str) -> object:
@@ -127,24 +146,35 @@ class Listening:
             means = joint.mean[POSE:].reshape(-1, 2)[place]
             model = stack(place, innovations(joint.mean[:POSE], joint.anchors[place], means, second.lines, second.cov))
             cov = joint.take(model.rows).cov
-            self.squared += float(nis(model.e[None], (model.H @ cov @ model.H.T + model.R)[None])[0])
-            self.dof += len(model.e)
+            self.values.append(float(nis(model.e[None], (model.H @ cov @ model.H.T + model.R)[None])[0]))
+            self.dofs.append(len(model.e))
         self._backend.update(first, second)
 
+    def told(self) -> tuple[float, float]:
+        """Return the NIS over its degrees of freedom, and the share of scans in the 95 % band of their own."""
+        bands = {dof: chi2_band(dof) for dof in set(self.dofs)}
+        inside = [bands[dof][0] <= value <= bands[dof][1] for value, dof in zip(self.values, self.dofs, strict=True)]
+        return float(np.sum(self.values) / np.sum(self.dofs)), float(np.mean(inside))
 
-def scores(backend: Backend, seen: DriveObservations) -> Scores:
-    """Return the scores of one ride; None where a covariance is none."""
+
+def scores(backend: Backend, tells: FromStart, seen: DriveObservations) -> Scores:
+    """Return the scores of one ride; None where a covariance is none.
+
+    `held` is the share of the 95 % intervals of x, y and the heading, step by step, that hold the truth.
+    """
     listening = Listening(backend)
-    ridden: Ridden = ride(listening, seen)  # type: ignore[arg-type]
-    off = ridden.estimated_world[:, :2] - ridden.true_poses_world[:, :2]
+    ridden: Ridden = ride(listening, seen, tells)  # type: ignore[arg-type]
+    off = ridden.from_start_world[:, :2] - ridden.true_poses_world[:, :2]
     rms = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
-    sigma = float(np.sqrt(np.mean(np.trace(ridden.estimated_cov[:, :2, :2], axis1=1, axis2=2))))
-    line = float(np.median(np.sqrt(np.diag(ridden.joint.cov)[POSE + 1 :: 2])))
+    sigma = float(np.sqrt(np.mean(np.trace(ridden.from_start_cov[:, :2, :2], axis1=1, axis2=2))))
+    error = ridden.estimated_world - ridden.true_poses_world
+    error[:, 2] = wrap(error[:, 2])
+    held = float(np.mean(np.abs(error) <= Z_95 * np.sqrt(np.diagonal(ridden.estimated_cov, axis1=1, axis2=2))))
     try:
-        rest = listening.squared / max(listening.dof, 1), rms, sigma, line
-        return anees(ridden.pose_nees, 3), ridden.map_anees, *rest
+        honest = anees(ridden.pose_nees_from_start, 3), anees(ridden.pose_nees, 3), ridden.map_anees
+        return *honest, *listening.told(), held, rms, sigma
     except np.linalg.LinAlgError:
-        return None, None, None, rms, sigma, line
+        return None, None, None, None, None, held, rms, sigma
 
 
 if __name__ == "__main__":
