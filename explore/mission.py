@@ -67,12 +67,13 @@ def explore_mission(
     return _mission(robot, mapper, driver, floor)
 
 
-def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "") -> Iterator[Step]:
+def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "", unread: str = "") -> Iterator[Step]:
     """Map what a recorded robot sensed in `scans` scans, wherever it was driven, and yield each step.
 
-    `cut_short` says in words what ended its drive early. Nobody plans, so nobody keeps the free floor.
+    `cut_short` says in words what ended its drive early, and `unread` why most of its log was not read: such a run has
+    failed. Nobody plans, so nobody keeps the free floor.
     """
-    return _mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot), cut_short), None)
+    return _mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot), cut_short, unread), None)
 
 
 def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:

@@ -17,7 +17,7 @@ from slam.backends import BACKENDS
 from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
-from ..replays.measured import held_against
+from ..replays.measured import check_references, held_against
 from ..replays.real_log import RealOptions, read_own_run, read_real_run
 from ..replays.replay import Association, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
@@ -40,8 +40,8 @@ class Replay:
     """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """The log.npz that a run left, also that of a robot of one's own, with its config.json beside it; or a CARMEN or
-    dp-slam log, also packed by gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
+    """The log.npz that a run left, also that of a robot of one's own, with its config.json beside it; or a CARMEN,
+    dp-slam or BreezySLAM log, also packed by gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
     backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
     """The estimators (see `chainslam backends`)."""
     association: Association = "own"
@@ -92,6 +92,7 @@ class Replay:
             choose("back end", name, BACKENDS)
         references = read_references(self.relations, self.reference)
         source = self.source()
+        check_references(references, *source.odometry)
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
         with ExitStack() as stack:
@@ -117,9 +118,12 @@ class Replay:
                     break
             problems += recording.close()
         self._print(source, summaries)
-        early = [summary["reason"] for summary in summaries if summary["outcome"] == Outcome.RECORDING_CUT_SHORT]
-        for words in dict.fromkeys(early):
-            print(words)
+        ended = {summary["reason"]: summary["outcome"] for summary in summaries}
+        for words, outcome in ended.items():
+            if outcome == Outcome.RECORDING_CUT_SHORT:
+                print(words)
+            elif outcome == Outcome.FAILED:
+                say(f"chainslam: failed: {words}", stderr=True)
         print_references(summaries)
         print(f"results in {out}")
         for problem in problems:
@@ -153,18 +157,14 @@ class Replay:
         topics = self.scan_topic, self.odom_topic
         told = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise, *topics)
         real = RealLog(read(self.log, told, self.config, self.set, robot))
-        for note in real.run.log.notes:
-            say(f"chainslam: {self.log.name}: {note}", stderr=True)
-        if real.run.log.trouble:
-            say(
-                f"chainslam: {self.log.name}, {real.run.log.trouble}: {len(real.run.log.scan_time_s)} scans before it"
-                " are used",
-                stderr=True,
-            )
+        log, name = real.run.log, self.log.resolve().name
+        cut = f"{log.trouble}: {len(log.scan_time_s)} scans before it are used" if log.trouble else ""
+        for words in filter(None, (*log.notes, log.left_out.words(len(log.scan_time_s)), cut)):
+            say(f"chainslam: {name}: {words}", stderr=True)
         return real
 
     def _kind(self, source: OwnLog | RealLog) -> str:
-        return self.association if isinstance(source, OwnLog) else self.log.name.partition(".")[0]
+        return self.association if isinstance(source, OwnLog) else source.title.partition(".")[0]
 
     def _timeline(self, source: OwnLog | RealLog) -> TimelineOutput:
         if isinstance(source, RealLog):

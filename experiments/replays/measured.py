@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.estimation.backend import PathKeeper
+from slam.evaluation.relations import SAME_TIME_S, interpolated, paired_poses
 
 from ..artifacts.trajectories import path_of, smoothed_path
 from ..scoring.records import Log
@@ -14,6 +15,70 @@ from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalis
 from ..scoring.without_truth.references import References, scored_by
 from ..scoring.without_truth.smoothing import rows_of_steps
 from ..trial import TrialResult
+from ..usage import UsageError
+
+CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}
+UNITS = {"millimetres": 1000.0, "centimetres": 100.0, "inches": 39.37}
+OTHER_UNIT = 20.0
+"""Wheels are never wrong by such a factor, however they slip."""
+MOVED_M = 0.5
+"""Less way tells nothing of a unit."""
+
+
+def check_references(
+    references: References, time_s: Float[np.ndarray, " s"], wheels_world: Float[np.ndarray, "s 3"]
+) -> None:
+    """Raise UsageError where what others measured cannot be of this drive: no time in common, or another unit.
+
+    `wheels_world` is where the odometry puts the robot at the times of the log.
+    """
+    if references.path is not None:
+        times, poses = references.path
+        ours, theirs = paired_poses(time_s, wheels_world, times, poses)
+        if not len(ours):
+            raise UsageError(_no_common_time("reference", time_s, times))
+        _check_unit("reference", np.hypot(*(theirs - theirs[0])[:, :2].T), np.hypot(*(ours - ours[0])[:, :2].T))
+    if (given := references.relations) is not None:
+        known = given.within(float(time_s[0]) - SAME_TIME_S, float(time_s[-1]) + SAME_TIME_S)
+        if not len(known.motions):
+            raise UsageError(_no_common_time("relations", time_s, np.concatenate([given.first_s, given.second_s])))
+        first, second = (interpolated(time_s, wheels_world, asked) for asked in (known.first_s, known.second_s))
+        _check_unit("relations", np.hypot(*known.motions[:, :2].T), np.hypot(*(second - first)[:, :2].T))
+
+
+def _no_common_time(what: str, ours: Float[np.ndarray, " s"], theirs: Float[np.ndarray, " r"]) -> str:
+    low, high, least, most = (float(value) for value in (ours[0], ours[-1], theirs.min(), theirs.max()))
+    unit = next((unit for unit, s in CLOCKS.items() if s * most >= low and s * least <= high), None)
+    if unit is not None:
+        hint = f"its times are in {unit}: divide them"
+    elif most - least <= 2.0 * (high - low) and abs(least) < 1.0 < abs(low):
+        hint = f"its times count from its beginning: add {low:.3f} or so"
+    elif most >= low and least <= high:
+        hint = "take one that was measured at the scans, or interpolate it to their times"
+    else:
+        hint = "take one of this drive, by the same clock"
+    return (
+        f"expected a time of the {what} within {1e3 * SAME_TIME_S:.0f} ms of a scan, found none: the log is of"
+        f" {low:.3f} to {high:.3f} s, the {what} of {least:.3f} to {most:.3f} s; {hint}"
+    )
+
+
+def _check_unit(what: str, theirs_m: Float[np.ndarray, " k"], ours_m: Float[np.ndarray, " k"]) -> None:
+    """Raise UsageError where distances differ by a factor that only another unit explains."""
+    theirs, ours = float(theirs_m.sum()), float(ours_m.sum())
+    if max(theirs_m.max(initial=0.0), ours_m.max(initial=0.0)) < MOVED_M or min(theirs, ours) <= 0.0:
+        return
+    factor = theirs / ours
+    if factor > OTHER_UNIT:
+        unit = min(UNITS, key=lambda name: abs(np.log(factor / UNITS[name])))
+        raise UsageError(
+            f"expected a {what} in metres, found it {factor:.0f} times as long as the odometry: {unit}? divide it"
+        )
+    if factor < 1.0 / OTHER_UNIT:
+        raise UsageError(
+            f"expected a {what} in metres, found it {1.0 / factor:.0f} times as short as the odometry: multiply it, or"
+            " take one of this drive"
+        )
 
 
 def held_against(result: TrialResult, references: References) -> TrialResult:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.logs.raw_scan import RawScan
+from sim.logs.raw_scan import LogError, RawScan
 from slam.geometry.poses import compose, inverse
 from slam.odometry.config import ScanMatchingConfig
 from slam.odometry.scan_matching import ScanMatcher
@@ -22,11 +22,11 @@ MOST_M, MOST_RAD = 0.3, float(np.deg2rad(15.0))
 SIGMA_M = 0.02
 
 
-def motion_of_scans(scans: Iterator[RawScan]) -> Iterator[RawScan]:
+def motion_of_scans(scans: Iterator[RawScan | LogError]) -> Iterator[RawScan | LogError]:
     """Yield scans with odometry: their own where the log tells it, else that of the scans themselves."""
     told = _Told()
     for scan in scans:
-        yield scan if scan.robot_odom is not None else told.at(scan)
+        yield scan if isinstance(scan, LogError) or scan.robot_odom is not None else told.at(scan)
 
 
 class _Told:

@@ -68,6 +68,12 @@ class RealRun:
     cut_short: str = ""
     """What ended the drive or its log early, in words."""
 
+    @property
+    def unread(self) -> str:
+        """Why most of the log was not read, in words; nothing where half of it or more was."""
+        left_out, read = self.log.left_out, len(self.log.scan_time_s)
+        return left_out.words(read) if left_out.count > read else ""
+
     @cached_property
     def wheels_alone(self) -> Float[np.ndarray, "s 3"]:
         """Where wheel odometry puts the robot at each keyframe, in the map's frame."""
@@ -93,7 +99,7 @@ def read_real_run(
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
     trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, sets, settled))
-    return RealRun(path.name, log, trial, options, log.trouble)
+    return RealRun(path.resolve().name, log, trial, options, log.trouble)
 
 
 def _keyframes(options: RealOptions) -> KeyframesConfig:
@@ -138,7 +144,7 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     def mission(scenario: Scenario) -> Iterator[Step]:
         heard = heard_by(run.options.odometry or run.trial.odometry, scenario.robot, scenario.config)
         mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
-        return ride_mission(heard, mapper, len(run.log.recording), run.cut_short)
+        return ride_mission(heard, mapper, len(run.log.recording), run.cut_short, run.unread)
 
     result = run_unwitnessed(scenario, watch, mission, run.log)
     return looked_again(result) if run.options.second_looks or result.smoothed is not None else result

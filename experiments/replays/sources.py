@@ -11,6 +11,7 @@ from explore.step import Step
 from sim.worlds import World
 
 from ..artifacts.results import REPLAY, config_record
+from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 from .real_log import RealRun, replay_real, replayed_real
 from .replay import RecordedRun, ReplayOptions, replay, replayed
@@ -50,6 +51,12 @@ class OwnLog:
         """Replay it."""
         return replay(self.run, backend, self.options, watch, self.world)
 
+    @property
+    def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:
+        """Return the times of the scans, and where the odometry puts the robot at each."""
+        recording = self.run.recording
+        return recording.time_s, odometry_poses(self.run.true_poses_world[0], recording.odometry)
+
     def true_pose(self, step: Step) -> Float[np.ndarray, "3"]:
         """Return where the robot was at a step."""
         return np.asarray(self.run.true_poses_world[step.index])
@@ -79,6 +86,11 @@ class RealLog:
     def go(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
         """Map it."""
         return replay_real(self.run, backend, watch)
+
+    @property
+    def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:
+        """Return the times of the scans, and where the odometry puts the robot at each."""
+        return self.run.log.scan_time_s, self.run.log.poses_of_scans(self.run.wheels_alone)
 
     def wheels_pose(self, step: Step) -> Float[np.ndarray, "3"]:
         """Return where wheel odometry puts the robot at a step."""

@@ -18,11 +18,17 @@ EARLY = "the recording ends early"
 class ReplayDriver:
     """Goes through a known number of scans; a robot that stays lost at the end for a turn's steps has failed."""
 
-    def __init__(self, scans: int, lost: LostConfig, cut_short: str = "") -> None:
-        """Go through `scans` scans; `cut_short` says in words what ended their drive early, if anything did."""
+    def __init__(self, scans: int, lost: LostConfig, cut_short: str = "", unread: str = "") -> None:
+        """Go through `scans` scans.
+
+        `cut_short` says in words what ended their drive early, and `unread` why most of their log was not read.
+        """
         self._scans, self._step, self._lost_since, self._lost = scans, -1, -1, lost
         self._outcome = Outcome.RECORDING_CUT_SHORT if cut_short else Outcome.RECORDING_ENDED
         told_before = cut_short.startswith(EARLY)  # by a replay that is replayed
+        if unread:
+            self._outcome, cut_short = Outcome.FAILED, f"{EARLY}: {unread}"
+            told_before = True
         self._words = cut_short if told_before else f"{EARLY} ({cut_short})" if cut_short else "the recording has ended"
 
     def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:

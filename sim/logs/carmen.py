@@ -1,63 +1,120 @@
-"""CARMEN logs: `FLASER`, `ROBOTLASER1` and `ODOM` lines of text, and dp-slam's variant of them.
+"""CARMEN logs: `FLASER`, `RLASER`, `ROBOTLASER` and `ODOM` lines of text, and dp-slam's variant of them.
 
 CARMEN's format is that of its `log` module (http://carmen.sourceforge.net/logger_playback.html).
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from slam.geometry.poses import compose, inverse
+
 from .raw_scan import LogError, RawScan, as_returns
 from .text_lines import text_lines
 
-SICK_BEAMS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5}
-"""Beams of a scanner of 180 degrees, the first of them to the right, and the degrees between two."""
+SICK_STEP = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
+"""Degrees between two beams, by the number of beams. CARMEN guesses so, and 180 degrees for any other number."""
 SICK_RANGE_M = 40.0
 """`FLASER` lines do not tell the scanner's range. SICK's scanners say 50 m or 81.8 m where nothing came back."""
 SICK_CODES_M = (8.1825, 8.1915)
 """In its mode of 8 m the same scanner says 8183 to 8191 mm where it measured nothing, and no range is larger."""
-KNOWN = ("FLASER", "ROBOTLASER1", "ODOM", "Laser", "Odometry")
+SCANS = ("FLASER", "ROBOTLASER1", "Laser", "RLASER", *(f"ROBOTLASER{k}" for k in range(2, 6)))
+"""Kinds of lines that hold a scan; of several scanners the first one of these is read."""
+KNOWN = (*SCANS, "ODOM", "Odometry")
+FIRST_LINES = 1000
+"""By so many lines it is known which scanners a log has."""
 EVERY_S = 1.0
 """Between two scans of a log without times."""
 MOST_BEAMS = 10_000
 
 
-def read_carmen(path: Path) -> Iterator[RawScan]:
-    """Yield the scans of a log; raises OSError, and LogError at the first line that cannot be read."""
-    known = False
-    odom: np.ndarray | None = None
-    count = 0
+def read_carmen(path: Path, notes: list[str] | None = None) -> Iterator[RawScan | LogError]:
+    """Yield the scans of a log, and an error in place of each that cannot be read; raises OSError and LogError.
+
+    `notes` gets what was assumed, in words.
+    """
+    said = [] if notes is None else notes
+    read = _first_kind(path)
+    odom: LogError | np.ndarray = LogError("expected an Odometry line before the first Laser line, found none")
+    counts, beams = Counter[str](), Counter[int]()
     for number, words in text_lines(path):
         kind = words[0]
-        if kind not in KNOWN:
-            continue
-        known = True
-        place = f"line {number}"
-        if kind == "ODOM":
-            _numbers(words[1:], 3, place, kind)
-        elif kind == "Odometry":
-            odom = _pose(_numbers(words[1:], 3, place, kind), place)
-        elif kind == "Laser":
-            if odom is None:
-                raise LogError(f"{place}: expected an Odometry line before the first Laser line, found none")
-            yield _dpslam(words, odom, count * EVERY_S, place)
-            count += 1
-        else:
-            yield _MESSAGES[kind](words, place)
-    if not known:
-        raise LogError(f"expected lines {', '.join(KNOWN[:3])}, or Laser and Odometry, found none of them")
+        counts[kind if kind in KNOWN else ""] += 1
+        read = read or (kind if kind in SCANS else "")
+        try:
+            if kind == "Odometry":
+                odom = _odometry(words, f"line {number}")
+            elif kind == read:
+                time_s = (counts[kind] - 1) * EVERY_S
+                scan = _scan(words, odom, time_s, f"line {number}")
+                beams[len(scan.ranges_m)] += 1
+                yield scan
+        except LogError as error:
+            yield error
+    if not any(counts[kind] for kind in KNOWN):
+        raise LogError(f"expected lines {', '.join(SCANS[:2])}, or Laser and Odometry, found none of them")
+    others = [f"{counts[kind]} of {kind}" for kind in SCANS if counts[kind] and kind != read]
+    if others:
+        said.append(f"expected the scans of one scanner, found {read} and {', '.join(others)}: {read} is read")
+    guessed = sorted(set(beams) - set(SICK_STEP)) if not read.startswith("ROBOT") else []
+    if guessed:
+        said.append(
+            f"expected {', '.join(map(str, SICK_STEP))} beams, found {', '.join(map(str, guessed))}: taken to be spread"
+            " over 180 degrees, as CARMEN takes them"
+        )
+
+
+def _first_kind(path: Path) -> str:
+    """Return the kind of the scans to read; nothing where the first lines have none."""
+    found = set()
+    with suppress(LogError):  # told where it is met again
+        for _, words in islice(text_lines(path), FIRST_LINES):
+            found.add(words[0])
+    return next((kind for kind in SCANS if kind in found), "")
+
+
+def _scan(words: list[str], odom: LogError | Float[np.ndarray, "3"], time_s: float, place: str) -> RawScan:
+    """Return what a line of any scanner tells; raises LogError."""
+    if words[0] != "Laser":
+        return _MESSAGES[words[0][:6]](words, place)
+    if isinstance(odom, LogError):
+        raise LogError(f"{place}: {odom}")
+    return _dpslam(words, odom, time_s, place)
+
+
+def _odometry(words: list[str], place: str) -> LogError | Float[np.ndarray, "3"]:
+    """Return the pose of an `Odometry` line, or why it is none: the scan after it has none, either."""
+    try:
+        return _pose(_numbers(words[1:], 3, place, "Odometry"), place)
+    except LogError as error:
+        return error
 
 
 def _flaser(words: list[str], place: str) -> RawScan:
     """`FLASER n r_1..r_n x y theta odom_x odom_y odom_theta time host logger_time`."""
     bearings, ranges, rest = _sick(words, place)
-    poses = _numbers(rest, 7, place, "FLASER")
+    poses = _numbers(rest, 7, place, words[0])
     return RawScan(
         poses[6], bearings, as_returns(ranges, SICK_RANGE_M), SICK_RANGE_M,
         _pose(poses[3:6], place), _pose(poses[:3], place), place,
     )  # fmt: skip
+
+
+def _rlaser(words: list[str], place: str) -> RawScan:
+    """`RLASER`, as `FLASER`: a scanner that looks back, whether its pose says so or not."""
+    scan = _flaser(words, place)
+    assert scan.robot_odom is not None
+    assert scan.scanner_odom is not None
+    on_robot = compose(inverse(scan.robot_odom), scan.scanner_odom)
+    if np.cos(on_robot[2]) > 0.0:
+        on_robot[2] += np.pi
+    return replace(scan, scanner_odom=compose(scan.robot_odom, on_robot))
 
 
 def _dpslam(words: list[str], odom: Float[np.ndarray, "3"], time_s: float, place: str) -> RawScan:
@@ -67,14 +124,14 @@ def _dpslam(words: list[str], odom: Float[np.ndarray, "3"], time_s: float, place
 
 
 def _robotlaser(words: list[str], place: str) -> RawScan:
-    """`ROBOTLASER1 type start fov resolution max accuracy mode n r.. m rem.. laser robot tv rv 3x time ..`."""
-    head = _numbers(words[1:], 7, place, "ROBOTLASER1")
+    """`ROBOTLASER type start fov resolution max accuracy mode n r.. m rem.. laser robot tv rv 3x time ..`."""
+    head = _numbers(words[1:], 7, place, words[0])
     start, resolution, most_m = head[1], head[3], head[4]
     count = _count(words[8] if len(words) > 8 else "nothing", place)
     ranges = _ranges(words[9:], count, place)
     rest = words[9 + count :]
     remissions = _count(rest[0], place, least=0) if rest else 0
-    poses = _numbers(rest[1 + remissions :], 12, place, "ROBOTLASER1")
+    poses = _numbers(rest[1 + remissions :], 12, place, words[0])
     if not (resolution > 0.0 and count * resolution < 2.0 * np.pi + resolution and most_m > 0.0):
         raise LogError(
             f"{place}: expected beams over one turn at most and a range, found {count} beams {resolution:g} rad apart"
@@ -87,15 +144,19 @@ def _robotlaser(words: list[str], place: str) -> RawScan:
     )  # fmt: skip
 
 
-_MESSAGES: dict[str, Callable[[list[str], str], RawScan]] = {"FLASER": _flaser, "ROBOTLASER1": _robotlaser}
+_MESSAGES: dict[str, Callable[[list[str], str], RawScan]] = {
+    "FLASER": _flaser,
+    "RLASER": _rlaser,
+    "ROBOTL": _robotlaser,
+}
+"""By the first six letters of a line."""
 
 
 def _sick(words: list[str], place: str) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], list[str]]:
     """Return bearings, ranges and the words behind them of a line that tells only the number of beams."""
     count = _count(words[1] if len(words) > 1 else "nothing", place)
-    if count not in SICK_BEAMS:
-        raise LogError(f"{place}: expected {', '.join(map(str, SICK_BEAMS))} beams, found {count}")
-    bearings = -0.5 * np.pi + np.deg2rad(SICK_BEAMS[count]) * np.arange(count)
+    step = SICK_STEP.get(count, 180.0 / (count - 1))
+    bearings = -0.5 * np.pi + np.deg2rad(step) * np.arange(count)
     return bearings, _without_codes(_ranges(words[2:], count, place)), words[2 + count :]
 
 

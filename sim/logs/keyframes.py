@@ -1,7 +1,7 @@
 """From the scans of a log to those that are mapped: one wherever the wheels have moved far enough since the last."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,8 +10,9 @@ from jaxtyping import Float, Int
 from slam.geometry.poses import compose, inverse, wrap
 
 from .archive import LIMIT_BYTES
-from .raw_scan import LogError, RawScan, scanner_on_robot
+from .raw_scan import ClockError, LeftOut, LogError, RawScan, scanner_on_robot
 from .recorded_robot import Recording, differing, fan_of, padded
+from .units import Measures
 
 FIRST_M, FIRST_SCANS = 2.0, 300
 """The scanner's place on the robot is read from the first scans: as many, or as many metres."""
@@ -59,6 +60,8 @@ class RecordedLog:
     """Why the log ends before its end, in words with the place."""
     notes: tuple[str, ...] = ()
     """What was assumed of the log, in words."""
+    left_out: LeftOut = field(default_factory=LeftOut)
+    """Scans that could not be read, or whose time goes back."""
 
     def poses_of_scans(self, keyframes_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "n 3"]:
         """Return where all scans were taken, given where the keyframes were; `s` may be less where a run ended early.
@@ -87,21 +90,34 @@ def _moved(poses: Float[np.ndarray, "n 3"], motions: Float[np.ndarray, "n 3"]) -
     return np.array([compose(pose, motion) for pose, motion in zip(poses, motions, strict=True)]).reshape(-1, 3)
 
 
-def gather(scans: Iterator[RawScan], config: KeyframesConfig) -> RecordedLog:
+def gather(scans: Iterator[RawScan | LogError], config: KeyframesConfig, notes: list[str] | None = None) -> RecordedLog:
     """Read scans to their end and return the log; raises LogError where not even one can be used.
 
-    What comes before a scan that cannot be used is kept, and `trouble` says what is wrong with that one.
+    A scan that cannot be used is left out, `trouble` says why no more came, and `notes` get what was assumed. Raises
+    LogError as well where the numbers cannot be in metres, radians and seconds.
     """
-    found, trouble = _Gathered(config), ""
+    found, measures, trouble, broken = _Gathered(config), Measures(), "", list[str]()
     try:
         for scan in scans:
-            found.add(scan)
+            if isinstance(scan, LogError):
+                broken.append(str(scan))
+                continue
+            found.left_out.add(*broken)
+            broken.clear()
+            if found.takes(scan):
+                measures.see(scan)
     except LogError as error:
+        if isinstance(error, ClockError):
+            raise
         trouble = str(error)
+    if len(broken) == 1 and found.read:
+        trouble = trouble or broken.pop()  # cut short within its last scan
+    found.left_out.add(*broken)
     found.place_scanner()
     if not found.keyframes:
-        raise LogError(trouble or "expected scans, found none")
-    return found.log(trouble)
+        raise LogError(found.left_out.first or trouble or "expected scans, found none")
+    measures.check(said := [] if notes is None else notes)
+    return replace(found.log(trouble), notes=tuple(said))
 
 
 class _Gathered:
@@ -123,15 +139,31 @@ class _Gathered:
         self._head: list[RawScan] | None = []
         """The first scans, until the scanner's place on the robot is known."""
         self._on_robot = np.zeros(3)
-        self._last: RawScan | None = None
+        self._last_s = -np.inf
+        self.left_out = LeftOut()
 
-    def add(self, scan: RawScan) -> None:
-        """Take in the next scan; raises LogError where it does not follow the one before."""
-        last, self._last = self._last, scan
-        if last is not None and scan.time_s < last.time_s:
-            raise LogError(f"{scan.place}: expected time to go on from {last.time_s:.6f} s, found {scan.time_s:.6f} s")
+    @property
+    def read(self) -> int:
+        """How many scans there are so far."""
+        return len(self._times) + len(self._head or ())
+
+    def takes(self, scan: RawScan) -> bool:
+        """Take in the next scan, or leave it out where it does not follow the one before; raises LogError when full."""
+        last_s = self._last_s
+        if not scan.time_s >= last_s:
+            self.left_out.add(f"{scan.place}: expected time to go on from {last_s:.6f} s, found {scan.time_s:.6f} s")
+            return False
         if scan.robot_odom is None:
-            raise LogError(f"{scan.place}: expected odometry, found none: take one that holds it, or let scans tell it")
+            self.left_out.add(
+                f"{scan.place}: expected odometry, found none: take one that holds it, or let scans tell it"
+            )
+            return False
+        self._last_s = scan.time_s
+        self._add(scan)
+        return True
+
+    def _add(self, scan: RawScan) -> None:
+        assert scan.robot_odom is not None
         if len(self.keyframes) * scan.ranges_m.nbytes > LIMIT_BYTES:
             raise LogError(f"{scan.place}: expected scans of {LIMIT_BYTES >> 20} MiB at most, found more")
         if self._head is None:
@@ -193,7 +225,7 @@ class _Gathered:
         of = np.array(self._of_scan)
         return RecordedLog(
             recording, np.array(self._times), of, np.array(self._since), _shares(np.array(self._ways), of),
-            self._on_robot, trouble,
+            self._on_robot, trouble, (), self.left_out,
         )  # fmt: skip
 
 

@@ -14,7 +14,31 @@ FARTHEST_M = 2.0
 
 
 class LogError(ValueError):
-    """A log that cannot be read on, in words: the place, what was expected there, and what was found."""
+    """A log that cannot be read on, in words: the place, what was expected there, and what was found.
+
+    Readers raise it where they cannot go on, and yield it in place of a scan that cannot be read.
+    """
+
+
+class ClockError(LogError):
+    """Two kinds of messages of one log, told by clocks that have no time in common: nothing of it can be used."""
+
+
+@dataclass
+class LeftOut:
+    """Scans of a log that are not read."""
+
+    count: int = 0
+    first: str = ""
+    """Why the first of them was not, in words with the place."""
+
+    def add(self, *why: str) -> None:
+        """Count one more for each of the reasons."""
+        self.count, self.first = self.count + len(why), self.first or "".join(why[:1])
+
+    def words(self, read: int) -> str:
+        """How many scans are left out beside those that were read, and why; nothing where none is."""
+        return f"{self.count} of {read + self.count} scans are left out: {self.first}" if self.count else ""
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,68 @@
 """Recorded logs of real robots, whatever their format: told by their contents."""
 
+import gzip
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
+from .archive import BROKEN
 from .bag_topics import TopicsWanted
+from .breezyslam import is_breezyslam, read_breezyslam
 from .carmen import read_carmen
 from .keyframes import KeyframesConfig, RecordedLog, gather
 from .raw_scan import LogError, RawScan
 from .recorded_robot import RecordingError
 from .rosbag import is_bag, read_bag
-from .text_lines import first_bytes
+from .text_lines import GZIP, first_bytes
 
-ARCHIVE = b"PK"
-"""A run's own log begins so."""
+PDF, PICTURE = "a PDF document", "a picture"
+PACKED = {
+    b"PK": "a zip file",
+    b"BZh": "a file packed by bzip2",
+    b"\xfd7zXZ": "a file packed by xz",
+    b"(\xb5/\xfd": "a file packed by zstd",
+    b'\x04"M\x18': "a file packed by lz4",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"Rar!": "a RAR archive",
+    b"%PDF": PDF,
+    b"\x89PNG": PICTURE,
+}
+"""What is no log, or is packed, by how it begins."""
+UNPACK = "unpack it, and name a log in it"
+TAR_AT, TAR = 257, b"ustar"
+LONGEST_HEAD = TAR_AT + len(TAR)
 
 
 def is_own_log(path: Path) -> bool:
-    """Return whether a file is a run's own `log.npz`, or is at least named so."""
+    """Return whether a file is a run's own `log.npz`, by its name or as an archive of arrays."""
     try:
-        return path.suffix == ".npz" or first_bytes(path, 2) == ARCHIVE
-    except OSError:
+        if path.suffix == ".npz":
+            return True
+        if first_bytes(path, 2) != b"PK":
+            return False
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (OSError, *BROKEN):
         return False
+
+
+def _refuse_packed(path: Path) -> None:
+    """Raise LogError, with its name, for an archive and for what else is no log."""
+    if path.is_dir():
+        return
+    head = first_bytes(path, LONGEST_HEAD)
+    for begin, words in PACKED.items():
+        if head.startswith(begin):
+            raise LogError(f"{words}: {UNPACK if words not in (PDF, PICTURE) else 'name a log'}")
+    if head.startswith(GZIP):
+        try:
+            with gzip.open(path) as file:
+                head = file.read(LONGEST_HEAD)
+        except (EOFError, zlib.error, gzip.BadGzipFile):
+            return  # its reader says where
+    if head[TAR_AT:] == TAR:
+        raise LogError(f"a tar archive: {UNPACK}")
 
 
 KEYFRAMES = KeyframesConfig()
@@ -32,9 +73,9 @@ def read_recorded_log(
     path: Path,
     config: KeyframesConfig = KEYFRAMES,
     wanted: TopicsWanted = ANY_TOPICS,
-    motion_of: Callable[[Iterator[RawScan]], Iterator[RawScan]] = iter,
+    motion_of: Callable[[Iterator[RawScan | LogError]], Iterator[RawScan | LogError]] = iter,
 ) -> RecordedLog:
-    """Return a CARMEN log or a ROS bag; raises RecordingError, in one line, where not one scan can be used.
+    """Return a CARMEN or BreezySLAM log or a ROS bag; raises RecordingError where not one scan can be used.
 
     `wanted` names the topics of a bag, and `motion_of` tells the odometry of scans that have none.
     """
@@ -44,12 +85,18 @@ def read_recorded_log(
             raise LogError(
                 "expected a ROS bag to name topics of, found another log: leave out --scan-topic and --odom-topic"
             )
-        scans = read_bag(path, wanted, notes) if is_bag(path) else read_carmen(path)
-        return replace(gather(motion_of(scans), config), notes=tuple(notes))
+        return gather(motion_of(_scans(path, wanted, notes)), config, notes)
     except LogError as error:
-        raise RecordingError(f"expected a recorded log, found {path.name}: {error}") from error
+        raise RecordingError(f"expected a recorded log, found {path.resolve().name}: {error}") from error
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise RecordingError(
-            f"expected a recorded log, found {path.name} ({reason}): name a log that exists"
+            f"expected a recorded log, found {path.resolve().name} ({reason}): name a log that exists"
         ) from error
+
+
+def _scans(path: Path, wanted: TopicsWanted, notes: list[str]) -> Iterator[RawScan | LogError]:
+    if is_bag(path):
+        return read_bag(path, wanted, notes)
+    _refuse_packed(path)
+    return read_breezyslam(path, notes) if is_breezyslam(path) else read_carmen(path, notes)

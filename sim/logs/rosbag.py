@@ -19,7 +19,7 @@ from slam.robot.ros.odometry_buffer import OdometryBuffer
 from slam.robot.ros.transforms import Frames, planar, seconds
 
 from .bag_topics import ODOMETRY, SCAN, BagTopics, TopicsWanted, topics_of
-from .raw_scan import LogError, RawScan
+from .raw_scan import ClockError, LogError, RawScan
 from .text_lines import first_bytes
 
 MAGIC = b"#ROSBAG"
@@ -42,8 +42,12 @@ def is_bag(path: Path) -> bool:
         return False
 
 
-def read_bag(path: Path, wanted: TopicsWanted | None = None, notes: list[str] | None = None) -> Iterator[RawScan]:
-    """Yield the scans of a bag; raises OSError, and LogError where it holds none or where it breaks off.
+def read_bag(
+    path: Path, wanted: TopicsWanted | None = None, notes: list[str] | None = None
+) -> Iterator[RawScan | LogError]:
+    """Yield the scans of a bag, and an error in place of each that cannot be read.
+
+    Raises OSError, LogError where it holds none or breaks off, and ClockError.
 
     `notes` gets what was assumed, in words.
     """
@@ -62,7 +66,7 @@ def read_bag(path: Path, wanted: TopicsWanted | None = None, notes: list[str] | 
         ):
             for scan in _scans(reader, wanted or TopicsWanted(), [] if notes is None else notes):
                 yield scan
-                at += 1
+                at += isinstance(scan, RawScan)
     except (LogError, OSError):
         raise
     except RobotError as error:
@@ -84,38 +88,87 @@ def _by_another_name(path: Path) -> Iterator[Path]:
         yield link
 
 
-def _scans(reader: Any, wanted: TopicsWanted, notes: list[str]) -> Iterator[RawScan]:
+def _scans(reader: Any, wanted: TopicsWanted, notes: list[str]) -> Iterator[RawScan | LogError]:
     topics = topics_of(reader, wanted, notes)
     frames, waiting, odometry = _frames(reader, topics, notes), deque[Any](), OdometryBuffer()
-    late, covered = 0, []
-    for connection, _, raw in reader.messages(connections=topics.chosen):
-        message = reader.deserialize(raw, connection.msgtype)
+    covered: list[float] = []
+    clocks = _Clocks()
+    for connection, recorded_ns, raw in reader.messages(connections=topics.chosen):
+        message = clocks.stamped(reader.deserialize(raw, connection.msgtype), recorded_ns)
         if connection.msgtype == SCAN:
             if is_covered(message):
                 covered.append(seconds(message.header.stamp))
             else:
                 waiting.append(message)
         elif connection.msgtype == ODOMETRY:
-            odometry.add(seconds(message.header.stamp), planar(message.pose.pose.position, message.pose.pose))
+            time_s = clocks.told(seconds(message.header.stamp))
+            odometry.add(time_s, planar(message.pose.pose.position, message.pose.pose))
         else:
             told = frames.take(message)
             for time_s, pose in () if topics.odometry else told:
-                odometry.add(time_s, pose)
+                odometry.add(clocks.told(time_s), pose)
         while waiting and (_is_covered(waiting[0], odometry, topics) or len(waiting) > MOST_WAITING):
-            late += odometry.newest_s < seconds(waiting[0].header.stamp) - GAP_S
+            clocks.scanned(seconds(waiting[0].header.stamp))
             yield _raw(waiting.popleft(), odometry, frames)
     for message in waiting:
-        late += odometry.newest_s < seconds(message.header.stamp) - GAP_S
+        clocks.scanned(seconds(message.header.stamp))
         yield _raw(message, odometry, frames)
     if covered:
         notes.append(
             f"expected a scanner among things, found it inside something in {len(covered)} scans, {covered[0]:.3f} s to"
             f" {covered[-1]:.3f} s: nearer than its least range on opposite sides; they are left out"
         )
-    if late and topics.tells_motion:
-        notes.append(
-            f"expected odometry up to the last scan, found {late} scans after its end: they stand where it ends"
-        )
+    clocks.tell(topics.tells_motion, notes)
+
+
+class _Clocks:
+    """The times of scans and of odometry, which have to be of one clock."""
+
+    def __init__(self) -> None:
+        self._scans: list[float] = []
+        self._odometry = np.inf, -np.inf
+        self._unstamped = 0
+
+    def stamped(self, message: Any, recorded_ns: int) -> Any:
+        """Return a message that says a time: that of its recording where its own is zero."""
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        if stamp is None or seconds(stamp) != 0.0 or recorded_ns <= 0:
+            return message
+        self._unstamped += 1
+        sec, nanosec = divmod(recorded_ns, 10**9)
+        return replace(message, header=replace(message.header, stamp=replace(stamp, sec=sec, nanosec=nanosec)))
+
+    def told(self, time_s: float) -> float:
+        """Take note of the time of odometry, and return it."""
+        self._odometry = min(self._odometry[0], time_s), max(self._odometry[1], time_s)
+        return time_s
+
+    def scanned(self, time_s: float) -> None:
+        """Take note of the time of a scan."""
+        self._scans.append(time_s)
+
+    def tell(self, has_motion: bool, notes: list[str]) -> None:
+        """Say what was assumed; raises ClockError where no scan is of a time with odometry."""
+        first_s, last_s = self._odometry
+        if self._unstamped:
+            notes.append(
+                f"expected messages that say their time, found {self._unstamped} that say 0: the time of their"
+                " recording is taken"
+            )
+        late = sum(time_s > last_s + GAP_S for time_s in self._scans)
+        early = sum(time_s < first_s - GAP_S for time_s in self._scans)
+        if not has_motion or not late + early:
+            return
+        if late + early == len(self._scans):
+            raise ClockError(
+                f"expected scans and odometry by one clock, found scans from {min(self._scans):.3f} to"
+                f" {max(self._scans):.3f} s and odometry from {first_s:.3f} to {last_s:.3f} s: record both by one clock"
+                " (use_sim_time), or leave out the odometry"
+            )
+        for count, words in ((early, "before its beginning: they stand where it begins"),
+                             (late, "after its end: they stand where it ends")):  # fmt: skip
+            if count:
+                notes.append(f"expected odometry for all scans, found {count} scans {words}")
 
 
 def _is_covered(message: Any, odometry: OdometryBuffer, topics: BagTopics) -> bool:
@@ -143,7 +196,7 @@ def _frames(reader: Any, topics: BagTopics, notes: list[str]) -> Frames:
     return frames
 
 
-def _raw(message: Any, odometry: OdometryBuffer, frames: Frames) -> RawScan:
+def _raw(message: Any, odometry: OdometryBuffer, frames: Frames) -> RawScan | LogError:
     where = f"scan at {seconds(message.header.stamp):.6f} s"
     place, is_turned = frames.on_body(message.header.frame_id)
     try:
@@ -152,7 +205,7 @@ def _raw(message: Any, odometry: OdometryBuffer, frames: Frames) -> RawScan:
             return _told(de_skewed(replace(taken, start_s=taken.end_s), _rests), None, None, where)
         scan = de_skewed(taken, lambda from_s, to_s: _at_scanner(odometry.motion(from_s, to_s), place))
     except RobotError as error:
-        raise LogError(f"{where}: {error}") from error
+        return LogError(f"{where}: {error}")
     robot = odometry.pose(scan.time_s)
     return _told(scan, robot, compose(robot, place), where)
 

@@ -72,7 +72,8 @@ def _table(path: Path, widths: tuple[int, ...], what: str) -> Float[np.ndarray, 
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
-        rows.append(_numbers(words, f"expected {what}, found in line {number} of {path.name}"))
+        times = 1 + (widths == (RELATION,))
+        rows.append(_numbers(words, times, f"expected {what}, found in line {number} of {path.name}"))
         if len(words) not in widths or len(words) != len(rows[0]):
             raise UsageError(f"expected {what}, found {len(words)} numbers in line {number} of {path.name}: correct it")
     if not rows:
@@ -80,12 +81,13 @@ def _table(path: Path, widths: tuple[int, ...], what: str) -> Float[np.ndarray, 
     return np.array(rows)
 
 
-def _numbers(words: list[str], expected: str) -> list[float]:
+def _numbers(words: list[str], times: int, expected: str) -> list[float]:
+    """Return the numbers of a line, of which the first ones are times; raises UsageError."""
     try:
         numbers = [float(word) for word in words]
     except ValueError as error:
         raise UsageError(f"{expected} other words: correct it") from error
-    if not np.all(np.isfinite(numbers)) or np.abs(numbers[1:]).max(initial=0.0) > MOST_M * MOST_M:
+    if not np.all(np.isfinite(numbers)) or np.abs(numbers[times:]).max(initial=0.0) > MOST_M * MOST_M:
         raise UsageError(f"{expected} numbers that are none: correct it")
     return numbers
 

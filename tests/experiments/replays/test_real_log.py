@@ -230,7 +230,7 @@ def test_what_is_good_of_a_damaged_log_is_mapped_and_one_line_tells_where_it_end
     assert main(["replay", str(log), "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
-    assert said[0].startswith("chainslam: room.log, line 17: ")
+    assert said[0].startswith("chainslam: room.log: line 17: ")
     assert said[0].endswith("16 scans before it are used")
     assert len(np.loadtxt(tmp_path / "out" / "trajectory_estimated.tum")) == 16
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -166,14 +166,14 @@ def test_a_bag_that_cannot_be_opened_is_no_damaged_one(tmp_path, monkeypatch):
     assert said_of(path) == "expected a recorded log, found a.bag (Permission denied): name a log that exists"
 
 
-def test_scans_that_tell_no_beams_end_the_log_and_those_before_are_kept(tmp_path):
+def test_scans_that_tell_no_beams_are_left_out(tmp_path):
     with Bag(tmp_path / "a.bag", "ros1") as bag:
         for k in range(4):
             bag.scan(10.0 + k, ranges=(1.0,) * (5 if k < 2 else 1))
             bag.odometry(10.0 + k, pose_at(10.0 + k))
     log = read_recorded_log(tmp_path / "a.bag")
     assert len(log.scan_time_s) == 2
-    assert log.trouble.startswith("scan at 12.000000 s: expected beams, found 1")
+    assert log.left_out.words(2).startswith("2 of 4 scans are left out: scan at 12.000000 s: expected beams, found 1")
 
 
 def test_without_rosbags_one_line_tells_what_to_install(tmp_path, monkeypatch):
