@@ -8,7 +8,8 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
-setup: .venv/made
+# What tests, checks and pages need, too; users of the program need .venv/made only.
+setup: .venv/tools
 
 .venv/made: requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -16,7 +17,10 @@ setup: .venv/made
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps -e .
 	$(BIN)/python -m experiments.library.compile_kernels && touch $@
 
-demo: setup
+.venv/tools: .venv/made requirements-dev.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements-dev.lock && touch $@
+
+demo: .venv/made
 	$(BIN)/chainslam explore paper-fig9 --seed 1
 
 test: setup
@@ -224,10 +228,10 @@ screenshots: setup
 pictures: setup
 	docs/make-pictures
 
-smoke: setup
+smoke: .venv/made
 	$(BIN)/chainslam compare --preset smoke --out results/smoke
 	$(BIN)/chainslam report results/smoke
 
-compare: setup
+compare: .venv/made
 	$(BIN)/chainslam compare --preset paper --out results/paper
 	$(BIN)/chainslam report results/paper --latex

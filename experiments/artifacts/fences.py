@@ -26,7 +26,7 @@ def fence_of(text: str) -> list[list[float]]:
             return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
         raise UsageError(f"expected {SHAPE}, found {text[:60]!r}: write four different numbers")
     try:
-        polygon = _polygon(shapely.from_geojson(regular(Path(text)).read_text()))
+        polygon = _polygon(shapely.from_geojson(regular(Path(text)).read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError, GEOSException) as error:
         reason = getattr(error, "strerror", None) or "no GeoJSON"
         raise UsageError(f"expected {SHAPE}, found {Path(text).name} ({reason}): name another") from error

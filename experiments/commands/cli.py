@@ -1,6 +1,7 @@
 """The command `chainslam`: one class for each subcommand, and one line in the registry."""
 
 import gc
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, make_dataclass, replace
@@ -13,6 +14,8 @@ from ..usage import UsageError, choose
 from .parsing import parsed
 
 FAILED, BAD_USAGE = 1, 2
+UTF8 = "PYTHONUTF8"
+"""Set to 1, names of files are UTF-8, whatever the locale says."""
 ABOUT = "Explore a building by wall following and map it as chains of line segments."
 NEW_OBJECTS = 20_000
 """Garbage is looked for when so many objects are new: loading modules and kernels makes hundreds of thousands, all of
@@ -112,6 +115,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def process() -> int:
     """Run one command as a process of its own and return its exit status: no signal makes another end of it."""
     status = INTERRUPTED
+    if sys.getfilesystemencoding() == "ascii" and os.environ.get(UTF8) != "1":
+        # No name of a file with other letters could be opened.
+        os.environ[UTF8] = "1"
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+    if os.environ.get("COLUMNS", "1").strip("0 ") == "":
+        del os.environ["COLUMNS"]  # 0 says that nobody knows; tables would have no room
     try:
         status = main()
         too_late()
@@ -160,7 +169,7 @@ def _tell(message: object) -> None:
 
 def _parse(arguments: Sequence[str] | None) -> Command:
     """Return the command that the arguments name; raises UsageError, in one line, where they make none."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = [_at_home(word) for word in (sys.argv[1:] if arguments is None else arguments)]
     if words in (["--version"], ["-V"], ["version"]):
         from importlib.metadata import version  # takes as long as the rest of the help
 
@@ -169,10 +178,26 @@ def _parse(arguments: Sequence[str] | None) -> Command:
     if words and not words[0].startswith("-"):
         # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
         choose("command", words[0], COMMANDS)
+    _refuse_empty(words)
     classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
     command = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
     asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
     return asked
+
+
+def _at_home(word: str) -> str:
+    """Return a word with the home folder in place of `~`, which no shell replaces within `--out=~/x`."""
+    option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
+    return f"{option}{equals}{os.path.expanduser(value)}" if value == "~" or value.startswith("~/") else word
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """Raise UsageError for a word that is empty: of a variable that is not set a path would become the folder here."""
+    for before, word in zip(("", *words), words, strict=False):
+        if not word or (word.startswith("--") and word.endswith("=")):
+            option = word.rstrip("=") or (before if before.startswith("--") else "")
+            value = f"a value for {option}" if option else "a word"
+            raise UsageError(f"expected {value}, found an empty one: is a variable not set?")
 
 
 def given(words: Sequence[str]) -> frozenset[str]:

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 from rich.table import Table
 
+from viz.figures import own_look
 from viz.figures.maps import saved
 
 from ..artifacts.files import json_bytes, replacing, write
@@ -44,7 +45,8 @@ class Reproduce:
             began = time.perf_counter()
             with bar_of(f"{_far(done, len(names), began - started)}{name}: {REPRODUCTIONS[name].about}", None):
                 replaced = replacing(self.out / f"{name}.json")
-                made = REPRODUCTIONS[name].make(self.seed)
+                with own_look():
+                    made = REPRODUCTIONS[name].make(self.seed)
                 for kind in ("png", "svg"):
                     write(self.out / f"{name}.{kind}", saved(made.figure, kind))
                 command = f"chainslam reproduce {name} --seed {self.seed}"

@@ -160,8 +160,10 @@ def _words(settings: Mapping[str, Any]) -> list[str]:
 
 def _folder(out: str | Path | None) -> tuple[Path, Home | None]:
     """Return the folder for the results, and what keeps one that nobody named."""
+    if out == "":
+        raise UsageError("expected a folder for out, found an empty name: leave it out, or name one")
     if out is not None:
-        return Path(out), None
+        return Path(out).expanduser(), None
     home = Home()
     return home.folder / "run", home
 

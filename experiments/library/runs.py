@@ -111,7 +111,7 @@ class Run:
     def _repr_html_(self) -> str:
         """Return the floor plan, which a notebook shows."""
         plan = self.folder / "map.svg"
-        return plan.read_text() if plan.is_file() else f"<pre>{self!r}</pre>"
+        return plan.read_text(encoding="utf-8") if plan.is_file() else f"<pre>{self!r}</pre>"
 
 
 def table_at(path: Path) -> Any:
@@ -121,7 +121,7 @@ def table_at(path: Path) -> Any:
         try:
             import pandas
         except ImportError:
-            with file.open(newline="") as stream:
+            with file.open(newline="", encoding="utf-8") as stream:
                 rows = list(csv.DictReader(stream))
             return {name: _array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
         try:

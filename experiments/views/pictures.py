@@ -99,7 +99,7 @@ def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
     path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad", "pose_nees")
     with told(path, REMEDY):
         try:
-            with regular(path).open(newline="") as stream:
+            with regular(path).open(newline="", encoding="utf-8") as stream:
                 rows = [[float(row[name] or "nan") for name in columns] for row in csv.DictReader(stream)]
         except (ValueError, KeyError, TypeError, csv.Error) as error:
             raise UnfitError("another table, or one that was cut short") from error

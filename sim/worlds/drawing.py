@@ -73,5 +73,5 @@ def counted(count: int, one: str, many: str) -> str:
 
 def shorten(value: Any) -> str:
     """Return a value as one short line for a message."""
-    text = ascii(value) if not isinstance(value, dict | list) or len(value) < 50 else type(value).__name__
+    text = repr(value) if not isinstance(value, dict | list) or len(value) < 50 else type(value).__name__
     return text if len(text) <= 60 else text[:57] + "..."

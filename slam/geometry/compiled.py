@@ -6,9 +6,12 @@ the numbers that it reads, so that a changed kernel is never run as it was befor
 what an earlier process kept runs without it (`machine_code.py`).
 """
 
+import atexit
 import inspect
 import logging
 import os
+import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Callable
@@ -114,9 +117,14 @@ def _let_numba_call_kernels() -> None:
 
 @lru_cache
 def _tell_once() -> None:
-    logging.getLogger("chainslam").warning(
-        "chainslam: compiling loops, once and for a minute or less; what comes of it is kept in %s", cache()
-    )
+    home = cache()
+    if is_users_own():
+        told = f"once and for a minute or less; what comes of it is kept in {home}"
+    elif home == _private():
+        told = f"once and for a minute or less; what comes of it is kept in {home}, since {_wanted()} cannot be written"
+    else:
+        told = f"at every start: {_wanted()} cannot be written; let NUMBA_CACHE_DIR name a folder that can"
+    logging.getLogger("chainslam").warning("chainslam: compiling loops, %s", told)
 
 
 def plain(array: np.ndarray) -> np.ndarray:
@@ -128,14 +136,44 @@ def plain(array: np.ndarray) -> np.ndarray:
 
 @lru_cache
 def cache() -> Path:
-    """Return the folder that keeps what was compiled: of the user, or a passing one where that cannot be written."""
-    home = Path(os.environ.get("NUMBA_CACHE_DIR") or _user_cache() / "chainslam")
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=home):
-            return home
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="chainslam-"))
+    """Return the folder that keeps what was compiled.
+
+    It is that of the user's cache or, where that cannot be written, one of the user's own among the temporary files,
+    which the next start finds again. Where that cannot be, either, a folder that goes when the process ends.
+    """
+    for home in (_wanted(), _private()):
+        try:
+            home.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if home == _private() and not _is_ours(home):
+                continue
+            with tempfile.TemporaryFile(dir=home):
+                return home
+        except OSError:
+            continue
+    passing = Path(tempfile.mkdtemp(prefix="chainslam-"))
+    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    return passing
+
+
+def is_users_own() -> bool:
+    """Return whether what was compiled is kept where it is meant to be."""
+    return cache() == _wanted()
+
+
+def _wanted() -> Path:
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or _user_cache() / "chainslam")
+
+
+def _private() -> Path:
+    """Return a folder among the temporary files that has the user's number in its name."""
+    return Path(tempfile.gettempdir()) / f"chainslam-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether nobody else has made a folder, or may write to it: machine code is run that lies there."""
+    found = folder.lstat()
+    mine = not hasattr(os, "getuid") or found.st_uid == os.getuid()
+    return stat.S_ISDIR(found.st_mode) and mine and not found.st_mode & 0o077
 
 
 def _user_cache() -> Path:

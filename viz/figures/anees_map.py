@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from .. import palette
 from ..text import literal
+from . import own_look
 
 WORST = 100.0
 """From here on all is one colour."""
@@ -31,6 +32,7 @@ class Field:
     """A few words below each number."""
 
 
+@own_look()
 def anees_map(
     fields: Sequence[Sequence[Field]], rows: Sequence[str], columns: Sequence[str], labels: tuple[str, str]
 ) -> Figure:

@@ -24,6 +24,7 @@ from slam.robot import RobotSpec
 
 from .. import palette
 from ..text import literal
+from . import own_look
 
 FRAMES = 90
 """A run of more steps shows this many of them, evenly spread."""
@@ -64,6 +65,7 @@ def shown_steps(count: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, FRAMES))}) if count else []
 
 
+@own_look()
 def animated(frames: Sequence[Frame], true_floor: Sequence[Float[np.ndarray, "_ 2"]], title: str) -> bytes:
     """Return an animated GIF; raises ValueError for no frames. `true_floor` has rings, the exterior first, m."""
     if not frames:

@@ -12,6 +12,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from .. import palette
 from ..text import literal
+from . import own_look
 
 SIZE_INCH = (5.2, 3.7)
 """One figure stands alone on a phone, two or three beside each other on a page."""
@@ -66,6 +67,7 @@ class SmallMap:
     """Rings of the true floor, the exterior first."""
 
 
+@own_look()
 def anees_figure(title: str, curves: Sequence[Curve]) -> Figure:
     """Draw the ANEES of several estimators over the way driven, with the band of an ideal one."""
     figure, axes = _figure(title)
@@ -90,6 +92,7 @@ def anees_figure(title: str, curves: Sequence[Curve]) -> Figure:
     return figure
 
 
+@own_look()
 def ratio_figure(title: str, ratios: Sequence[Ratio], label: str) -> Figure:
     """Draw ratios of back ends with their intervals, a row each: a colour for each back end, a mark for each group."""
     figure, axes = _figure(title, (SIZE_INCH[0], 1.5 + 0.27 * len(ratios)))
@@ -130,6 +133,7 @@ def round_ratios(low: float, high: float) -> list[float]:
     return ticks
 
 
+@own_look()
 def map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> Figure:
     """Draw one map over the true floor; `low` and `high` are the corners of what is shown, the same for all."""
     size = high - low

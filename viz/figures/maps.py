@@ -26,6 +26,7 @@ from slam.robot import RobotSpec
 from .. import palette
 from ..shapes import ellipses
 from ..text import literal
+from . import own_look
 
 WALL_M = 0.1
 """How thick true walls are drawn around the floor, m."""
@@ -74,6 +75,7 @@ class Picture:
     """Of the body."""
 
 
+@own_look()
 def draw_map(picture: Picture) -> Figure:
     """Return the picture as a figure of one set of axes."""
     low, high = _extent(picture)
@@ -115,6 +117,7 @@ def png(figure: Figure) -> bytes:
     return saved(figure, "png")
 
 
+@own_look()
 def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
     """Return a figure as the bytes of a file, the same for the same figure; svg and pdf stay sharp at any size."""
     buffer = BytesIO()

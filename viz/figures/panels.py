@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from .. import palette
 from ..shapes import ellipses
 from ..text import literal
+from . import own_look
 from .curves import SmallMap, paint_map
 
 MARGIN_M = 0.5
@@ -20,6 +21,7 @@ DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
 """Of curves in turn: those that lie on one before them leave it to be seen."""
 
 
+@own_look()
 def panels(title: str, rows: int, columns: int, size_inch: tuple[float, float]) -> tuple[Figure, list[Axes]]:
     """Return a figure of empty panels, row by row; `size_inch` is that of one panel."""
     size = (columns * size_inch[0], rows * size_inch[1] + 0.35)
@@ -36,6 +38,7 @@ def panels(title: str, rows: int, columns: int, size_inch: tuple[float, float]) 
     return figure, found
 
 
+@own_look()
 def map_panels(title: str, maps: Sequence[SmallMap], columns: int) -> tuple[Figure, list[Axes]]:
     """Draw maps of one world beside each other, all at one scale."""
     points = np.concatenate([p for small in maps for p in (small.ends_world.reshape(-1, 2), *small.true_floor)])

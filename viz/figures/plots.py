@@ -17,6 +17,7 @@ from slam.evaluation.consistency import chi2_band
 from .. import palette
 from ..shapes import SIGMAS, VAGUE_RAD, ellipses
 from ..text import literal
+from . import own_look
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
@@ -32,6 +33,7 @@ GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 Rings = Sequence[Float[np.ndarray, "_ 2"]]
 
 
+@own_look()
 def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str) -> Figure:
     """Return the NEES of each back end against the step, on a logarithmic axis, with its 95 % band."""
     figure, axes = _figure(title, (7.2, 3.2))
@@ -47,6 +49,7 @@ def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str) -> Figu
     return figure
 
 
+@own_look()
 def draw_coverage(
     curves: Mapping[str, tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]],
     colours: Mapping[str, str],
@@ -65,6 +68,7 @@ def draw_coverage(
     return figure
 
 
+@own_look()
 def draw_trajectories(
     true_world: Float[np.ndarray, "s 3"] | None,
     estimated_world: Mapping[str, Float[np.ndarray, "_ 3"]],
@@ -90,6 +94,7 @@ def draw_trajectories(
     return figure
 
 
+@own_look()
 def draw_model_space(
     lines_world: Float[np.ndarray, "n 2"],
     covs: Float[np.ndarray, "n 2 2"],
@@ -125,6 +130,7 @@ def draw_model_space(
     return figure
 
 
+@own_look()
 def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: str) -> Figure:
     """Return the path shaded by how often each stretch was driven, the start in a circle (paper, figures 5 and 6)."""
     figure, axes = _plan(rings, title)

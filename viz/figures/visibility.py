@@ -22,6 +22,7 @@ from slam.map.stochastic_map import StochasticMap
 
 from .. import palette
 from ..text import literal
+from . import own_look
 from .graph_shapes import Nodes, heads, nodes_of
 
 MARGIN_M = 0.5
@@ -70,6 +71,7 @@ class _Edges:
     """The second was seen from the first, and not the first from the second."""
 
 
+@own_look()
 def draw_graph(picture: GraphPicture) -> Figure:
     """Return the picture as a figure of one set of axes."""
     low, high = extent_of(picture)
