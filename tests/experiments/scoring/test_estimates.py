@@ -18,6 +18,7 @@ def test_the_mean_the_runs_and_the_effect_size_are_the_plain_ones():
 def test_few_runs_have_neither_interval_nor_test_and_one_no_effect_size():
     four = estimate({("a", seed): float(seed) for seed in range(LEAST - 1)})
     assert four.low is four.high is four.low_buildings is four.p is None
+    assert LEAST == 5
     one = estimate({("a", 1): 7.0})
     assert (one.mean, one.low, one.runs, one.effect_size) == (7.0, None, 1, None)
     assert estimate({("a", 1): 2.0, ("a", 2): 2.0}).effect_size is None

@@ -1,11 +1,13 @@
 """What moves is told apart from what stands: by returns amid floor that was seen free before."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
 
 from explore.floor.free_space import FreeSpace
-from explore.survey.moving_things import moving_returns
+from explore.survey.moving_things import _is_amid_free_floor, moving_returns
 from sim.lidar import LidarConfig, RangeFinder, noisy
 from sim.people import hidden_by
 from slam.geometry.poses import to_world
@@ -83,3 +85,58 @@ def test_a_scan_that_hits_nothing_tells_nothing(scene_of):
     pose = np.append(scene.places[0], 0.0)
     assert moving_returns(scan, scene.grid, scene.walls(pose), ScannerSpec()).shape == (0, 2)
     assert to_world(np.zeros((0, 2)), pose).shape == (0, 2)
+
+
+class Grid:
+    """Floor by its evidence alone, in cells of 5 cm from the origin."""
+
+    def __init__(self, evidence):
+        self.evidence = evidence
+
+    def cells(self, points_world):
+        return np.floor(points_world[:, ::-1] / 0.05).astype(int)
+
+    def inside(self, cells):
+        return np.all((cells >= 0) & (cells < self.evidence.shape), axis=1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_return_counts_in_a_free_cell_with_no_occupied_one_beside_it(seed):
+    rng = np.random.default_rng(seed)
+    grid = Grid(rng.choice([-6, -1, 0, 1, 6], p=[0.5, 0.39, 0.05, 0.03, 0.03], size=(40, 60)))
+    points = rng.uniform(-0.2, [3.2, 2.2], (500, 2))
+    expected = []
+    for row, column in grid.cells(points):
+        beside = [grid.evidence[r, c] for r in range(row - 1, row + 2) for c in range(column - 1, column + 2)
+                  if 0 <= r < 40 and 0 <= c < 60]  # fmt: skip
+        is_inside = 0 <= row < 40 and 0 <= column < 60
+        expected.append(is_inside and grid.evidence[row, column] < 0 and max(beside) <= 0)
+    found = _is_amid_free_floor(grid, points)
+    assert found.tolist() == expected
+    assert 50 < found.sum() < 450
+
+
+def seen_amid_floor(count, walls=(), tentative=()):
+    """Return what of so many neighbouring returns 2 m ahead is told, amid floor seen free and beside some walls."""
+    ranges = np.full(180, np.inf)
+    ranges[90 : 90 + count] = 2.0
+    scan = Scan(np.linspace(-3.1, 3.1, 180), ranges, 0.01, 4.0, 0.0)
+    pose = np.array([3.0, 3.0, 0.0])
+    ends = np.reshape(np.array([*walls, *tentative], dtype=float), (-1, 2, 2)) + pose[:2]
+    is_tentative = np.arange(len(ends)) >= len(walls)
+    map_ = SimpleNamespace(ends_world=ends, tentative=is_tentative, belief=SimpleNamespace(pose_world=pose))
+    return len(moving_returns(scan, Grid(np.full((120, 140), -6)), map_, ScannerSpec()))
+
+
+@pytest.mark.parametrize(("count", "told"), [(1, 0), (2, 0), (3, 3), (5, 5)])
+def test_single_beams_are_not_told(count, told):
+    assert seen_amid_floor(count) == told
+
+
+def test_what_lies_beside_a_wall_of_the_map_is_the_wall():
+    """Within 0.3 m of it; where two returns are left of five, none is."""
+    at = {gap: [[2.0 + gap, -1.0], [2.0 + gap, 1.0]] for gap in (0.25, 0.4)}
+    assert seen_amid_floor(5, walls=[at[0.25]]) == 0
+    assert seen_amid_floor(5, walls=[at[0.4]]) == 5
+    assert seen_amid_floor(5, tentative=[at[0.25]]) == 5
+    assert [seen_amid_floor(5, walls=[[[2.0, from_m], [2.0, 1.0]]]) for from_m in (0.43, 0.5)] == [0, 3]

@@ -10,6 +10,8 @@ from experiments.replays.corridor import Loop, drive
 from experiments.replays.observations import ride
 from experiments.scenario import KNOWN, drawn_start, sigmas_of
 from slam.backends import BACKENDS
+from slam.backends.full_ekf import FullEkf
+from slam.estimation.backend import Observations
 from slam.evaluation.consistency import nees, pose_covariances, pose_errors
 from slam.evaluation.from_start import Start, as_it_is, from_start
 from slam.robot import Odometry, ScannerSpec
@@ -94,14 +96,14 @@ def compose_(pose, motion):
 
 
 class Breaking:
-    """A back end whose copy breaks down at the second motion."""
+    """A back end whose copy breaks down at the second motion, and at no other."""
 
     def __init__(self, pose, cov, after):
         self.inner, self.after, self.moves = BACKENDS["full-ekf"].make(pose.copy(), cov.copy()), after, 0
 
     def predict(self, odometry):
         self.moves += 1
-        if self.moves > self.after:
+        if self.moves == self.after + 1:
             raise np.linalg.LinAlgError("singular")
         self.inner.predict(odometry)
 
@@ -134,6 +136,40 @@ def test_a_second_back_end_that_breaks_down_tells_nothing_from_then_on_and_ends_
         told.append(np.isfinite(tells(backend.belief)[1]).all())
     assert told == [True, False, False]
     assert as_it_is(backend.belief)[0] is not None
+
+
+class Shaken(FullEkf):
+    """Moves a little by itself after each scan: a verb that calls another."""
+
+    def update(self, first, second):
+        super().update(first, second)
+        self.predict(Odometry(np.array([0.01, 0.0, 0.0]), 1e-4 * np.eye(3)))
+
+
+def test_what_a_verb_calls_of_its_own_is_not_told_again():
+    nobody = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+    start = Start(np.zeros(3), 1e-4 * np.eye(3), np.zeros(3))
+    known = start.known(np.array([1e-4, 1e-4, 1e-5]))
+    first, alone = Shaken(np.zeros(3), start.cov), Shaken(known.estimate_world, known.cov)
+    tells = from_start(first, False, start, known, Shaken, ScannerSpec())
+    for backend in (first, alone):
+        backend.update(nobody, nobody)
+        backend.update(nobody, nobody)
+    np.testing.assert_array_equal(tells(first.belief)[1], alone.belief.pose_cov)
+
+
+def test_a_second_back_end_hears_of_new_lines_mergers_and_removals():
+    start = Start(np.zeros(3), 1e-4 * np.eye(3), np.zeros(3))
+    known = start.known(np.array([1e-4, 1e-4, 1e-5]))
+    first, alone = FullEkf(np.zeros(3), start.cov), FullEkf(known.estimate_world, known.cov)
+    tells = from_start(first, False, start, known, FullEkf, ScannerSpec())
+    lines, centres = np.array([[0.0, 2.0], [0.02, 2.01], [1.5, 1.0]]), np.array([[2.0, 0.0], [2.0, 0.5], [0.1, 1.0]])
+    for backend in (first, alone):
+        keep, drop, gone = backend.grow(lines, np.tile(1e-4 * np.eye(2), (3, 1, 1)), centres)
+        backend.merge(int(keep), int(drop))
+        backend.remove([int(gone)])
+    np.testing.assert_array_equal(tells(first.belief)[1], alone.belief.pose_cov)
+    assert tells.second.belief.ids.tolist() == [keep]
 
 
 def test_halves_of_a_noise_are_found_out_from_the_start_and_not_by_the_plain_pose():
