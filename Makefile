@@ -64,7 +64,7 @@ random: setup
 .PHONY: rivals rows apartments apartments-errorless exact schools-whole bundled paper-method navigation-apartments odometry-twice
 
 # What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
-rows: intervals paper paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
+rows: intervals paper rivals paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
 
 # 160 apartments with noise, by two back ends.
 apartments: setup
@@ -88,9 +88,11 @@ schools: setup
 	$(BIN)/python -m studies.exploration.schools --plans $(PLANS) --jobs 2 --out $(ROWS)/schools.jsonl \
 	    --backends full-ekf invariant-ekf graph --seeds 1 2
 
-# Every back end on the same drives of figures 8 and 9 and of a ring; begun again, it goes on where it was.
+# Every back end on the same drives of figures 8 and 9, of two rings and of 40 apartments; begun again, it goes on where it was.
 rivals: setup
-	nice $(BIN)/python -m studies.paper.rivals --seeds 20
+	nice $(BIN)/python -m studies.paper.rivals --seeds 20 --out $(ROWS)/rivals.jsonl
+	nice $(BIN)/python -m studies.paper.rivals --plans $(PLANS) --driver invariant-ekf --out $(ROWS)/rivals.jsonl
+
 
 # The same buildings, to their end.
 schools-whole: setup

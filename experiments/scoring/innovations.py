@@ -1,11 +1,13 @@
 """How far scans lay from where the estimate put them, without any truth: what a robot can watch on its way."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from slam.estimation.gates import gate_level
+from slam.evaluation.consistency import chi2_band
 
 from .records import Log
 
@@ -25,6 +27,13 @@ def nis_in_band(log: Log) -> Bool[np.ndarray, " s"]:
     bands = {n: (gate_level(0.025, n), gate_level(0.975, n)) for n in np.unique(dof[dof > 0]).astype(int).tolist()}
     inside = [n > 0 and bands[int(n)][0] <= value <= bands[int(n)][1] for value, n in zip(squared, dof, strict=True)]
     return np.array(inside, dtype=bool)
+
+
+def share_in_own_band(values: Sequence[float], dofs: Sequence[int]) -> float:
+    """Return the share of scans whose NIS lies in the two-sided 95 % band of its own chi-square."""
+    bands = {dof: chi2_band(dof) for dof in set(dofs)}
+    inside = [bands[dof][0] <= value <= bands[dof][1] for value, dof in zip(values, dofs, strict=True)]
+    return float(np.mean(inside))
 
 
 def innovation_scores(log: Log) -> dict[str, Any]:

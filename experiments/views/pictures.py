@@ -95,15 +95,20 @@ def read_pictured(folder: Path) -> PicturedRun:
 
 
 def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
-    """Return the estimated poses (m, m, rad) and the pose's NEES from a run's `steps.csv`; raises UsageError."""
-    path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad", "pose_nees")
+    """Return the estimated poses (m, m, rad) and the NEES of the pose from a run's `steps.csv`; raises UsageError.
+
+    It is that of the pose relative to the start, and of an older run without it the pose's own.
+    """
+    path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad")
     with told(path, REMEDY):
         try:
             with regular(path).open(newline="", encoding="utf-8") as stream:
-                rows = [[float(row[name] or "nan") for name in columns] for row in csv.DictReader(stream)]
+                table = csv.DictReader(stream)
+                nees = "pose_nees_from_start" if "pose_nees_from_start" in (table.fieldnames or ()) else "pose_nees"
+                rows = [[float(row[name] or "nan") for name in (*columns, nees)] for row in table]
         except (ValueError, KeyError, TypeError, csv.Error) as error:
             raise UnfitError("another table, or one that was cut short") from error
-        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
+        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns) + 1)
         if not within(steps[:, :3], MOST_M):
             raise UnfitError(f"poses that are NaN or beyond {MOST_M:g} m")
     return steps

@@ -20,11 +20,13 @@ from experiments.replays.replay import ReplayOptions, replay, run_of
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
 from experiments.trial import run_trial
-from experiments.usage import UsageError
+from experiments.usage import UsageError, choose
+from slam.backends import BACKENDS
 
 from ..results.figures import innovations
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
+from ..runner.scores import precision
 from .intervals import scores
 
 NAMES = ("world", "seed", "backend", "stage")
@@ -35,7 +37,8 @@ STAGES = {
     "true matches and lines": ReplayOptions("true", perfect_extraction=True),
 }
 """What the truth takes the place of, by the name in the table."""
-BACKENDS = ("invariant-ekf", "full-ekf", "block-ekf", "joint-block-ekf", "relocation-ekf", "graph")
+ONLINE = tuple(name for name in BACKENDS if name != "graph-batch")
+"""Until the end `graph-batch` is `graph`."""
 KEPT = (
     *("pose_anees_from_start", "nis", "nis_in_band"),
     "pose_anees",
@@ -64,8 +67,10 @@ class RealPlans:
     """Which files of the folder."""
     driver: str = "invariant-ekf"
     """The estimator that drives."""
-    backends: tuple[str, ...] = BACKENDS
+    backends: tuple[str, ...] = ONLINE
     """Those that are replayed, with their own matches and with the true ones."""
+    stages: tuple[str, ...] = tuple(STAGES)
+    """What the truth takes the place of; of other back ends than the driver the first two alone."""
     seed: int = 1
     """Of the noise."""
     max_steps: int = 3000
@@ -80,7 +85,9 @@ class RealPlans:
         plans = sorted(self.plans.glob(self.pattern))[:: self.every]
         if not plans:
             raise UsageError(f"expected plan files in {self.plans}, found no {self.pattern}")
-        cells = cells_of(self.backends, self.driver)
+        for name in self.stages:
+            choose("stage", name, STAGES)
+        cells = [cell for cell in cells_of(self.backends, self.driver) if cell[1] in self.stages]
         tasks = [(plan, [(plan.stem, self.seed, *cell) for cell in cells]) for plan in plans]
         perform = partial(_replays_of, self.driver, self.seed, self.max_steps, cells)
         rows = list(rows_of(self.out, NAMES, tasks, perform, self.jobs))
@@ -111,6 +118,10 @@ def _replays_of(driver: str, seed: int, max_steps: int, cells: Sequence[tuple[st
         if hears:
             # On true matches before any gate, scan by scan: a gate cuts off the very tail that tells.
             told |= {"nis": ear.mean(), "nis_in_band": ear.in_band()}
+        log = result.log
+        assert log is not None
+        rms, sigma = precision(log.from_start_world, log.from_start_cov, log.true_world)
+        told |= {"rms_from_start_m": rms, "sigma_from_start_m": sigma}
         of_corners = scores(result) if result.joint is not None else {"pairs": 0}
         corners = {key: of_corners.get(key) for key in ("pairs", "held", "mean_z2")}
         rows.append(known | {"backend": backend, "stage": stage} | told | corners)

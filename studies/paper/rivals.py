@@ -1,7 +1,11 @@
 """What does the shortcut cost, and is there an honest one? Every back end on the same drives.
 
 Matches are true and noise is as stated. Drives of figures 8 and 9 are explored once with `--driver`; a ring of
-corridors is driven without a mapper. The ideal EKF, whose Jacobians are at the truth, rides along.
+corridors is driven without a mapper. The ideal EKF, whose Jacobians are at the truth, rides along. With `--plans` the
+drives are of real plans, a plan each, and lines are those that the extraction finds.
+
+.venv/bin/python -m studies.paper.rivals --seeds 20                                   # goes on where interrupted
+.venv/bin/python -m studies.paper.rivals --plans ../shared/data/plans --driver invariant-ekf
 """
 
 import functools
@@ -18,19 +22,20 @@ from experiments.replays.ideal import IdealEkf
 from experiments.replays.observations import DriveObservations, Ridden, observations_of, ride
 from experiments.replays.recordings import record
 from experiments.scenario import KNOWN, P0, P0_SIGMAS, TrialConfig, drawn_start, sigmas_of
+from experiments.scoring.innovations import share_in_own_band
 from experiments.scoring.measurements import Z_95
 from experiments.terminal.console import plain_console
 from experiments.usage import UsageError, choose
 from slam.backends import BACKENDS
 from slam.estimation.backend import POSE, Backend, Observations
 from slam.estimation.models import innovations, stack
-from slam.evaluation.consistency import anees, chi2_band, nis
+from slam.evaluation.consistency import anees, nis
 from slam.evaluation.from_start import FromStart, Start, from_start
 from slam.geometry.poses import wrap
 from slam.robot import ScannerSpec
 
 from ..runner.command import run_study
-from ..runner.scores import Key, Scores, fill
+from ..runner.scores import Key, Scores, fill, precision
 
 KEY = ("place", "p0", "backend", "seed")
 SCORES = (
@@ -40,8 +45,10 @@ SCORES = (
 SHOWN = "from the start", "pose ANEES", "map ANEES", "NIS", "in band", "held", "rms, mm", "sigma, mm"
 """What the table calls them; error and sigma are of the position from the start."""
 RINGS_M = {f"ring of {length:g} m": length for length in (60.0, 200.0)}
-"""The long one closes beyond what the wheels alone would find again."""
+"""By their length."""
 PLACES = ("paper-fig8", "paper-fig9", *RINGS_M)
+MOST_STEPS = 3000
+"""A drive stops here."""
 EVERY = (*(name for name in BACKENDS if name != "graph-batch"), IDEAL)
 """What rides along; until the end `graph-batch` is `graph`."""
 
@@ -54,6 +61,12 @@ class RivalStudy:
     """Where."""
     backends: tuple[str, ...] = EVERY
     """The estimators."""
+    plans: Path | None = None
+    """Folder of plan files, which take the place of those places."""
+    every: int = 4
+    """Every so many plans by name, one drive in each."""
+    pattern: str = "lifull_*.json"
+    """Which files of the folder."""
     seeds: int = 20
     """Drives in each place."""
     first_seed: int = 1
@@ -78,18 +91,26 @@ class RivalStudy:
         choose("start covariance (--p0)", self.p0, P0_SIGMAS)
         if self.seeds < 1:
             raise UsageError(f"expected --seeds of 1 or more, found {self.seeds}: change it")
-        seeds = range(self.first_seed, self.first_seed + self.seeds)
-        tasks = {
-            (place, seed): [self.key(place, n, seed) for n in self.backends] for place in self.places for seed in seeds
-        }
+        drives = self.drives()
+        tasks = {each: [self.key(*each, name) for name in self.backends] for own in drives.values() for each in own}
         found = fill(self.out, (KEY, SCORES), tasks, functools.partial(rows_of, self), self.jobs)
-        for place in self.places:
-            runs = {n: np.array([found[self.key(place, n, seed)] for seed in seeds]) for n in self.backends}
-            show(f"{place}, P0 {self.p0}, true matches, stated noise, seeds {seeds[0]} to {seeds[-1]}", runs)
+        for words, own in drives.items():
+            runs = {name: np.array([found[self.key(*each, name)] for each in own]) for name in self.backends}
+            show(f"{words}, P0 {self.p0}, true matches, drives: {len(own)}, from seed {self.first_seed}", runs)
 
-    def key(self, place: str, name: str, seed: int) -> Key:
+    def drives(self) -> dict[str, list[tuple[str, int]]]:
+        """Return the drives (place, seed) of each table; raises UsageError for a folder without plans."""
+        if self.plans is None:
+            seeds = range(self.first_seed, self.first_seed + self.seeds)
+            return {place: [(place, seed) for seed in seeds] for place in self.places}
+        found = sorted(self.plans.glob(self.pattern))[:: self.every]
+        if not found:
+            raise UsageError(f"expected plan files in {self.plans}, found no {self.pattern}: name their folder")
+        return {f"{len(found)} plans": [(str(plan), self.first_seed) for plan in found]}
+
+    def key(self, place: str, seed: int, name: str) -> Key:
         """Return the key of one ride's row."""
-        return place, self.p0, name, str(seed)
+        return Path(place).stem, self.p0, name, str(seed)
 
 
 def show(title: str, runs: dict[str, Float[np.ndarray, "r c"]]) -> None:
@@ -109,8 +130,9 @@ def rows_of(study: RivalStudy, task: tuple[str, int]) -> dict[Key, Scores]:
     if place in RINGS_M:
         seen = drive(Loop(RINGS_M[place]), seed)
     else:
-        seen = observations_of(record(TrialConfig(place, study.driver, seed=seed), study.recordings), True)
-    return {study.key(place, name, seed): scores(*made(name, study.p0, seen), seen) for name in study.backends}
+        trial = TrialConfig(place, study.driver, seed=seed, max_steps=MOST_STEPS)
+        seen = observations_of(record(trial, study.recordings), study.plans is None)
+    return {study.key(*task, name): scores(*made(name, study.p0, seen), seen) for name in study.backends}
 
 
 def made(name: str, p0: P0, seen: DriveObservations) -> tuple[Backend, FromStart]:
@@ -152,9 +174,7 @@ class Listening:
 
     def told(self) -> tuple[float, float]:
         """Return the NIS over its degrees of freedom, and the share of scans in the 95 % band of their own."""
-        bands = {dof: chi2_band(dof) for dof in set(self.dofs)}
-        inside = [bands[dof][0] <= value <= bands[dof][1] for value, dof in zip(self.values, self.dofs, strict=True)]
-        return float(np.sum(self.values) / np.sum(self.dofs)), float(np.mean(inside))
+        return float(np.sum(self.values) / np.sum(self.dofs)), share_in_own_band(self.values, self.dofs)
 
 
 def scores(backend: Backend, tells: FromStart, seen: DriveObservations) -> Scores:
@@ -164,9 +184,7 @@ def scores(backend: Backend, tells: FromStart, seen: DriveObservations) -> Score
     """
     listening = Listening(backend)
     ridden: Ridden = ride(listening, seen, tells)  # type: ignore[arg-type]
-    off = ridden.from_start_world[:, :2] - ridden.true_poses_world[:, :2]
-    rms = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
-    sigma = float(np.sqrt(np.mean(np.trace(ridden.from_start_cov[:, :2, :2], axis1=1, axis2=2))))
+    rms, sigma = precision(ridden.from_start_world, ridden.from_start_cov, ridden.true_poses_world)
     error = ridden.estimated_world - ridden.true_poses_world
     error[:, 2] = wrap(error[:, 2])
     held = float(np.mean(np.abs(error) <= Z_95 * np.sqrt(np.diagonal(ridden.estimated_cov, axis1=1, axis2=2))))

@@ -69,7 +69,7 @@ def _nees(runs: Sequence[Path]) -> str:
         f"{name} {np.nanmean(read_steps(run)[:, 3]) / 3.0:.3g}"
         for run, name in zip(runs, map(_name, runs), strict=True)
     )
-    return f"NEES of the pose over {_scans(runs)}, mean over 3 (1 is ideal): {', '.join(means)}"
+    return f"NEES of the pose from the start over {_scans(runs)}, mean over 3 (1 is ideal): {', '.join(means)}"
 
 
 def _paths(runs: Sequence[Path]) -> str:
@@ -102,7 +102,8 @@ def _looked(runs: Sequence[Path]) -> str:
     metres, walls = said["path_length_m"], said["second_looks"]["lines"]
     errors = said.get("relations_smoothed")
     error = "" if errors is None else f", {errors['at_scans']['all']['translation_m']['mean']:.3f} m off on average"
-    return f"{_log(runs[0])}: {walls} walls and a path of {metres:.0f} m after second looks{error}; grey: wheel odometry"
+    walls_and_path = f"{walls} walls and a path of {metres:.0f} m after second looks{error}"
+    return f"{_log(runs[0])}: {walls_and_path}; grey: wheel odometry"
 
 
 def _floor(runs: Sequence[Path]) -> str:
@@ -110,7 +111,8 @@ def _floor(runs: Sequence[Path]) -> str:
 
 
 def _log_view(runs: Sequence[Path]) -> str:
-    return f"{_log(runs[0])} in the viewer, by {_name(runs[0])}: map and wheel odometry, model space, visibility graph, NIS"
+    panels = "map and wheel odometry, model space, visibility graph, NIS"
+    return f"{_log(runs[0])} in the viewer, by {_name(runs[0])}: {panels}"
 
 
 def _log(run: Path) -> str:

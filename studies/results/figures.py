@@ -1,7 +1,7 @@
 """What many rows come to, in the words of a table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +19,8 @@ class Found:
     table: Table
     """The first row holds the columns' names."""
     verdict: str
+    parts: Mapping[str, "Found"] = field(default_factory=dict)
+    """Of several tables each one, by its title; the table above is then none."""
 
 
 def grouped(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:
@@ -47,6 +49,14 @@ def median_of(rows: Sequence[Row], name: str, digits: int = 3) -> str:
 def typical(rows: Sequence[Row], name: str) -> str:
     """Return their mean and their median, in words."""
     return f"{mean_of(rows, name):.3g}, {median_of(rows, name)}"
+
+
+def pose_score(rows: Sequence[Row]) -> tuple[str, str]:
+    """Return what the pose is scored by, in words, and its name: from the start, but for rows older than that score."""
+    told = [row for row in rows if row.get("pose_anees") is not None]
+    if told and all(row.get("pose_anees_from_start") is not None for row in told):
+        return "pose ANEES from the start", "pose_anees_from_start"
+    return "pose ANEES", "pose_anees"
 
 
 def innovations(rows: Sequence[Row]) -> str:

@@ -7,10 +7,11 @@ from pathlib import Path
 from ..runner.rows import Row
 from .figures import Found
 from .plans import apartments, courts, navigation, real_plans, schools, whole_schools
+from .shortcut import rides
 from .worlds import bundled, intervals, paper, paper_method
 
 STORED = Path("studies/results/rows")
-REAL_PLANS = "real-plans.md"
+REAL_PLANS, SHORTCUT = "real-plans.md", "shortcut.md"
 
 
 @dataclass(frozen=True)
@@ -108,5 +109,13 @@ HEADLINES = (
         "make navigation-apartments",
         STORED / "navigation.jsonl",
         navigation,
+    ),
+    Headline(
+        "Every back end on the same observations",
+        "Which of them know how wrong they are, and how precise are they?",
+        "make rivals",
+        STORED / "rivals.jsonl",
+        rides,
+        SHORTCUT,
     ),
 )

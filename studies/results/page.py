@@ -12,6 +12,7 @@ from pathlib import Path
 import tyro
 
 from ..runner.rows import Row, fingerprint
+from .figures import Found
 from .headlines import HEADLINES, Headline
 
 DOCS = Path("docs")
@@ -57,12 +58,20 @@ def newest(path: Path) -> list[Row]:
 def section(headline: Headline, rows: Sequence[Row]) -> str:
     """Return the part of the page for one table."""
     found = headline.make(rows)
-    head, *lines = ["| " + " | ".join(cells) + " |" for cells in found.table]
-    rule = "|" + "---|" * len(found.table[0])
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     made = f"{count}, made by `{headline.command}`."
-    parts = [f"## {headline.title}", f"**Aim.** {headline.aim}", "\n".join([head, rule, *lines])]
-    return "\n\n".join([*parts, f"**Verdict.** {found.verdict}", made]) + "\n"
+    parts = [f"## {headline.title}", f"**Aim.** {headline.aim}"]
+    if found.parts:
+        parts += [f"### {title}\n\n{_told(part)}" for title, part in found.parts.items()]
+    else:
+        parts.append(_told(found))
+    return "\n\n".join([*parts, made]) + "\n"
+
+
+def _told(found: Found) -> str:
+    head, *lines = ["| " + " | ".join(cells) + " |" for cells in found.table]
+    rule = "|" + "---|" * len(found.table[0])
+    return "\n".join([head, rule, *lines]) + f"\n\n**Verdict.** {found.verdict}"
 
 
 if __name__ == "__main__":

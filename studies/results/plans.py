@@ -16,6 +16,7 @@ from .figures import (
     mean_of,
     median_of,
     numbers,
+    pose_score,
     total,
     typical,
 )
@@ -30,6 +31,7 @@ def apartments(rows: Sequence[Row]) -> Found:
     """Return what exploring apartments with noise came to, by back end."""
     by = grouped(rows, "backend")
     table: Table = [["measure", *(f"`{name}`" for name in by)]]
+    words, pose = pose_score(rows)
     measures: dict[str, Callable[[Sequence[Row]], str]] = {
         "complete": completed,
         "coverage: mean, median, least": lambda mine: (
@@ -37,7 +39,7 @@ def apartments(rows: Sequence[Row]) -> Found:
         ),
         "contours closed": closed_contours,
         "collisions": lambda mine: str(total(mine, "collisions")),
-        "pose ANEES: mean, median": lambda mine: typical(mine, "pose_anees"),
+        f"{words}: mean, median": lambda mine: typical(mine, pose),
         "map ANEES: mean, median": lambda mine: typical(mine, "map_anees"),
         NOISE: innovations,
         "maps with an ANEES above 3": lambda mine: str(sum(value > LOST for value in numbers(mine, "map_anees"))),
@@ -64,7 +66,8 @@ def _anees(rows: Sequence[Row]) -> str:
 
 def real_plans(rows: Sequence[Row]) -> Found:
     """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones."""
-    head = ["back end", "pose ANEES: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
+    words, pose = pose_score(rows)
+    head = ["back end", f"{words}: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
     table: Table = [["matches", *head, WRONG, "duplicate walls", NOISE]]
     for stage in dict.fromkeys(row["stage"] for row in rows):
         for backend, mine in grouped([row for row in rows if row["stage"] == stage], "backend").items():
@@ -73,7 +76,7 @@ def real_plans(rows: Sequence[Row]) -> Found:
             cells = [
                 stage,
                 f"`{backend}`",
-                typical(mine, "pose_anees"),
+                typical(mine, pose),
                 typical(mine, "map_anees"),
                 f"{100 * held:.1f} %",
             ]
@@ -88,12 +91,13 @@ def real_plans(rows: Sequence[Row]) -> Found:
 
 def schools(rows: Sequence[Row]) -> Found:
     """Return how back ends fare in schools over a limited number of steps, and which of them loses fewest maps."""
-    head = ["back end", "runs", "exceptions", "pose ANEES: median", "map ANEES: median"]
+    words, pose = pose_score(rows)
+    head = ["back end", "runs", "exceptions", f"{words}: median", "map ANEES: median"]
     lost = f"lost: pose ANEES above {LOST:g}"
     table: Table = [[*head, lost, "coverage by then: mean", f"{WRONG} a run", "collisions", NOISE]]
     shares = {}
     for backend, mine in grouped(rows, "backend").items():
-        medians = [median_of(mine, name) for name in ("pose_anees", "map_anees")]
+        medians = [median_of(mine, name) for name in (pose, "map_anees")]
         failed, gone = sum(bool(row["raised"]) for row in mine), sum(v > LOST for v in numbers(mine, "pose_anees"))
         shares[backend] = f"`{backend}` {gone} of {len(mine)}"
         cells = [f"`{backend}`", str(len(mine)), str(failed), *medians, str(gone)]
@@ -107,12 +111,13 @@ def schools(rows: Sequence[Row]) -> Found:
 
 def whole_schools(rows: Sequence[Row]) -> Found:
     """Return what exploring schools to their end came to, by back end."""
-    head = ["back end", "complete", "coverage: mean, least", "own frame: mean", "pose ANEES: median"]
+    words, pose = pose_score(rows)
+    head = ["back end", "complete", "coverage: mean, least", "own frame: mean", f"{words}: median"]
     table: Table = [[*head, "map ANEES: mean, median", f"{WRONG} a run", "steps: mean", "collisions", NOISE]]
     for backend, mine in grouped(rows, "backend").items():
         coverage = numbers(mine, "coverage")
         cells = [f"`{backend}`", completed(mine), f"{np.mean(coverage):.4f}, {min(coverage):.3f}"]
-        cells += [f"{mean_of(mine, 'coverage_own_frame'):.4f}", median_of(mine, "pose_anees")]
+        cells += [f"{mean_of(mine, 'coverage_own_frame'):.4f}", median_of(mine, pose)]
         cells += [typical(mine, "map_anees"), f"{np.mean(false_matches(mine)):.1f}", f"{mean_of(mine, 'steps'):.0f}"]
         table.append([*cells, str(total(mine, "collisions")), innovations(mine)])
     by = grouped(rows, "backend")

@@ -18,6 +18,7 @@ from .figures import (
     mean_of,
     median_of,
     numbers,
+    pose_score,
     total,
     touches_of,
     typical,
@@ -71,11 +72,11 @@ def paper(rows: Sequence[Row]) -> Found:
 
 def bundled(rows: Sequence[Row]) -> Found:
     """Return completion, coverage and consistency of the bundled worlds."""
-    errorless = rows[0]["errorless"]
+    errorless, (words, pose) = rows[0]["errorless"], pose_score(rows)
     table: Table = [["world", "complete", "coverage: least", "contours closed", "path, mean"]]
     if not errorless:
         table[0] += [
-            "pose ANEES: mean, median",
+            f"{words}: mean, median",
             "map ANEES: mean, median",
             "false matches: of five beams or more, of fewer",
         ]
@@ -84,7 +85,7 @@ def bundled(rows: Sequence[Row]) -> Found:
         cells.append(f"{mean_of(mine, 'path_length_m'):.1f} m")
         if not errorless:
             cells += [
-                typical(mine, "pose_anees"),
+                typical(mine, pose),
                 typical(mine, "map_anees"),
                 f"{sum(false_matches(mine))}, {total(mine, 'false_matches_few_beams')}",
             ]
@@ -97,12 +98,13 @@ def bundled(rows: Sequence[Row]) -> Found:
 
 def paper_method(rows: Sequence[Row]) -> Found:
     """Return how often the paper's method enters a duplicate wall, beside today's mapper with two filters."""
-    head = ["method", "runs", "with a duplicate wall", "duplicate walls", "pose ANEES: median"]
+    words, pose = pose_score(rows)
+    head = ["method", "runs", "with a duplicate wall", "duplicate walls", f"{words}: median"]
     table: Table = [[*head, "map ANEES: median"]]
     by = grouped(rows, "method")
     twice = {name: sum(row["duplicate_lines"] > 0 for row in mine) for name, mine in by.items()}
     for name, mine in by.items():
         cells = [f"`{name}`", str(len(mine)), f"{twice[name]} of {len(mine)}", str(total(mine, "duplicate_lines"))]
-        table.append([*cells, median_of(mine, "pose_anees"), median_of(mine, "map_anees")])
+        table.append([*cells, median_of(mine, pose), median_of(mine, "map_anees")])
     shares = "; ".join(f"`{name}` in {count} of {len(by[name])}" for name, count in twice.items())
     return Found(table, f"The duplicate wall appears, by {shares} runs ([why](exploration.md#the-papers-method)).")

@@ -47,6 +47,15 @@ def _rows(
     return [dict(zip((*names, *scores), (*key, *values), strict=True)) for key, values in run(task).items()]
 
 
+def precision(
+    estimated_world: Float[np.ndarray, "s 3"], covs: Float[np.ndarray, "s 3 3"], true_world: Float[np.ndarray, "s 3"]
+) -> tuple[float, float]:
+    """Return how far positions are off, rms over all steps, m, and how far the estimate says that they are."""
+    off = estimated_world[:, :2] - true_world[:, :2]
+    stated = np.trace(covs[:, :2, :2], axis1=1, axis2=2)
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), float(np.sqrt(np.mean(stated)))
+
+
 def interval_words(values: Float[np.ndarray, " n"], digits: int = 3, is_log: bool = False) -> str:
     """Return the 95 % interval of the mean over runs in brackets, of `is_log` values their exponentials'.
 

@@ -4,9 +4,11 @@ import json
 
 import pytest
 
+from studies.results.figures import pose_score
 from studies.results.headlines import HEADLINES, Headline
 from studies.results.page import BEGIN, END, Results, newest, section, state
 from studies.results.plans import apartments, schools, whole_schools
+from studies.results.shortcut import rides
 from studies.results.worlds import bundled
 from studies.runner.rows import fingerprint
 
@@ -23,7 +25,7 @@ def test_the_pages_are_those_that_the_stored_rows_make(request, tmp_path, capsys
         (tmp_path / name).write_text(text[: text.index(BEGIN)] + BEGIN + END + text[text.index(END) + len(END) :])
     Results(tmp_path).run()
     assert {name: (tmp_path / name).read_text() for name in texts} == texts, "run `make results`"
-    assert len(texts) == 2
+    assert len(texts) == 3
     assert len(capsys.readouterr().out.splitlines()) == len(HEADLINES) <= 12
 
 
@@ -85,3 +87,44 @@ def test_schools_count_the_runs_of_each_back_end_that_lost_their_map():
 def test_schools_to_their_end_have_means_over_the_runs():
     found = whole_schools([run("graph", coverage=0.8, status="stopped", steps=300), run("graph")])
     assert found.table[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0", "-"]
+
+
+def ridden(backend, place, seed, **more):
+    scores = {"pose_anees_from_start": 1.0, "map_anees": 1.0, "nis": 1.0, "nis_in_band": 0.95, "held": 0.95}
+    precise = {"pose_rms_m": 0.002, "pose_sigma_m": 0.001}
+    return {"code": "a", "backend": backend, "place": place, "seed": str(seed)} | scores | precise | more
+
+
+def test_rides_stand_place_by_place_with_intervals_over_drives_and_the_price_of_honesty(tmp_path):
+    """Precision is paired by drive; a score that one drive lacks makes no back end consistent."""
+    rows = [ridden("full-ekf", place, seed) for place in ("paper-fig8", "plan-a", "plan-b") for seed in range(5)]
+    rows += [ridden("intersection-ekf", "paper-fig8", k, pose_rms_m=0.004, pose_sigma_m=0.005) for k in range(5)]
+    rows += [ridden("block-ekf", "paper-fig8", k, pose_anees_from_start=2.0 + k, map_anees=9.0) for k in range(5)]
+    rows.append(ridden("ukf", "plan-a", 0, map_anees=None))
+    found = rides(rows).parts
+    assert list(found) == ["Figure 8, 5 drives", "Apartments, with the lines that the extraction finds, 10 drives"]
+    first, second = found.values()
+    assert first.table[1] == ["`full-ekf`", "1 (1 to 1), 1", "1 (1 to 1), 1", "1.00, 95 %", "95.0 %", "2, 1"]
+    low, high = map(float, first.table[3][1].split("(")[1].split(")")[0].split(" to "))
+    assert 1.0 < low < 4.0 < high
+    assert first.table[3][1].startswith("4 (")
+    assert "both means up to 1.5: `full-ekf`, `intersection-ekf`." in first.verdict
+    assert "`intersection-ekf` errs by 2 times as much and states 5 times as much" in first.verdict
+    assert "`block-ekf` errs by 1 times as much and states 1 times as much" in first.verdict
+    assert second.table[2][2] == "-"
+    assert second.verdict == "Consistent, with both means up to 1.5: `full-ekf`."
+    made = section(Headline("Rides", "All.", "make rivals", tmp_path, rides), rows)
+    assert made.count("\n### ") == 2
+    assert made.count("**Verdict.**") == 2
+    assert f"{len(rows)} rows, made at a commit not recorded: `make rivals`." in made
+
+
+def test_the_pose_is_scored_from_the_start_where_all_rows_can_tell():
+    old, new = {"pose_anees": 1.0}, {"pose_anees": 0.4, "pose_anees_from_start": 1.1}
+    failed = {"pose_anees": None, "pose_anees_from_start": None}
+    assert pose_score([new, failed, new]) == ("pose ANEES from the start", "pose_anees_from_start")
+    assert pose_score([new, old]) == pose_score([old]) == pose_score([]) == ("pose ANEES", "pose_anees")
+    assert apartments([run("graph", pose_anees_from_start=3.25)]).table[5][:2] == [
+        "pose ANEES from the start: mean, median",
+        "3.25, 3.25",
+    ]

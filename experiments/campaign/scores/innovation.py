@@ -9,10 +9,12 @@ from slam.association.matching import KnownWalls, Matches, MatchingConfig
 from slam.association.methods import Matcher
 from slam.estimation.backend import Joint
 from slam.estimation.models import innovations
-from slam.evaluation.consistency import chi2_band, nis
+from slam.evaluation.consistency import nis
 from slam.extraction.segments import Segments
 from slam.extraction.straightness import cov_of_faces
 from slam.map.reliability import ReliabilityConfig, are_clear
+
+from ...scoring.innovations import share_in_own_band
 
 
 @dataclass
@@ -46,9 +48,7 @@ class InnovationEar:
 
     def in_band(self) -> float | None:
         """Return the share of scans whose NIS lies in the 95 % band of its own chi-square."""
-        bands = {dof: chi2_band(dof) for dof in set(self.dofs)}
-        inside = [bands[dof][0] <= value <= bands[dof][1] for value, dof in zip(self.values, self.dofs, strict=True)]
-        return float(np.mean(inside)) if inside else None
+        return share_in_own_band(self.values, self.dofs) if self.values else None
 
     def whiteness(self) -> float | None:
         """Return the correlation of a wall's normalised innovations in two scans running: 0 for a right filter."""
