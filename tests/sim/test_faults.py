@@ -141,8 +141,11 @@ def test_a_misread_range_is_that_of_its_bias_scale_and_resolution():
     assert misread(ranges, FaultsConfig(), 4.0) is ranges
     told = misread(ranges, FaultsConfig(range_bias_m=0.03, range_scale=1.01), 4.0)
     np.testing.assert_allclose(told, [0.535, 2.05, np.inf, np.inf, np.nan])
-    steps = misread(np.linspace(0.1, 3.9, 200), FaultsConfig(resolution_m=0.025), 4.0) / 0.025
+    true = np.linspace(0.1, 3.9, 200)
+    steps = misread(true, FaultsConfig(resolution_m=0.025), 4.0) / 0.025
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    assert np.abs(steps - true / 0.025).max() <= 0.5 + 1e-9
+    np.testing.assert_array_equal(misread(np.array([0.1, 0.2]), FaultsConfig(range_bias_m=-0.1), 4.0), [np.nan, 0.1])
 
 
 def test_a_mirrored_scan_shows_left_on_the_right():

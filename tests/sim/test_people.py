@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from sim.chance import Chance
 from sim.faults import FaultsConfig
@@ -44,6 +45,41 @@ def test_people_keep_clear_of_walls_of_the_robot_and_of_each_other(seed):
     assert (steps > 0.0).mean() > 0.5
 
 
+BOX = np.array([[[0.0, 0.0], [6.0, 0.0]], [[6.0, 0.0], [6.0, 6.0]], [[6.0, 6.0], [0.0, 6.0]], [[0.0, 6.0], [0.0, 0.0]]])
+THIN = np.array([[[2.0, 0.0], [2.0, 5.0]]])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_people_enter_within_reach_and_in_sight_of_the_robot(seed):
+    robot, faces = np.array([1.0, 2.0]), np.concatenate([BOX, THIN])
+    people = People(PeopleConfig(walking=3), faces, Chance(seed, 7), BODY_M)
+    people.enter(robot, 2.5)
+    assert len(people.places_at(0.0))
+    for place in people.places_at(0.0):
+        assert 1.0 <= np.hypot(*(place - robot)) <= 2.5
+        assert not shapely.intersects(shapely.linestrings([robot, place]), shapely.linestrings(faces)).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_who_walks_goes_straight_on_until_something_is_in_the_way(seed):
+    robot = np.array([3.0, 3.0])
+    config = PeopleConfig(walking=1)
+    people = People(config, BOX, Chance(seed, 7), BODY_M)
+    people.enter(robot, 3.0)
+    places = [people.places_at(0.0)[0].copy()]
+    for _ in range(120):
+        people.walk(0.3, robot)
+        places.append(people.places_at(0.0)[0].copy())
+    steps = np.diff(places, axis=0)
+    body = config.radius_m + config.keep_m
+    for place, before, step in zip(places[1:], steps, steps[1:], strict=False):
+        ahead = place + before
+        is_free = distance_to_segments(ahead[None], BOX).min() > body and np.hypot(*(ahead - robot)) > body + BODY_M
+        if is_free and np.any(before):
+            np.testing.assert_allclose(step, before, atol=1e-9)
+    assert (np.hypot(*steps.T) > 0.0).mean() > 0.95
+
+
 def test_the_same_seed_brings_the_same_people_and_another_one_others():
     first, again, other = (walked(2, seed, 20)[1] for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -64,6 +100,8 @@ def test_a_disc_hides_what_is_behind_it_and_nothing_else():
             inside = (np.hypot(*np.moveaxis(points[:, None] - places, -1, 0)) < 0.25).any(axis=1)
             first = ways[np.argmax(inside)] if inside.any() else 3.0
             assert told == pytest.approx(first, abs=2e-3) or (told < 3.0 and first == 3.0 and told > 0.0)
+    within = hidden_by(np.full(90, 3.0), bearings, np.zeros(2), np.array([[0.1, 0.0]]), 0.25)
+    assert within.min() == 1e-3, "somebody around the scanner is as near as can be"
 
 
 def test_who_stands_is_seen_touched_and_gone():
