@@ -12,7 +12,9 @@ from experiments.replays.observations import ride
 from experiments.reproductions import REPRODUCTIONS, fig8, table1
 from experiments.reproductions.runs import maps
 from experiments.scenario import drawn_start
+from slam.backends import BACKENDS
 from slam.evaluation.consistency import bound_margins
+from slam.geometry.poses import wrap
 from studies.paper import following, page, rivals, study
 from studies.paper.following import ROWS as FOLLOWED
 from studies.paper.following_tables import read_following
@@ -131,3 +133,30 @@ def test_the_ideal_filter_never_learns_where_the_world_lies_and_rides_beside_the
     study = rivals.RivalStudy(("ring of 60 m",), ("full-ekf", "ideal-ekf"), seeds=1, first_seed=4, out=tmp_path / "r")
     study.run()
     assert "ring of 60 m, P0 small, true matches, drives: 1, from seed 4" in capsys.readouterr().out
+
+
+def test_the_scores_of_a_ride_are_those_of_its_estimates_and_innovations():
+    """Held against the ride itself, of a filter whose intervals hold less often than they should."""
+    seen, make = drive(Loop(30.0, after_m=5.0), 3), BACKENDS["joint-block-ekf"].make
+    found = dict(zip(rivals.SCORES, rivals.scores(*rivals.made("joint-block-ekf", "small", seen), seen), strict=True))
+    pose, cov = drawn_start(seen.chance, seen.true_poses_world[0], "small")
+    ridden = ride(make(pose, cov), seen)
+    known = ride(make(*drawn_start(seen.chance, seen.true_poses_world[0], "zero")), seen)
+    assert found["pose_anees"] == pytest.approx(ridden.pose_nees.mean() / 3.0)
+    assert found["pose_anees_from_start"] == pytest.approx(known.pose_nees.mean() / 3.0)
+    assert found["map_anees"] == pytest.approx(ridden.map_anees)
+    off = np.hypot(*(known.estimated_world - known.true_poses_world)[:, :2].T)
+    assert found["pose_rms_m"] == pytest.approx(np.sqrt(np.mean(off**2)))
+    assert found["pose_sigma_m"] == pytest.approx(
+        np.sqrt(np.mean(known.estimated_cov[:, 0, 0] + known.estimated_cov[:, 1, 1]))
+    )
+    error = ridden.estimated_world - ridden.true_poses_world
+    sigma = np.sqrt([np.diag(each) for each in ridden.estimated_cov])
+    inside = [
+        np.abs(wrap(a)) <= 1.959964 * b if k == 2 else np.abs(a) <= 1.959964 * b
+        for k, (a, b) in enumerate(zip(error.T, sigma.T, strict=True))
+    ]
+    assert np.mean(inside) < 0.9
+    assert found["held"] == pytest.approx(np.mean(inside))
+    assert 0.85 < found["nis"] < 1.3
+    assert 0.88 < found["nis_in_band"] <= 1.0
