@@ -51,9 +51,10 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# 10,000 mutated inputs through every reader; those that are not borne are kept in results/fuzzing.
+# 10,000 mutated inputs through every reader; those that are not borne are kept in results/fuzzing. Then 100 of each kind that others brought.
 fuzz: setup
 	$(BIN)/python -m tests.fuzzing --count 10000 --seed 1
+	$(BIN)/python -m tests.kinds --count 100 --seed 1
 
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
