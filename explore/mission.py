@@ -108,6 +108,7 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
             seen=tuple(seen),
             nis=localisation.nis,
             is_lost=localisation.is_lost,
+            fault=localisation.fault,
         )
         decision = driver.decide(around, update.chains, graph.graph)
         given_up = decision.given_up

@@ -26,12 +26,11 @@ from .map.polylines.wall_beams import beams_on_walls
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
 from .map_keeper import MapKeeper
+from .odometry.diagnosis import AT_REST, Diagnosis
 from .robot import Odometry, RobotError, Scan
 
 NONE = np.zeros(0, dtype=np.int64)
 """No rows."""
-AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
-"""The motion between two scans that were taken at one place."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +95,8 @@ class Mapper:
         self._keeper = MapKeeper(backend, config)
         noise = None if config.recovery is None else config.recovery.noise
         self._noise = None if noise is None else MotionNoise(noise)
+        diagnosis = None if config.recovery is None else config.recovery.diagnosis
+        self._diagnosis = None if diagnosis is None else Diagnosis(diagnosis)
         self._odometry = AT_REST
         self._chains: tuple[Chain, ...] = ()
         self._is_lost = False
@@ -113,6 +114,8 @@ class Mapper:
                 "expected the covariance of a motion's error, found zero: state how far the wheels slip, 1e-6 m and rad"
                 " at least"
             )
+        if self._diagnosis is not None:
+            self._diagnosis.moved(odometry)
         odometry = odometry_of_scanner(odometry, self.config.robot.scanner)
         self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
         self.backend.predict(self._odometry)
@@ -122,6 +125,16 @@ class Mapper:
 
         Raises ContradictionError where no estimate agrees with it, nor with the two that were to be taken in before.
         """
+        if self._diagnosis is None:
+            return self._taken_in(scan, set_aside)
+        repeats, factor = self._diagnosis.repeats(scan), 1.0 if self._noise is None else self._noise.factor
+        update = self._nothing_taken_in(*self._features(scan)) if repeats else self._taken_in(scan, set_aside)
+        found = update.localisation
+        is_in_doubt = found.is_lost or (self._noise is not None and self._noise.factor > factor)
+        fault = self._diagnosis.see(scan, found.unstated_motion is not None, is_in_doubt)
+        return replace(update, localisation=replace(found, fault=fault)) if fault else update
+
+    def _taken_in(self, scan: Scan, set_aside: Collection[tuple[int, int]]) -> MapUpdate:
         # 1. Extract features from the sensory input.
         segments, walls = self._features(scan)
         # 2 to 4. Match them, localise the robot, and match again.

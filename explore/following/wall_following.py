@@ -89,6 +89,8 @@ class Surroundings:
     """How far they lay from where the belief predicted them."""
     is_lost: bool = False
     """The scan fits nowhere in the map, so nobody knows where the robot is."""
+    fault: str = ""
+    """What is wrong with the robot, in words, where the last scans say so."""
 
     @property
     def pose_world(self) -> Float[np.ndarray, 3]:

@@ -1,4 +1,7 @@
-"""What a robot does while its scans fit nowhere in the map: it turns on the spot, and gives up after a turn."""
+"""What a robot does while its scans fit nowhere in the map: it turns on the spot, and gives up after a turn.
+
+It gives up at once where the scans say what is wrong with the robot itself.
+"""
 
 from __future__ import annotations
 
@@ -46,6 +49,9 @@ class Lost:
     def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
         """Return what to do next: what the inner driver says, or a turn on the spot, or at last nothing more."""
         self._step += 1
+        if around.fault:
+            words = f"at step {self._step}: {around.fault}"
+            return Decision(None, words, given_up=self._given_up, outcome=Outcome.FAILED)
         if not around.is_lost:
             self._since = -1
             decision = self._inner.decide(around, chains, graph)

@@ -19,6 +19,7 @@ from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
 from ..map.kernels.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
+from ..odometry.diagnosis import DiagnosisConfig
 from ..robot import Odometry, Scan
 from .joint_compatibility import NO_NIS, Nis
 from .matching import Matches
@@ -47,6 +48,8 @@ class RecoveryConfig:
     """None where the wheels are never taken for worse than they state."""
     place: PlaceSearchConfig = field(default_factory=lambda: PlaceSearchConfig(least=0.7))
     """One scan proves less than a submap: more of it must lie on walls."""
+    diagnosis: DiagnosisConfig | None = field(default_factory=DiagnosisConfig)
+    """None where the map is rescued without end, and nobody asks why."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Localisation:
     """The scan fits nowhere: it was not taken in."""
     noise_factor: float = 1.0
     """How many times as large as stated the standard deviation of the wheels' noise was taken to be."""
+    fault: str = ""
+    """What is wrong with the robot, in words, where the map was rescued and the last scans say why."""
 
 
 def _explains(segments: Segments, matches: Matches, config: RecoveryConfig) -> bool:

@@ -26,6 +26,38 @@ def returns_within(scan: Scan, reach_m: float) -> Float[np.ndarray, "n 2"]:
     return ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
 
 
+def told_by_scans(
+    before: Scan, after: Scan, guess: Float[np.ndarray, "3"], half_m: float, half_rad: float
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+    """Return the scanner's motion between two scans, in its frame before it, and the information that they give of it.
+
+    It is sought about a guess, so far to each side. The guess decides between places that are alike, and counts for
+    nothing else; the information is zero where the scans have nothing in common.
+    """
+    c, nothing = DEFAULTS, (guess, np.zeros((3, 3)))
+    returns = returns_within(after, c.reach_m)
+    points = thinned(returns, c.cell_m)
+    surface = thinned(joined(returns_within(before, c.reach_m), c.cell_m, c.gap_m), 0.5 * c.cell_m)
+    if len(points) < c.least_points or not len(surface):
+        return nothing
+    farthest = float(np.hypot(*points.T).max())
+    field = field_of(surface, guess[:2], farthest + half_m, c.cell_m, c.kernel_m, int(np.ceil(half_m / c.cell_m)) + 2)
+    worth = c.independent * len(points) * (c.kernel_m / c.sigma_m) ** 2
+    mild = np.diag([half_m**-2, half_m**-2, half_rad**-2]) / worth
+    coarse, _ = correlate(field, points, Window(guess, half_m, half_rad, c.step_rad, mild))
+    pose, score = refine(field, points, coarse, c.step_rad, c.finest_m)
+    if score < c.slip_score:
+        return nothing
+    normals, known = surface_normals(returns, c.surface_m)
+    earlier = sorted_into_buckets(surface, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)
+    surfaces = Surfaces(returns[known], normals[known])
+    weak = Prior(pose, np.diag([1e-2, 1e-2, 1e-2]))
+    pose, information = settle(earlier, surfaces, pose, weak, c.sigma_m, c.kernel_m)
+    floor = np.diag([c.floor_m**2, c.floor_m**2, c.floor_rad**2])
+    told = np.linalg.inv(np.linalg.inv(c.independent * information + weak.information) + floor)
+    return pose, told
+
+
 class ScanMatcher:
     """Keeps the points of the last scans in a frame of its own, and the pose of the last one there."""
 

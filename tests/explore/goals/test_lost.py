@@ -18,6 +18,7 @@ pytestmark = pytest.mark.usefixtures("_unchecked")
 @dataclass
 class Around:
     is_lost: bool
+    fault: str = ""
 
 
 class Inner:
@@ -77,3 +78,13 @@ def test_a_recording_that_ends_while_the_robot_is_lost_says_so(lost, outcome, wo
     assert all(decision.outcome is None for decision in decisions[:-1])
     assert decisions[-1].outcome is outcome
     assert words in decisions[-1].words
+
+
+def test_a_robot_with_a_fault_gives_up_at_once_and_says_why():
+    inner = Inner()
+    driver = Lost(inner, LostConfig())
+    for fault in ("", "the scans are late"):
+        decision = driver.decide(Around(True, fault), (), nx.DiGraph())
+    assert decision.command is None
+    assert decision.outcome is Outcome.FAILED
+    assert decision.words == "at step 1: the scans are late"
