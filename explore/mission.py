@@ -14,6 +14,7 @@ from slam.robot import Odometry, Robot, RobotSpec, of_robot
 from .floor.accumulated_returns import AccumulatedReturns
 from .floor.floor_memory import FloorMemory, FloorMemoryConfig
 from .floor.free_space import FreeSpace, FreeSpaceConfig
+from .floor.lost_returns import LostReturns
 from .following.wall_following import Surroundings
 from .goal import GivenUp
 from .goals.decider import Driver
@@ -78,14 +79,14 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "", 
 
 def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
     spec = mapper.config.robot
-    graph, recent = VisibilityGraph(), AccumulatedReturns(spec)
+    graph, recent, lost = VisibilityGraph(), AccumulatedReturns(spec), LostReturns(spec.scanner)
     free_space = FreeSpace() if floor is None else floor.free_space
     odometry = Odometry(np.zeros(3), np.zeros((3, 3)))
     given_up = GivenUp()
     path_length, index = 0.0, 0
     while True:
         began = time.perf_counter()
-        scan = robot.sense()
+        scan = robot.sense() if floor is None else lost.believed(robot.sense())
         update = mapper.step(scan, given_up.keys)
         localisation = update.localisation
         if localisation.unstated_motion is not None:
@@ -142,6 +143,7 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
         if floor is not None:
             floor.move(odometry)
         driver.moved(decision.command, odometry)
+        lost.move(odometry)
         recent.see(scan)
         recent.move(odometry)
         path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))
