@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from slam.geometry.poses import inverse, to_world
+from slam.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Place, Share, Weight
 
 from .chance import Chance, Channel
 from .drive import Slip
@@ -23,47 +24,47 @@ MOMENTS = 32
 class FaultsConfig:
     """Faults that the robot does not know of; the defaults are none."""
 
-    dropout: float = 0.0
+    dropout: Share = 0.0
     """Share of the beams that come back empty (+inf), whatever stands there."""
-    clump: int = 1
+    clump: Count = 1
     """They are lost in runs of so many neighbours."""
-    mixed: float = 0.0
+    mixed: Share = 0.0
     """Share of the beams at an edge that return something between the surface before it and the one behind it."""
-    edge_m: float = 0.2
+    edge_m: Distance = 0.2
     """An edge is where two neighbouring beams' true ranges differ by more than this m."""
-    bump: float = 0.0
+    bump: Share = 0.0
     """Share of the drives in which a bump turns the robot by `bump_rad`, to either side alike."""
-    bump_rad: float = float(np.deg2rad(8.0))
+    bump_rad: Heading = float(np.deg2rad(8.0))
     """How far a bump turns the robot rad; the wheels report nothing of it."""
-    moving: float = 0.0
+    moving: Share = 0.0
     """Share of the scans that are taken over the end of the drive, not after it; nobody corrects them for that."""
-    slip: float = 1.0
+    slip: Weight = 1.0
     """How many times as far as stated the wheels slip."""
-    scanner_ahead_m: float = 0.0
+    scanner_ahead_m: Place = 0.0
     """How much farther ahead than stated the scanner sits m."""
-    scanner_left_m: float = 0.0
+    scanner_left_m: Place = 0.0
     """How much farther to the left m."""
-    scanner_turned_rad: float = 0.0
+    scanner_turned_rad: Heading = 0.0
     """By how much more than stated it is turned rad, counter-clockwise."""
-    range_bias_m: float = 0.0
+    range_bias_m: Place = 0.0
     """How much too long each range is m."""
-    range_scale: float = 1.0
+    range_scale: Factor = 1.0
     """How many times too long each range is."""
-    resolution_m: float = 0.0
+    resolution_m: Distance = 0.0
     """Ranges come in multiples of this m; 0 for any."""
     mirrored: bool = False
     """The beams come in the opposite order: what is on the left seems to be on the right."""
-    frozen_from: int = NEVER
+    frozen_from: Number = NEVER
     """From this scan on the scanner repeats the one before."""
-    late: int = 0
+    late: Number = 0
     """Each scan is the one that was taken so many steps before."""
-    stuck_from: int = NEVER
+    stuck_from: Number = NEVER
     """From this drive on the wheels turn, and report it, while the robot stands."""
-    posts: int = 0
+    posts: Number = 0
     """So many posts of the robot's own body stand around the scanner, evenly ..."""
-    post_m: float = 0.15
+    post_m: Body = 0.15
     """... so far from it m ..."""
-    post_rad: float = float(np.deg2rad(8.0))
+    post_rad: Angle = float(np.deg2rad(8.0))
     """... and hide so much of its view rad each."""
     people: PeopleConfig = field(default_factory=PeopleConfig)
 

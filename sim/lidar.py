@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals, through
+from slam.quantities import Beams, Count, Deviation, Share, Size, View
 
 from .kernels import nearest, seen_from
 
@@ -14,19 +15,19 @@ from .kernels import nearest, seen_from
 class LidarConfig:
     """The range finder (section 4 of the paper)."""
 
-    beams: int = 180
+    beams: Beams = 180
     """Number of beams."""
-    fov_rad: float = 2 * np.pi
+    fov_rad: View = 2 * np.pi
     """Field of view rad: a full turn without repeating its end, or anything less with both ends included."""
-    range_max_m: float = 4.0
+    range_max_m: Size = 4.0
     """Returns beyond this m are rejected."""
-    sigma_m: float = 0.010
+    sigma_m: Deviation = 0.010
     """Standard deviation m of the radial error of one beam."""
-    sigma_share: float = 0.0
+    sigma_share: Share = 0.0
     """Standard deviation of a beam's radial error as a share of its range, beside `sigma_m`; both add by squares."""
-    cell_m: float = 1.0
+    cell_m: Size = 1.0
     """Side m of the grid cells that share one list of faces within range."""
-    cells_max: int = 4096
+    cells_max: Count = 4096
     """Number of cells whose lists are kept in memory."""
 
     @property

@@ -1,11 +1,14 @@
 """People in a simulated building: discs that walk about, or stand in one place for a time, and hide what is behind."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import Meta
 
 from slam.geometry.lines import distance_to_segments
+from slam.quantities import Body, Distance, Pace, Place, Wait
 from slam.robot import RobotError
 
 from .chance import Chance, Channel
@@ -20,28 +23,23 @@ DRAWS = 64
 class PeopleConfig:
     """People that the robot knows nothing of; the defaults are none."""
 
-    walking: int = 0
+    walking: Annotated[int, Meta(ge=0, le=1000)] = 0
     """So many walk about, each straight on until something is in the way, then in another direction."""
-    radius_m: float = 0.2
+    radius_m: Body = 0.2
     """Radius of a person at the height of the scanner m."""
-    speed_m_s: float = 0.8
+    speed_m_s: Pace = 0.8
     """How fast they walk m/s."""
-    keep_m: float = 0.1
+    keep_m: Distance = 0.1
     """They keep at least this m between themselves and walls, and between themselves and the robot's body."""
-    standing: tuple[float, ...] = ()
+    standing: tuple[Place, ...] = ()
     """Where others stand, world frame: x and y m of the first, of the second, and so on."""
-    leave_s: float = 1e9
+    leave_s: Wait = 1e9
     """When those who stand have gone, s on the robot's clock."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for people that cannot be."""
         if len(self.standing) % 2:
             raise RobotError(f"expected x and y of each who stands, found {len(self.standing)} numbers: leave none out")
-        if self.walking < 0 or self.radius_m <= 0.0 or self.speed_m_s < 0.0 or self.keep_m < 0.0:
-            raise RobotError(
-                f"expected people of 0 or more, a radius above 0, a speed and a distance of 0 or more, found {self}:"
-                " correct them"
-            )
 
 
 @dataclass

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
+from slam.quantities import Period, Pitch, Speed
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Chance, Channel, world_key
@@ -55,12 +56,12 @@ def chance_in(world: Building, seed: int) -> Chance:
 class RobotConfig(RobotSpec):
     """What a simulated robot states of itself, and what only the simulation knows: clock, devices, faults."""
 
-    sampling_m: float = 0.005
+    sampling_m: Pitch = 0.005
     """Distance m between the places of a step that are checked for collisions."""
-    scan_s: float = 0.1
+    scan_s: Period = 0.1
     """How long one turn of the range finder takes, s."""
     lidar: LidarConfig = field(default_factory=LidarConfig)
-    wheel_speed_m_s: float = 0.3
+    wheel_speed_m_s: Speed = 0.3
     """Speed m/s of the faster wheel, which sets how long a step takes."""
     faults: FaultsConfig = field(default_factory=FaultsConfig)
 

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
 from slam.map.stochastic_map import StochasticMap
+from slam.quantities import Count, Distance, Number, Size
 from slam.robot import Odometry, RobotSpec, Scan, of_robot
 
 from .free_space import FreeSpace
@@ -20,22 +21,22 @@ class FloorMemoryConfig:
     """Which scans are kept, and when the grid is drawn anew."""
 
     robot: RobotSpec = of_robot()
-    spacing_m: float = 0.25
+    spacing_m: Size = 0.25
     """Of the scans taken in one square of this side the last one is kept."""
-    walls: int = 8
+    walls: Count = 8
     """So many of the nearest walls carry a kept scan with them."""
-    moved_m: float = 0.1
+    moved_m: Distance = 0.1
     """The grid is drawn anew once floor seen from a kept scan has moved this far with its walls."""
-    arm_m: float = 2.0
+    arm_m: Distance = 2.0
     """How far that floor lies from the scan, for what a turn of the walls moves."""
-    rest_steps: int = 20
+    rest_steps: Number = 20
     """So many steps at least, and a tenth of the scans kept, lie between two looks at how far the walls have moved."""
-    faith_m: float = 0.01
+    faith_m: Size = 0.01
     """Where no wall nearby tells, a scan moves as the one kept before it did: worth this many metres of wall."""
-    redrawn: int = 500
+    redrawn: Count = 500
     """So many kept scans are drawn anew in one step, in 30 to 50 ms; where there are more, the old grid stays in use
     for as long."""
-    last_m: float = 15.0
+    last_m: Size = 15.0
     """The last scans, of the steps that so long a way takes, are enough to begin the grid anew."""
 
     @property

@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
+from msgspec import Meta
 
 from slam.geometry.poses import compose
+from slam.quantities import Count, Distance, Place, Size
 from slam.robot import RobotSpec, Scan, of_robot
 
 from .kernels import Box, squared_distances, take_in
@@ -22,18 +25,18 @@ class FreeSpaceConfig:
     """The grid and how evidence gathers in it."""
 
     robot: RobotSpec = of_robot()
-    cell_m: float = 0.05
+    cell_m: Size = 0.05
     """Side of a cell: a third of a step."""
-    hit: int = 3
+    hit: Count = 3
     """What one hit adds to a cell; a beam that passes takes one away."""
-    limit: int = 6
+    limit: Count = 6
     """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
-    fence: tuple[tuple[float, float], ...] | None = None
+    fence: Annotated[tuple[tuple[Place, Place], ...], Meta(min_length=3)] | None = None
     """Corners of a polygon that the robot keeps within, m, world frame; None where nothing bounds it. What lies beyond
     is no floor: nothing there is driven to or looked for."""
-    cells_max: int = 100_000_000
+    cells_max: Count = 100_000_000
     """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
-    clearance_beyond_m: float = 0.8
+    clearance_beyond_m: Distance = 0.8
     """Clearances are exact up to the radius and this; beyond, they are at least that."""
 
     @property

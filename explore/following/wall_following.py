@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from slam.association.joint_compatibility import NO_NIS, Nis
 from slam.map.stochastic_map import StochasticMap
+from slam.quantities import Count, Distance, Number, Size
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
 from ..floor.free_space import FreeSpace
@@ -37,7 +38,7 @@ class FollowingConfig:
     robot: RobotSpec = of_robot()
     method: Following = "viewpoints"
     """How an open end is explored: from viewpoints, or by following its wall to and fro, as the paper does."""
-    ping_pongs: int = 1
+    ping_pongs: Count = 1
     """By the paper's following, a wall is given up after so many times to and fro along it without a change of the
     map."""
     navigation: Navigation = "floor"
@@ -45,21 +46,21 @@ class FollowingConfig:
     paths: PathConfig = field(default_factory=PathConfig)
     driving: DrivingConfig = field(default_factory=DrivingConfig)
     viewpoints: ViewpointsConfig = field(default_factory=ViewpointsConfig)
-    window_m: float = 6.0
+    window_m: Size = 6.0
     """Paths are sought this far around the robot first, then along the route of walls, then everywhere."""
-    moved_m: float = 0.2
+    moved_m: Distance = 0.2
     """An end that moved by more than this is looked at afresh."""
-    tries: int = 4
+    tries: Number = 4
     """A place to which the way was blocked this often is given up."""
-    squeezes: int = 2
+    squeezes: Number = 2
     """A gap hardly wider than the body is tried this often."""
-    stall_m: float = 9.0
+    stall_m: Size = 9.0
     """An errand ends when the way to its place grew no shorter for the steps that so long a way takes."""
-    shorter_m: float = 0.02
+    shorter_m: Distance = 0.02
     """Shorter by less than this is no shorter: a path over cells of 0.05 m differs so much from step to step."""
-    wider_m: float = 0.01
+    wider_m: Distance = 0.01
     """So much farther from walls the way is sought after each failure."""
-    apart_m: float = 0.12
+    apart_m: Distance = 0.12
     """No look is made from a place this near to an earlier one."""
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from slam.quantities import Count, Distance, Number, Share, Size, Wait
 from slam.robot import RobotSpec, of_robot
 
 from ..following.wall_following import FollowingConfig
@@ -17,27 +18,27 @@ class ExplorerConfig:
 
     robot: RobotSpec = of_robot()
     following: FollowingConfig = field(default_factory=FollowingConfig)
-    near_beyond_m: float = 0.1
+    near_beyond_m: Distance = 0.1
     """Ends, and places to be visited, no farther apart than the radius and this, the errors of a map, are one."""
-    moved_m: float = 0.2
+    moved_m: Distance = 0.2
     """An end that was set aside is tried again when it has moved this far."""
-    attempts: int = 3
+    attempts: Count = 3
     """So many ends set aside at one place (as above) are enough: it is not tried again."""
-    returns: int = 8
+    returns: Number = 8
     """An end that was gone so often while the robot was about it, and came back, is set aside."""
-    grown: float = 0.1
+    grown: Share = 0.1
     """An end that could not be looked at is tried again when so much more of the floor around it is known."""
     round_things: RoundConfig = field(default_factory=RoundConfig)
     """Ends on these are set aside without a look of their own."""
-    patience_m: float = 60.0
+    patience_m: Size = 60.0
     """A goal that takes more steps than so long a way is set aside."""
-    wait_s: float = 10.0
+    wait_s: Wait = 10.0
     """Where something moved, what was given up is tried again so long after the last of it was, ..."""
-    again: int = 3
+    again: Number = 3
     """... at most so often in a run, ..."""
-    moving_scans: int = 3
+    moving_scans: Count = 3
     """... and something moved if so many scans show it."""
-    second_looks: int = 4
+    second_looks: Number = 4
     """Before it ends, the robot turns on the spot this often while there are tentative walls."""
     sweep: bool = True
     """After the last chain, visit what is reachable and unseen."""

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain
+from slam.quantities import Number
 from slam.robot import RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour
@@ -24,7 +25,7 @@ class HomingConfig:
     """When the robot is at its start again."""
 
     robot: RobotSpec = of_robot()
-    rounds: int = 5
+    rounds: Number = 5
     """What the way home shows is explored too, and the robot goes home again; a bound, so that every mission ends."""
 
     @property

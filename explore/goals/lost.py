@@ -11,6 +11,7 @@ import networkx as nx
 import numpy as np
 
 from slam.map.chains import Chain
+from slam.quantities import Factor
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour
@@ -25,7 +26,7 @@ class LostConfig:
     """How long a robot looks for itself."""
 
     robot: RobotSpec = of_robot()
-    turns: float = 1.1
+    turns: Factor = 1.1
     """A robot that found nowhere after so many turns on the spot gives up."""
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.map.chains import Chain
+from slam.quantities import Distance, Number, Share, Size
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
@@ -29,15 +30,15 @@ class RetreatConfig:
     """How far back, and how often."""
 
     robot: RobotSpec = of_robot()
-    locked_back_m: float = 1.0
+    locked_back_m: Distance = 1.0
     """So far the robot backs out where it believed itself locked in: through a door."""
-    last_m: float = 2.0
+    last_m: Size = 2.0
     """A robot that cannot drive back along so much of its way, is locked in."""
-    near_m: float = 0.3
+    near_m: Distance = 0.3
     """It is back if it gets so near: the odometry tells the way no better."""
-    way_share: float = 0.9
+    way_share: Share = 0.9
     """Where it could drive to less of all its way, the floor contradicts the map: it begins the floor anew."""
-    rounds: int = 8
+    rounds: Number = 8
     """So often at most, and never twice within `last_m` of way."""
 
     @property

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from slam.quantities import Number, Part
+
 from ..planning.driving_field import NEAR_M
 from ..strategies import Choice, Place, Situation
 from ..strategies.nearest import nearest_frontier, nearest_unmapped_obstacle, nearest_viewpoint
@@ -19,9 +21,9 @@ from .ledger import Event, Ledger
 class SweepConfig:
     """How often a place is visited."""
 
-    visits: int = 2
+    visits: Number = 2
     """A border of unseen floor, or a thing that is no wall, that is still one after so many visits is left."""
-    reach: float = 0.8
+    reach: Part = 0.8
     """Unseen floor in a hall is looked at from within this share of the scanner's range."""
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
+from slam.quantities import Distance, Size, Weight
 from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
@@ -20,26 +21,26 @@ class PathConfig:
     """How near to walls a path may lead, and what it pays for it."""
 
     robot: RobotSpec = of_robot()
-    margin_m: float = 0.025
+    margin_m: Distance = 0.025
     """Least distance m kept beyond the radius, between cell centres."""
-    squeeze_beyond_m: float = 0.0
+    squeeze_beyond_m: Distance = 0.0
     """Through gaps narrower than that, down to this clearance beyond the radius, between cell centres, the robot
     squeezes where no other way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells
     whether it fits."""
-    squeeze_cost: float = 20.0
+    squeeze_cost: Weight = 20.0
     """What a metre of squeezing costs on top."""
-    tight_beyond_m: float = 0.1
+    tight_beyond_m: Distance = 0.1
     """Within the radius and this of a place where the body did not fit it is not tried again."""
-    standoff_beyond_m: float = 0.15
+    standoff_beyond_m: Distance = 0.15
     """A body this far from walls pays nothing; it yields in narrow passages, the margin does not."""
-    narrow_cost: float = 4.0
+    narrow_cost: Weight = 4.0
     """A metre at the least clearance costs this much more than one at the stand-off."""
-    coast_m: float = 3.0
+    coast_m: Size = 3.0
     """Farther than this from any wall, or than three quarters of its range, the scanner shows too little to tell where
     the robot is, ..."""
-    blind_cost: float = 4.0
+    blind_cost: Weight = 4.0
     """... and a metre costs so much more: a way along the walls is worth a detour."""
-    escape_beyond_m: float = 0.1
+    escape_beyond_m: Distance = 0.1
     """So far around the body free cells count as passable however near a wall is: it may have to get away."""
 
     def coast_of(self, range_m: float) -> float:

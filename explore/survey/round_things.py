@@ -9,23 +9,24 @@ from jaxtyping import Float
 from slam.geometry.lines import directions, normals
 from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
+from slam.quantities import Count, Distance, Size, Turn
 
 
 @dataclass(frozen=True)
 class RoundConfig:
     """When short walls are chords and tangents of one circle."""
 
-    radius_m: float = 1.0
+    radius_m: Size = 1.0
     """Largest radius: what is larger shows walls that are long enough to be joined."""
-    wall_m: float = 0.8
+    wall_m: Distance = 0.8
     """Longer walls are none of a circle's."""
-    off_m: float = 0.02
+    off_m: Distance = 0.02
     """A tangent passes no farther than this from the circle."""
-    beside_m: float = 0.1
+    beside_m: Distance = 0.1
     """And it touches it no farther than this past its ends."""
-    walls: int = 4
+    walls: Count = 4
     """So many walls must lie on it: any three do on some circle."""
-    step_rad: float = float(np.deg2rad(60.0))
+    step_rad: Turn = float(np.deg2rad(60.0))
     """Neighbours on it turn by less than this: a box is no circle, though one touches all its faces."""
 
 

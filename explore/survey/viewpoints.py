@@ -8,6 +8,7 @@ from jaxtyping import Float
 from slam.geometry.lines import directions, normals
 from slam.map.chains import HEAD, OpenEnd
 from slam.map.stochastic_map import StochasticMap
+from slam.quantities import Distance
 from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
@@ -25,17 +26,17 @@ class ViewpointsConfig:
     """The places from which an end is looked at."""
 
     robot: RobotSpec = of_robot()
-    standoff_beyond_m: float = 0.15
+    standoff_beyond_m: Distance = 0.15
     """Distance of the body at which a wall is followed and its end rounded."""
-    close_beyond_m: float = 0.05
+    close_beyond_m: Distance = 0.05
     """Distance of the body at the last, close look."""
-    slack_m: float = 0.25
+    slack_m: Distance = 0.25
     """A place this near to the ideal one will do."""
-    near_m: float = 1.2
+    near_m: Distance = 1.2
     """Where none of the ideal places can be reached, any place within this that sees the end."""
-    far_m: float = 3.5
+    far_m: Distance = 3.5
     """And where there is none, any place within this, and not too far for the scanner."""
-    short_m: float = 0.12
+    short_m: Distance = 0.12
     """A line of sight need not come nearer than this to the end itself."""
 
     @property

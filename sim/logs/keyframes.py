@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.poses import compose, inverse, wrap
+from slam.quantities import Count, Deviation, Size, Spread, Turn, Weight
 
 from .archive import LIMIT_BYTES
 from .raw_scan import ClockError, LeftOut, LogError, RawScan, scanner_on_robot
@@ -25,19 +26,19 @@ class KeyframesConfig:
     The same for all logs: medians of real wheels' errors between two keyframes are 1 to 4 degrees, slips of 13 occur.
     """
 
-    least_m: float = 0.1
+    least_m: Size = 0.1
     """A scan is mapped where the robot has moved so far since the last one, or turned by `least_rad`."""
-    least_rad: float = float(np.deg2rad(5.0))
-    every: int = 1
+    least_rad: Turn = float(np.deg2rad(5.0))
+    every: Count = 1
     """Of these only each so many."""
-    sigma_m: float = 0.02
+    sigma_m: Deviation = 0.02
     """Range noise that is assumed: logs do not state it, and scans of real walls scatter more than the scanner does."""
-    wheels_m: float = 0.02
+    wheels_m: Deviation = 0.02
     """Standard deviation of the wheels' motion between two keyframes, with `wheels_share` of the way."""
-    wheels_share: float = 0.1
-    wheels_rad: float = float(np.deg2rad(3.0))
+    wheels_share: Weight = 0.1
+    wheels_rad: Spread = float(np.deg2rad(3.0))
     """The same for the turn, with `turn_share` of the turn."""
-    turn_share: float = 0.15
+    turn_share: Weight = 0.15
 
 
 @dataclass(frozen=True)

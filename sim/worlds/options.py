@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from fnmatch import fnmatchcase
 
+from slam.quantities import Factor, Part, fault
+
 from .drawing import WorldError, shorten
 
 
@@ -11,7 +13,7 @@ from .drawing import WorldError, shorten
 class DrawingOptions:
     """How to read a drawing; what is not said is as the file says, or as it is assumed where the file is silent."""
 
-    scale: float | None = None
+    scale: Factor | None = None
     """Metres per pixel or drawing unit, for files that do not say."""
     layers: tuple[str, ...] = ()
     """Layers, groups or classes of an SVG or DXF file that are drawn, and no others; * stands for any letters."""
@@ -21,19 +23,15 @@ class DrawingOptions:
     """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
     level: str | None = None
     """The storey, of a GeoJSON file with several."""
-    threshold: float | None = None
+    threshold: Part | None = None
     """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
     negate: bool = False
     """In a bare picture, light is wall and dark is free."""
 
     def __post_init__(self) -> None:
         """Refuse what means nothing; raises WorldError."""
-        if self.scale is not None and not 0 < self.scale < float("inf"):
-            raise WorldError(f"expected a scale above 0 metres per unit, found --scale {self.scale}: correct it")
-        if self.threshold is not None and not 0 < self.threshold <= 1:
-            raise WorldError(
-                f"expected a threshold above 0 and up to 1, found --threshold {self.threshold}: correct it"
-            )
+        if wrong := fault(self):
+            raise WorldError(f"expected options of a drawing, found {wrong}: correct it")
 
     @property
     def given(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from ..estimation.backend import Joint, Observations
 from ..estimation.gates import gate_level, pair_levels
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
+from ..quantities import Angle, Distance, Factor, Probability
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
 from .kernels.matching_kernels import matched, refused
 
@@ -29,21 +30,21 @@ class MatchingConfig:
     method: MatchingMethod = "joint"
     """All segments of a scan together, or each alone by `gate` and `shared.within_m`, as in the paper, or assigned
     by the weights of hypotheses (`methods`)."""
-    gate: float = 0.99
+    gate: Probability = 0.99
     """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to
     be clear."""
-    angle_rad: float = 1.05
+    angle_rad: Angle = 1.05
     """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
-    beside_rad: float = 0.35
+    beside_rad: Angle = 0.35
     """Largest turn of a short segment that lies along a wall, beyond what is not known of its direction."""
-    one_wall: float = 0.9999
+    one_wall: Probability = 0.9999
     """Probability level within which two landmarks of the map may be one wall, so that either will do; where they lie
     along each other they are made one. One true pair in 10,000 is refused, and stays, since each observation goes to
     the landmark that it fits better, which keeps them apart."""
-    overlap_m: float = 0.02
+    overlap_m: Distance = 0.02
     """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
     apart than a wall is thick."""
-    density: float = 0.1
+    density: Factor = 0.1
     """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
     sight is matched beyond the gate too where a new one would be less likely."""
 

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from ..estimation.backend import Joint, Observations
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.compiled import plain
+from ..quantities import Count
 from ..robot import Odometry
 from .joint_compatibility import NO_NIS, Nis, seen_halfway
 from .kernels import motion_kernels
@@ -24,7 +25,7 @@ class MotionNoiseConfig:
     """When the stated noise of the wheels is no longer believed."""
 
     shared: SharedConfig = of_shared()
-    window: int = 50
+    window: Count = 50
     """Scans that are weighed together. Honest wheels are taken for worse by chance alone (`shared.chance`), by the
     likelihood ratio."""
 

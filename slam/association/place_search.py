@@ -16,6 +16,7 @@ from ..odometry.config import ScanMatchingConfig
 from ..odometry.field_kernels import field_of
 from ..odometry.point_kernels import joined
 from ..odometry.search_kernels import refine
+from ..quantities import Angle, Distance, Share, Size, Turn
 from .kernels.correlation_kernels import best_in_blocks, largest_ahead
 
 BLOCK = 8
@@ -28,18 +29,18 @@ FINE = 0.5
 class PlaceSearchConfig:
     """How finely places are tried, and what proves that one is right."""
 
-    cell_m: float = 0.1
+    cell_m: Size = 0.1
     """Size of a cell of the search, and the standard deviation by which likelihood falls with the distance from a
     known point."""
-    step_rad: float = ScanMatchingConfig.step_rad
+    step_rad: Turn = ScanMatchingConfig.step_rad
     """Between two turns that are tried."""
-    least: float = ScanMatchingConfig.slip_score
+    least: Share = ScanMatchingConfig.slip_score
     """A place must have so large a mean likelihood, ..."""
-    rival: float = 0.9
+    rival: Share = 0.9
     """... and no other place more than this share of it, ..."""
-    apart_m: float = 0.5
+    apart_m: Distance = 0.5
     """... where places farther apart than this, or than ..."""
-    apart_rad: float = float(np.deg2rad(10.0))
+    apart_rad: Angle = float(np.deg2rad(10.0))
     """... this, are others."""
 
 

@@ -20,6 +20,7 @@ from ..geometry.poses import compose, inverse
 from ..map.kernels.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
 from ..odometry.diagnosis import DiagnosisConfig
+from ..quantities import Deviation, Number, Share, Spread
 from ..robot import Odometry, Scan
 from .joint_compatibility import NO_NIS, Nis
 from .matching import Matches
@@ -33,16 +34,16 @@ class RecoveryConfig:
     """How far a robot may have moved without saying so, what proves that it did, and when it is lost."""
 
     shared: SharedConfig = of_shared()
-    shift_m: float = 0.3
+    shift_m: Deviation = 0.3
     """Standard deviation of the place after a motion that was not reported."""
-    turn_rad: float = float(np.deg2rad(15.0))
+    turn_rad: Spread = float(np.deg2rad(15.0))
     """Standard deviation of the heading after it."""
-    least_segments: int = 3
+    least_segments: Number = 3
     """So many segments more must belong to known walls than without the motion, ..."""
-    least_share: float = 0.5
+    least_share: Share = 0.5
     """... and so large a share of all. The robot is lost if more than this share of the beams towards known walls goes
     through them, ..."""
-    least_beams: int = 20
+    least_beams: Number = 20
     """... of so many at least, towards walls a short face from their ends and the beams as far past them."""
     noise: MotionNoiseConfig | None = field(default_factory=MotionNoiseConfig)
     """None where the wheels are never taken for worse than they state."""

@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
+from ..quantities import Angle, Distance
 from .segments import Segments
 from .straightness_kernels import faces_cov, misfit_variances
 
@@ -22,12 +23,12 @@ class StraightnessConfig:
     """How far short faces are off their lines, sigma."""
 
     shared: SharedConfig = of_shared()
-    edge_m: float = 0.01
+    edge_m: Distance = 0.01
     """The shortest; one as long as `shared.face_m` is half as far off, a longer one falls with the fourth power. 0
     where every segment is known to be of one face."""
-    bow_rad: float = 0.0
+    bow_rad: Angle = 0.0
     """How far the direction of a wall of any length is off, where one scan sees another part of it than the next ..."""
-    bow_m: float = 0.0
+    bow_m: Distance = 0.0
     """... and how far it is off across; 0 where walls are drawn with a ruler."""
 
 

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.gates import gate_level
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
+from ..quantities import Distance, Probability
 from ..robot import RobotSpec, Scan, of_robot
 from .kernels.existence_kernels import Odds, crossing, look
 from .kernels.few_beams_kernels import Same, distances, lines_of, paired
@@ -30,18 +31,18 @@ class ExistenceConfig:
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
-    over_faces: float = 0.07
+    over_faces: Probability = 0.07
     """Of segments that no wall explains, with enough beams to be sure, so many lie over two faces ..."""
-    few_over_faces: float = 0.27
+    few_over_faces: Probability = 0.27
     """... and of those with fewer."""
-    shown: float = 0.9
+    shown: Probability = 0.9
     """A look shows a line where enough beams reach it: so often where it is of one face ..."""
-    shown_over_faces: float = 0.2
+    shown_over_faces: Probability = 0.2
     """... so often where it lies over two, and two beams more reach it than make a sure segment, one for each end that
     may lose its last ..."""
-    few_shown_over_faces: float = 0.5
+    few_shown_over_faces: Probability = 0.5
     """... and so often where it has few beams, and as many reach it as make a segment."""
-    slack_m: float = 0.01
+    slack_m: Distance = 0.01
     """What the pose may have drifted between two observations of a line of few beams, sigma."""
 
     def odds(self, sure_beams: int) -> Odds:

@@ -15,6 +15,7 @@ from ..estimation.gates import gate_level
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions, normals
 from ..geometry.numerics import LEAST_SIGMA
+from ..quantities import Distance
 from .kernels import merging_kernels
 from .stochastic_map import StochasticMap
 
@@ -29,7 +30,7 @@ class MergingConfig:
     """
 
     shared: SharedConfig = of_shared()
-    hidden_m: float = 0.01
+    hidden_m: Distance = 0.01
     """Two faces on one side no farther apart than this, at both ends of the shorter one, are one to a laser whose
     beams are as far off: the nearer hides the farther. With 0.02 m eight mergers in 121 apartments were false, none
     by the gate alone: a landmark across a step of 2 cm from wall to wall lies near both. They overlap over a long

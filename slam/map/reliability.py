@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
+from ..quantities import Angle, Distance
 from .kernels import reliability_kernels
 from .kernels.reliability_kernels import add_fits, add_lengths, keep_longest
 from .records import Merger, Records
@@ -22,13 +23,13 @@ class ReliabilityConfig:
     """When a direction is clear, and how far a face may be from its line."""
 
     shared: SharedConfig = of_shared()
-    heading_rad: float = 0.15
+    heading_rad: Angle = 0.15
     """A segment of five beams or more is clear where its direction is known better than this, sigma, that of short
     faces included (`straightness`). One of fewer beams may be turned by as much: it may lie over two faces, and has too
     few beams to show it."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
     """How far a face may be from its line."""
-    edge_m: float = 0.002
+    edge_m: Distance = 0.002
     """How far the shortest wall may be from its line, sigma: less than a single segment (`straightness.edge_m`), since
     few lines over two faces stay in the map. By this the short walls alone have a map ANEES near 1
     (`python -m studies.exploration.map_causes`)."""

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from ..quantities import Body, Heading, Place, Turn, fault
 from .errors import RobotError
 from .wheels import WheelSpec
 
@@ -19,11 +20,11 @@ TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
 class ScannerSpec:
     """Where the range finder sits, in the robot frame: the origin is the middle of the axle, x points ahead."""
 
-    x_m: float = 0.0
+    x_m: Place = 0.0
     """Ahead of the axle."""
-    y_m: float = 0.0
+    y_m: Place = 0.0
     """To the left."""
-    heading_rad: float = 0.0
+    heading_rad: Heading = 0.0
     """Where its bearing zero points, counter-clockwise from straight ahead."""
 
     @property
@@ -46,11 +47,11 @@ class ScannerSpec:
 class RobotSpec:
     """What a robot states of itself: planners, mapper, certificate and scores take it from here and nowhere else."""
 
-    radius_m: float = 0.2
+    radius_m: Body = 0.2
     """Radius of the body, a disc about the middle of the axle; of an outline, its farthest point (`of_outline`)."""
-    step_m: float = 0.15
+    step_m: Body = 0.15
     """Longest step; longer commands are shortened along the same arc."""
-    turn_rad: float = float(np.deg2rad(10.0))
+    turn_rad: Turn = float(np.deg2rad(10.0))
     """Widest turn of one step; wider commands are shortened along the same arc."""
     can_reverse: bool = True
     """Whether it can drive backwards."""
@@ -58,17 +59,9 @@ class RobotSpec:
     wheels: WheelSpec = field(default_factory=WheelSpec)
 
     def __post_init__(self) -> None:
-        """Raise RobotError for a body, a step or wheels that cannot be."""
-        wheels, numbers = self.wheels, (self.scanner.x_m, self.scanner.y_m, self.scanner.heading_rad)
-        above = {"radius_m": self.radius_m, "step_m": self.step_m, "turn_rad": self.turn_rad, "base_m": wheels.base_m}
-        for name, value in above.items():
-            if not 0.0 < value < np.inf:
-                raise RobotError(f"expected a robot's {name} above 0 and finite, found {value:g}: correct it")
-        for name, value in {"slip": wheels.slip, "lateral_slip": wheels.lateral_slip, "floor": wheels.floor}.items():
-            if not 0.0 <= value < np.inf:
-                raise RobotError(f"expected wheels with a {name} of 0 or more, found {value:g}: correct it")
-        if not all(np.isfinite(numbers)):
-            raise RobotError(f"expected a scanner at a finite place on the body, found {numbers}: correct it")
+        """Raise RobotError for a body, a step, a scanner or wheels that cannot be."""
+        if wrong := fault(self):
+            raise RobotError(f"expected what a robot states of itself, found {wrong}: correct it")
 
     def beyond(self, metres: float) -> float:
         """Return the distance from the middle of the body to so far beyond its rim, m."""

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..geometry.poses import arc, compose, inverse, rotation
+from ..quantities import Body, Distance
 from .messages import Odometry
 
 
@@ -14,13 +15,13 @@ from .messages import Odometry
 class WheelSpec:
     """Two driven wheels and how far they slip; the defaults lose 4 degrees of heading per square root of a metre."""
 
-    base_m: float = 0.4
+    base_m: Body = 0.4
     """Distance m between the wheels."""
-    slip: float = 0.02
+    slip: Distance = 0.02
     """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
-    lateral_slip: float = 0.006
+    lateral_slip: Distance = 0.006
     """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
-    floor: float = 1e-6
+    floor: Distance = 1e-6
     """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
 
     def ways(self, forward_m: float, turn_rad: float) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from ...estimation.shared import SharedConfig, of_shared
 from ...extraction.segments import Segments
 from ...extraction.visible_extent import beam_step
+from ...quantities import Count, Sigmas, Size
 from ...robot import Scan
 from ..records import Merger, Records
 from .kernels.change_point_kernels import places_between, surest, turns_of_beams
@@ -33,13 +34,13 @@ class ChangePointsConfig:
     """
 
     shared: SharedConfig = of_shared()
-    pitch_m: float = 0.25
+    pitch_m: Size = 0.25
     """Bends are looked for at places so far apart along a wall: half of it from the bend, a turn of a degree is off by
     2 mm."""
-    sigmas: float = 6.0
+    sigmas: Sigmas = 6.0
     """The turn differs from zero by so many of its own: hundreds of walls, each at dozens of places, are asked
     thousands of times."""
-    least_beams: int = 4
+    least_beams: Count = 4
     """A scan counts at a place where it has so many beams on either side."""
 
 
