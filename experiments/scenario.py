@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, Protocol, runtime_checkable
+from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import shapely
 from jaxtyping import Float
+from msgspec import Meta
 
 from explore.limits import Limits
 from explore.mission import MissionConfig
@@ -22,6 +23,7 @@ from slam.estimation.mounting import start_of_scanner
 from slam.odometry.config import ScanMatchingConfig
 from slam.odometry.matched_robot import MatchedRobot
 from slam.odometry.scan_matching import ScanMatcher
+from slam.quantities import Count, Period, Place, Size, fault
 from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
@@ -59,19 +61,27 @@ class TrialConfig:
     """All that decides a trial: the same values give the same bytes."""
 
     world: str
+    """A bundled name or a file."""
     backend: str = "full-ekf"
+    """The estimator; `explore` takes another one by default."""
     strategy: str = "nearest-robot"
-    seed: int = 1
+    """Where to explore next."""
+    seed: Annotated[int, Meta(ge=0)] = 1
+    """Decides all noise and the error of the first estimate; below 2^64."""
     p0: P0 = "small"
+    """Covariance of the start."""
     errorless: bool = False
-    max_steps: int = 100_000
-    start: tuple[float, ...] | None = None
+    """Exact ranges and wheels; the models keep the stated noise."""
+    max_steps: Count = 100_000
+    """The run is stopped after so many scans."""
+    start: Annotated[tuple[Place, ...], Meta(min_length=2, max_length=3)] | None = None
     """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
     drawing: DrawingOptions = field(default_factory=DrawingOptions)
     """What the world's file leaves open: its scale, its storey, and which of its parts are walls."""
-    max_path_m: float | None = None
-    time_limit_s: float | None = None
-    """On the robot's own clock."""
+    max_path_m: Size | None = None
+    """The run is stopped once the wheels have counted so much."""
+    time_limit_s: Period | None = None
+    """The run is stopped once so much has passed on the robot's own clock."""
     odometry: OdometrySource = "wheels"
     """Who tells the motion between two scans."""
     robot: RobotConfig = field(default_factory=RobotConfig)
@@ -140,17 +150,14 @@ def strategy_of(words: str) -> Strategy:
 
 def check(config: TrialConfig) -> None:
     """Raise UsageError for names that are in no registry and numbers out of range, before anything is computed."""
+    if wrong := fault(config):
+        raise UsageError(f"expected settings of a trial, found {wrong}: docs/settings.md names all")
     choose("back end", config.backend, BACKENDS)
     if config.strategy != STRATEGY_OF_REPLAYS:
         strategy_of(config.strategy)
     choose("start covariance (--p0)", config.p0, P0_SIGMAS)
-    if not 0 <= config.seed <= SEED_MAX:
+    if config.seed > SEED_MAX:  # a schema's numbers have 63 bits
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")
-    if config.max_steps < 1:
-        raise UsageError(f"expected at least 1 step, found --max-steps {config.max_steps}: raise it")
-    for option, limit in (("--max-path", config.max_path_m), ("--time-limit", config.time_limit_s)):
-        if limit is not None and not 0 < limit < float("inf"):
-            raise UsageError(f"expected a limit above 0 and finite, found {option} {limit:g}: choose another")
 
 
 def build(config: TrialConfig, world: World | None = None) -> Scenario:

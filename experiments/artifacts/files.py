@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and the same bytes for the same content."""
+"""Files that are written whole or not at all: the same bytes for the same content, with the number of their format."""
 
 import csv
 import errno
@@ -14,6 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from sim.logs.recorded_robot import FORMAT
+
+CONFIG = "config.json"
+"""Of a run, of a campaign and of merged campaigns."""
 PART = re.compile(r"\..+\.\d+\.part")
 """The names of files that are being written; a process that was killed leaves them behind."""
 
@@ -34,6 +38,19 @@ def write(path: Path, content: bytes) -> None:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def stamp() -> dict[str, int]:
+    """Return what every file that is read back holds: keys and their order change only with this number."""
+    return {"format": FORMAT}
+
+
+def format_fault(said: Any) -> str:
+    """Return in words what is wrong with the format number in a file; empty where it can be read."""
+    if type(said) is int and said == FORMAT:
+        return ""
+    shown = said if isinstance(said, int | float) else type(said).__name__
+    return f"format {str(shown)[:20]} of another version, where this one reads {FORMAT}"
 
 
 def replacing(path: Path) -> str:

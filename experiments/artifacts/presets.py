@@ -15,7 +15,8 @@ from sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
 from slam.robot import RobotSpec, of_outline
 
 from ..usage import UsageError, did_you_mean
-from .settings import FOLLOWING, NAVIGATION, Record, leaves, nested, trial_of
+from .schema import UnfitError
+from .settings import FOLLOWING, NAVIGATION, Record, leaves, nested, some_settings, trial_of
 
 PresetName = Literal["paper-method"]
 SWEEP = "mission.explorer.sweep"
@@ -92,7 +93,7 @@ def robot_of(name: str | None) -> Record:
     try:
         with regular(path).open("rb") as file:
             said = plain_mapping(file.read(FILE_MAX + 1), "a robot's YAML", f" with {ROBOT_KEYS}")
-        record = {"robot": _robot_keys(said, RobotConfig())}
+        record = some_settings({"robot": _robot_keys(said, RobotConfig())})
         trial_of(record)
     except OSError as error:
         found = f"{path.name} ({error.strerror or type(error).__name__})"
@@ -100,6 +101,8 @@ def robot_of(name: str | None) -> Record:
         raise UsageError(
             f"expected a robot out of {', '.join(ROBOTS)} or a file, found {found}{near}: name one of these"
         ) from error
+    except UnfitError as error:
+        raise UsageError(f"expected what a robot states of itself, found {error}: correct {path.name}") from error
     except (WorldError, UsageError) as error:
         raise UsageError(f"{error} (in {path.name})") from error
     return record

@@ -20,8 +20,7 @@ from ..scoring.innovations import nis_in_band, windowed_nis
 from ..scoring.records import Log
 from ..scoring.summary import odometry_path, pose_nees, pose_nees_from_start
 from ..trial import TrialResult
-from .files import csv_bytes, json_bytes, npz_bytes, write
-from .formats import CONFIG, stamp
+from .files import CONFIG, csv_bytes, json_bytes, npz_bytes, stamp, write
 from .maps.dimensions import dimensions
 from .maps.drawn_floor import drawn_floor
 from .maps.dxf import map_dxf
@@ -81,7 +80,7 @@ def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | No
 def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[], bytes]]:
     files: dict[str, Callable[[], bytes]] = {
         CONFIG: lambda: json_bytes(config),
-        SUMMARY: lambda: json_bytes(stamp(SUMMARY) | result.summary),
+        SUMMARY: lambda: json_bytes(stamp() | result.summary),
     }
     if result.ending.traceback:
         files["failure.txt"] = lambda: result.ending.traceback.encode()
@@ -138,7 +137,7 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {**stamp(CONFIG), "trial": own(config), "versions": versions, "commit": _commit()}
+    return {**stamp(), "trial": own(config), "versions": versions, "commit": _commit()}
 
 
 def _pictures() -> ModuleType:
@@ -166,7 +165,7 @@ def _commit() -> str | None:
 def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
     """Return the run's own log: what the robot reported, and under `true_*` what only experiments read."""
     return {
-        **stamp(LOG),
+        **stamp(),
         **_sensed(result, log),
         **({} if result.recorded is not None else _true(result, log)),
     }
@@ -214,7 +213,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
     walls, joint = (result.last.map, result.joint) if final is None else (final.map, final.joint)
     size = 3 + 2 * len(walls)
     return {
-        **stamp(MAP),
+        **stamp(),
         "pose": walls.belief.pose_world,
         "ids": walls.ids,
         "lines": walls.belief.means,

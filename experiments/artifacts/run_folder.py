@@ -11,8 +11,7 @@ from typing import Any
 
 from ..scenario import TrialConfig
 from ..usage import UsageError
-from .files import PART, json_bytes, write
-from .formats import CONFIG, FORMATS
+from .files import CONFIG, PART, format_fault, json_bytes, write
 from .results import REPLAY, RUN_FILES
 
 LOCK = ".lock"
@@ -147,8 +146,8 @@ def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
         there = json.loads((folder / CONFIG).read_text())
         if "campaign" in there or "merged" in there:
             return _CAMPAIGN
-        if there["format"] != FORMATS[CONFIG]:
-            return f"a run of format {str(there['format'])[:9]}, where this version writes {FORMATS[CONFIG]},"
+        if wrong := format_fault(there["format"]):
+            return f"a run of {wrong},"
         now = json.loads(json_bytes(config))
         if there.get(REPLAY) != now.get(REPLAY):
             return "a replay of other options" if REPLAY in there and REPLAY in now else "another kind of run"

@@ -16,10 +16,10 @@ import pyarrow as pa
 from jaxtyping import Float
 
 from explore.step import Step
+from sim.logs.recorded_robot import FORMAT
 
 from ..usage import UsageError
 from .files import json_bytes, write
-from .formats import FORMATS
 from .results import RUNNING
 from .run_folder import FolderGoneError, unwritable
 
@@ -47,7 +47,7 @@ class RunningLog:
         """Begin the stream, or go on behind the steps that were kept of it; raises UsageError."""
         self._folder, self._path = folder, folder / RUNNING
         self._steps = 0 if kept is None else len(kept.time_s)
-        metadata = {"format": str(FORMATS[RUNNING]), "config": json_bytes(config).decode()}
+        metadata = {"format": str(FORMAT), "config": json_bytes(config).decode()}
         self._schema = pa.schema(_FIELDS, metadata=metadata)
         batches = b"" if kept is None else kept.batches
         try:
@@ -128,7 +128,7 @@ def read_running(folder: Path) -> Kept | None:
         config = said["config"].encode()
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
         raise _none(path, "none of ours") from error
-    if said.get("format") != str(FORMATS[RUNNING]) or not reader.schema.equals(pa.schema(_FIELDS)):
+    if said.get("format") != str(FORMAT) or not reader.schema.equals(pa.schema(_FIELDS)):
         raise _none(path, f"format {said.get('format')}")
     began = end = source.tell()
     steps: list[list[Any]] = []

@@ -6,12 +6,13 @@ robot reports on the way is held against the log, so that a world or a software 
 A run that was killed left no `log.npz`, or an older one, but the stream that it wrote as it went (`running_log.py`).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import Struct, defstruct
 
 from explore.limits import Limits
 from explore.outcome import Outcome
@@ -19,13 +20,12 @@ from explore.step import Step
 from sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
-from ..terminal.console import say
 from ..usage import UsageError
-from .formats import CONFIG, FORMATS
-from .reading import Each, Maybe, UnfitError, fit, parse_json, read_json, told
+from .files import CONFIG
+from .reading import check_format, plain_json, read_json, read_plain, told
 from .results import LOG, RUNNING
 from .running_log import Kept, read_running
-from .settings import converted
+from .schema import fit, many
 
 REMEDY = "keep a run's files together, or make it anew"
 NUMBERS = (
@@ -37,16 +37,29 @@ COUNTS = (
     *("open_ends", "lines", "contours_closed", "contours_reachable", "false_matches", "duplicate_lines", "collisions"),
     "map_began_step",
 )
-SUMMARY = {
-    "status": str,
-    "reason": str,
-    "steps": int,
-    **{f"{name}?": float | None for name in NUMBERS},
-    **{f"{name}?": int | None for name in COUNTS},
-    "coverage_curve?": Maybe({"path_length_m": [float], "coverage": [float]}),
-    "set_aside?": Maybe([{"wall": int, "side": int, "position_m": tuple[float, float], "why": str}]),
-}
+Curve = defstruct("Curve", [("path_length_m", list[float]), ("coverage", list[float])])
+Aside = defstruct("Aside", [("wall", int), ("side", int), ("position_m", tuple[float, float]), ("why", str)])
+Summary = defstruct(
+    "Summary",
+    [
+        *(("status", str), ("reason", str), ("steps", int)),
+        *((name, float | None, None) for name in NUMBERS),
+        *((name, int | None, None) for name in COUNTS),
+        ("coverage_curve", Curve | None, None),
+        ("set_aside", many(Aside) | None, None),
+    ],
+)
 """What pages and pictures take from a `summary.json`."""
+
+
+Known = defstruct("Known", [("outcome", str)])
+
+
+class Ended(Struct):
+    """What every `summary.json` says of the end of the run."""
+
+    status: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -105,11 +118,6 @@ def read_saved(folder: Path) -> SavedRun:
     kept = read_running(folder)
     config = read_config(folder / CONFIG) if kept is None else _config_in(kept, folder / RUNNING)
     trial = config.trial
-    if config.format < FORMATS[CONFIG]:
-        raise UsageError(
-            f"expected a run of format {FORMATS[CONFIG]}, found one of format {config.format} in {folder}, of which"
-            " some settings had other names and values: it cannot go on, explore anew with --force"
-        )
     if trial.strategy == STRATEGY_OF_REPLAYS:
         raise UsageError(f"expected the folder of a run that drove, found that of a replay in {folder}: replay again")
     time_s, ranges_m, odometry = np.empty(0), np.empty((0, 0)), np.empty((0, 3))
@@ -128,7 +136,7 @@ def read_saved(folder: Path) -> SavedRun:
 
 def _outcome(summary: Path) -> Outcome | None:
     try:
-        return Outcome(read_json(summary, {"outcome": str}, REMEDY)["outcome"])
+        return Outcome(read_json(summary, Known, REMEDY)["outcome"])
     except ValueError:
         return None
 
@@ -137,53 +145,33 @@ def _outcome(summary: Path) -> Outcome | None:
 class SavedConfig:
     """A run's `config.json`: what was run, as a replay or not, and by which versions."""
 
-    trial: TrialConfig
-    replay: Any
-    """The options of a replay as they stand there; None for a run that drove."""
-    versions: dict[str, str]
-    commit: str | None
     format: int
-    unknown: tuple[str, ...]
-    """Keys of an older format that mean nothing now."""
-
-
-SHAPE = {"format": int, "trial": dict, "versions?": Each(str), "commit?": str | None, "replay?": Any}
+    trial: TrialConfig
+    versions: dict[str, str] = field(default_factory=dict)
+    commit: str | None = None
+    replay: Any = None
+    """The options of a replay as they stand there; None for a run that drove."""
 
 
 def read_config(path: Path) -> SavedConfig:
     """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
-    return _config_of(read_json(path, SHAPE, REMEDY), path)
+    with told(path, REMEDY):
+        return _config_of(read_plain(path))
 
 
 def _config_in(kept: Kept, path: Path) -> SavedConfig:
     with told(path, REMEDY):
-        said = parse_json(kept.config, CONFIG, SHAPE)
-    return _config_of(said, path)
+        return _config_of(fit(dict, plain_json(kept.config)))
 
 
-def _config_of(said: dict[str, Any], path: Path) -> SavedConfig:
-    with told(path, REMEDY):
-        for key in said.keys() - {key.removesuffix("?") for key in SHAPE}:
-            raise UnfitError(f"an unknown {key[:40]!r}")
-        trial, unknown = (
-            (fit(TrialConfig, said["trial"], "trial"), ())
-            if said["format"] == FORMATS[CONFIG]
-            else converted(said["trial"])
-        )
-    made_by = said.get("versions", {}), said.get("commit")
-    return SavedConfig(trial, said.get("replay"), *made_by, said["format"], unknown)
+def _config_of(said: dict[str, Any]) -> SavedConfig:
+    check_format(said)
+    return fit(SavedConfig, {"versions": {}, "commit": None, "replay": None} | said)
 
 
 def read_trial(path: Path) -> TrialConfig:
-    """Read the settings of a run from its `config.json`; raises UsageError.
-
-    What of an older one means nothing now is told on standard error.
-    """
-    config = read_config(path)
-    if config.unknown:
-        few = ", ".join(config.unknown[:3]) + (f" and {len(config.unknown) - 3} more" if config.unknown[3:] else "")
-        say(f"chainslam: {path} is of format {config.format}; not known any more, left aside: {few}", stderr=True)
-    return config.trial
+    """Read the settings of a run from its `config.json`; raises UsageError."""
+    return read_config(path).trial
 
 
 def cut_short(folder: Path) -> str:
@@ -193,10 +181,10 @@ def cut_short(folder: Path) -> str:
     """
     if not (folder / "summary.json").exists():
         return ""
-    said = read_json(folder / "summary.json", {"status": str, "reason": str}, REMEDY)
+    said = read_json(folder / "summary.json", Ended, REMEDY)
     return "" if said["status"] == "complete" else str(said["reason"])
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a run's `summary.json`; raises UsageError."""
-    return read_json(folder / "summary.json", SUMMARY, REMEDY)
+    return read_json(folder / "summary.json", Summary, REMEDY)

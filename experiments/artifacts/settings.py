@@ -5,10 +5,12 @@ Keys are those of `config.json`, with a dot between an object and what it holds:
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from sim.worlds import DrawingOptions, WorldError
 from slam.robot import STATED, RobotError
@@ -16,72 +18,42 @@ from slam.robot import STATED, RobotError
 from ..scenario import TrialConfig
 from ..usage import UsageError
 from .files import json_bytes
-from .formats import CONFIG, is_past, stated_then, today, told_of
-from .reading import UnfitError, check_format, fit, plain_json, read_plain, told
+from .reading import check_format, plain_json, read_plain, told
+from .schema import UnfitError, UnknownKeyError, check_keys, fit, group_of, settings_in
 
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
 DRAWING = tuple(each.name for each in fields(DrawingOptions))
 """Options that say how a world's file is read."""
-SEE = "config.json of any run names all"
+SEE = "docs/settings.md names all"
 Record = dict[str, Any]
 
 
 def read_settings(path: Path) -> Record:
     """Return the settings in a file, as a nested record: a run's whole `config.json`, or an object of some keys of one.
 
-    Raises UsageError, in one line, for any other file, and for a key that no trial has.
+    Raises UsageError, in one line, for any other file, for a key that no trial has, and for a value out of its range.
     """
     with told(path, REMEDY):
         said = read_plain(path)
         if "trial" not in said:
-            for key, value in leaves(said):
-                _place(key, value)
-            return said
-        check_format(said, CONFIG, older=False)
+            return some_settings(said)
+        check_format(said)
         fit(TrialConfig, said["trial"], "trial")
-        trial: Record = said["trial"]
-    return trial
-
-
-def converted(said: Mapping[str, Any]) -> tuple[TrialConfig, tuple[str, ...]]:
-    """Return what still holds of a trial in an older format, and the keys of what means nothing now.
-
-    The defaults take the places of settings that are not there. Raises UnfitError where no world is named.
-    """
-    record, unknown, robot = defaults(), [], stated_then(said)
-    for key, value in leaves(said):
-        found = today(key, value, robot)
-        if found is None:
-            continue
-        try:
-            _place(*found)
-        except UnfitError:
-            unknown.append(key)
-        else:
-            record = over(record, nested([found]))
-    if not record["world"]:
-        raise UnfitError("no trial.world")
-    return fit(TrialConfig, record), tuple(unknown)
+        return dict(said["trial"])
 
 
 def parse_setting(text: str) -> Record:
-    """Return one `KEY=VALUE` as a nested record; raises UsageError for a key that no trial has and for other text.
+    """Return one `KEY=VALUE` as a nested record; raises UsageError for a key or a value that no trial can have.
 
     A value is JSON; what is no JSON is text.
     """
     key, equals, words = text.partition("=")
     if not equals or not key:
         raise UsageError(f"expected --set KEY=VALUE, found {text[:60]!r}: write it so")
-    try:
-        value = _value(words)
-        _place(key, value)
-    except UnfitError as error:
-        raise UsageError(f"expected a setting, found {error}: {SEE}") from error
-    for part in reversed(key.split(".")):
-        value = {part: value}
-    return dict(value)
+    with _asked_for("a setting"):
+        return some_settings(nested([(key, _value(words))]))
 
 
 def asked(file: Path | None, sets: Sequence[str], settled: Collection[str]) -> Record:
@@ -134,20 +106,15 @@ def over(base: Record, *changes: Mapping[str, Any]) -> Record:
 def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
     """Return the settings of a trial: the defaults with some nested records over them, the last one on top.
 
-    Raises UsageError for a value of another type than its key's.
+    Raises UsageError for a key that no trial has, and for a value that its key does not allow.
     """
-    record = over(defaults(), *changes)
-    try:
-        trial: TrialConfig = fit(TrialConfig, record)
-    except UnfitError as error:
-        raise UsageError(f"expected settings of a trial, found {error}: {SEE}") from error
-    except (RobotError, WorldError) as error:
-        raise UsageError(str(error)) from error
-    return trial
+    with _asked_for("settings of a trial"):
+        return fit(TrialConfig, over(defaults(), *changes))
 
 
+@cache
 def defaults() -> Record:
-    """Return the settings of a trial as they are where nothing else is said, as they come back from a file."""
+    """Return the settings of a trial as they are where nothing else is said, for nobody to change."""
     return record_of(TrialConfig(""))
 
 
@@ -187,39 +154,37 @@ def nested(settings: Iterable[tuple[str, Any]]) -> Record:
     return result
 
 
-def _place(key: str, value: Any) -> None:
-    """Raise UnfitError where a trial has no such setting, or where the value is of another type."""
-    kind: Any = TrialConfig
-    parts = key.split(".")
-    for depth, part in enumerate(parts):
-        kind = _inner(kind)
-        if kind is None:
-            raise UnfitError(f"{key[:80]!r} below {'.'.join(parts[:depth])!r}, which is one value")
-        hints = get_type_hints(kind)
-        if part not in hints or part not in kind.__dataclass_fields__ or _is_stated(kind, part):
-            if now := told_of(key):
-                raise UnfitError(f"the key {key!r} of older versions (name {now})")
-            if is_past(key):
-                raise UnfitError(f"the key {key!r} of older versions (nothing stands for it now)")
-            beside = [
-                ".".join([*parts[:depth], name, *parts[depth + 1 :]]) for name in get_close_matches(part, hints, 1)
-            ]
-            near = beside or get_close_matches(key, [name for name, _ in leaves(defaults())], 3, 0.5)
-            raise UnfitError(f"the unknown key {key[:80]!r}" + (f" (is it {' or '.join(near)}?)" if near else ""))
-        kind = hints[part]
-    if _inner(kind) is not None and value is not None:
-        raise UnfitError(f"{key!r}, which holds several settings: name one of them")
-    fit(kind, value, key)
+def names() -> Iterator[str]:
+    """Yield the dotted keys of all settings of a trial, and of the groups that hold them."""
+    groups: list[tuple[str, Any]] = [("", TrialConfig)]
+    while groups:
+        above, group = groups.pop()
+        for name, kind in settings_in(group).items():
+            yield f"{above}{name}"
+            groups += [(f"{above}{name}.", inner)] if (inner := group_of(kind)) is not None else []
 
 
-def _is_stated(kind: Any, part: str) -> bool:
-    return bool(kind.__dataclass_fields__[part].metadata.get(STATED))
+def some_settings(record: Record) -> Record:
+    """Return some settings as they are; raises UnfitError for a key that no trial has, or a value that it cannot."""
+    try:
+        check_keys(TrialConfig, record, some=True)
+    except UnknownKeyError as error:
+        known, group = list(names()), error.key.rpartition(".")[0]
+        beside = [name for name in known if name.rpartition(".")[0] == group]
+        near = get_close_matches(error.key, beside, 1, 0.8) or get_close_matches(error.key, known, 3, 0.5)
+        raise UnknownKeyError(error.key, f" (is it {' or '.join(near)}?)" if near else "") from None
+    return record
 
 
-def _inner(kind: Any) -> Any:
-    """Return the dataclass that a type is, or may be beside None; None where it is none."""
-    options = [kind, *getattr(kind, "__args__", ())]
-    return next((option for option in options if isinstance(option, type) and is_dataclass(option)), None)
+@contextmanager
+def _asked_for(what: str) -> Iterator[None]:
+    """Turn what is wrong with settings into a UsageError."""
+    try:
+        yield
+    except UnfitError as error:
+        raise UsageError(f"expected {what}, found {error}: {SEE}") from error
+    except (RobotError, WorldError) as error:
+        raise UsageError(str(error)) from error
 
 
 def _value(words: str) -> Any:

@@ -5,8 +5,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from ..artifacts.files import csv_bytes, json_bytes, write
-from ..artifacts.formats import stamp
+from ..artifacts.files import csv_bytes, json_bytes, stamp, write
 from ..artifacts.reading import read_json
 from ..artifacts.settings import leaves, nested, record_of, trial_of
 from ..usage import UsageError
@@ -47,7 +46,7 @@ def contrast(first: Path, second: Path, out: Path) -> None:
         if not agree(*records):
             different.append(_side_by_side(before, after))
     said = {
-        **stamp(CONTRAST),
+        **stamp(),
         "first": str(first),
         "second": str(second),
         "settings": _settings(first, second),

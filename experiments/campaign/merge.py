@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..artifacts.files import json_bytes, write
-from ..artifacts.formats import CONFIG, FORMATS, stamp
+from ..artifacts.files import json_bytes, stamp, write
 from ..artifacts.settings import plain
 from ..scoring.summary import TIMED
 from ..usage import UsageError
 from .comparison.tables import write_tables
 from .plan import ARMS, Campaign, Trial, trials
 from .scores.score import TrialScores
-from .store import MERGED, Store, opened_anew, outdated, read_campaigns, read_config
+from .store import MERGED, Store, opened_anew, read_campaigns, read_config
 
 SHARED = ("driver", "p0", "max_steps", "settings")
 """What campaigns must have in common to be one."""
@@ -29,9 +28,6 @@ def merge(folders: Sequence[Path], out: Path) -> None:
     """
     if len(folders) < 2:
         raise UsageError(f"expected two or more campaigns to merge, found {len(folders)}: name another")
-    for folder in folders:
-        if read_config(folder).format < FORMATS[CONFIG]:
-            raise UsageError(outdated(folder, "run it again to merge it"))
     stores = [Store(folder, campaign) for folder in folders for campaign in read_campaigns(folder)]
     campaigns = [store.campaign for store in stores]
     for name in SHARED:
@@ -48,7 +44,7 @@ def merge(folders: Sequence[Path], out: Path) -> None:
     for store in stores:
         for trial in trials(store.campaign):
             _take(found, trial, store)
-    config = {**stamp(CONFIG), MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
+    config = {**stamp(), MERGED: [plain(vars(each)) for each in campaigns], "worlds_sha256": digests}
     config |= {"from": [read_config(folder).said for folder in folders]}
     with opened_anew(out, json_bytes(config)):
         merged = Store(out, levels)

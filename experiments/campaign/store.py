@@ -8,13 +8,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from msgspec import defstruct
+
 from sim.logs.archive import regular
 
-from ..artifacts.files import json_bytes, write
-from ..artifacts.formats import CONFIG, FORMATS, stamp
-from ..artifacts.reading import Each, UnfitError, fit, read_json, told
+from ..artifacts.files import CONFIG, json_bytes, stamp, write
+from ..artifacts.reading import read_json, told
 from ..artifacts.results import config_record
 from ..artifacts.run_folder import LOCK, FolderGoneError, clear_leftovers, held, prepare
+from ..artifacts.schema import UnfitError, fit
 from ..artifacts.settings import own, plain
 from ..usage import UsageError
 from .plan import Campaign, Trial, check_campaign, config_of, world_digests
@@ -24,6 +26,11 @@ from .work import Done, unpack
 REMEDY = "name the folder of a campaign, what `compare --out` made"
 MERGED = "merged"
 """The key under which the config of a merged folder holds the campaigns that went into it."""
+Worlds = defstruct("Worlds", [("worlds_sha256", dict[str, str])])
+Merged = defstruct(
+    "Merged", [(MERGED, list[dict[str, Any]]), ("from_", list[dict[str, Any]])], rename={"from_": "from"}
+)
+MadeBy = defstruct("MadeBy", [("versions", dict[str, str]), ("commit", str | None)])
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             # So that the recording is one that `chainslam replay` takes, too.
             config = config_of(self.campaign, done.trial.recording)
-            write(path.with_name(CONFIG), json_bytes({**stamp(CONFIG), "trial": own(config)}))
+            write(path.with_name(CONFIG), json_bytes({**stamp(), "trial": own(config)}))
             write(path, done.log)
         if done.trial.arm != "recording":
             path = self.path(done.trial)
@@ -113,11 +120,6 @@ class Settled:
     said: dict[str, Any]
     """As it stands in the file."""
 
-    @property
-    def format(self) -> int:
-        """Of the file; one of before can be read and compared, and does not go on."""
-        return int(self.said["format"])
-
 
 def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
     """Return the campaigns whose results stand in a folder, several where it was merged; raises UsageError."""
@@ -126,20 +128,17 @@ def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
 
 def read_config(folder: Path) -> Settled:
     """Return the config of a campaign's folder; raises UsageError where it has none."""
-    said = read_json(folder / CONFIG, {"worlds_sha256": Each(str)}, REMEDY)
+    said = read_json(folder / CONFIG, Worlds, REMEDY)
     with told(folder / CONFIG, REMEDY):
         if MERGED in said:
-            fit({MERGED: [dict], "from": [dict]}, said)
-        later: dict[str, Any] = {} if said["format"] == FORMATS[CONFIG] else {"settings": []}
-        found = said.get(MERGED, [said.get("campaign")])
-        found = [{**later, **each} if isinstance(each, dict) else each for each in found]
-        campaigns = tuple(fit(Campaign, each, "campaign") for each in found)
+            fit(Merged, said)
+        campaigns = tuple(fit(Campaign, each, "campaign") for each in said.get(MERGED, [said.get("campaign")]))
         made = said
         while "from" in made:
             if not made["from"]:
                 raise UnfitError("a campaign merged from none")
             made = made["from"][0]
-        fit({"versions": Each(str), "commit": str | None}, made)
+        fit(MadeBy, made)
         if not campaigns:
             raise UnfitError("no campaign")
     for campaign in campaigns:
@@ -147,26 +146,16 @@ def read_config(folder: Path) -> Settled:
     return Settled(campaigns, said["worlds_sha256"], made["versions"], made["commit"], said)
 
 
-def outdated(folder: Path, todo: str) -> str:
-    """Return what is told of a campaign whose trials ran with settings that had other names."""
-    return (
-        f"expected a campaign of format {FORMATS[CONFIG]}, found one of before in {folder}, of which some settings had"
-        f" other names and values: {todo}, `report` and --against still read it"
-    )
-
-
 def _settle(folder: Path, campaign: Campaign) -> None:
     """Write the config, or hold it against the one that is there."""
     path = folder / CONFIG
     held = read_config(folder) if os.path.lexists(path) else None
-    if held is not None and held.format < FORMATS[CONFIG]:
-        raise UsageError(outdated(folder, "name another with --out"))
     before = None if held is None else held.said
     try:
         digests = world_digests(campaign)
     except OSError as error:
         raise UsageError(f"expected readable worlds, found {error.filename} ({error.strerror})") from error
-    now = plain({**stamp(CONFIG), "campaign": asdict(campaign), "worlds_sha256": digests})
+    now = plain({**stamp(), "campaign": asdict(campaign), "worlds_sha256": digests})
     made = config_record(config_of(campaign, Trial(campaign.worlds[0], campaign.strategies[0], "", "closed", 1)))
     made_with = {"versions": made["versions"], "commit": made["commit"]}
     if before is None:

@@ -4,10 +4,12 @@ import traceback
 from dataclasses import dataclass
 from functools import lru_cache
 from time import process_time
+from types import GenericAlias
 from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import defstruct
 
 from sim.logs.archive import read_archive
 from sim.logs.recorded_robot import read_log
@@ -18,11 +20,11 @@ from slam.extraction.segments import Segments
 from slam.mapper import Extractor
 from slam.robot import Scan
 
-from ..artifacts.files import json_bytes, npz_bytes
-from ..artifacts.formats import RECORD, stamp
+from ..artifacts.files import json_bytes, npz_bytes, stamp
 from ..artifacts.presets import backend_of
-from ..artifacts.reading import Each, Maybe, UnfitError, parse_json
+from ..artifacts.reading import parse_json
 from ..artifacts.results import log_arrays
+from ..artifacts.schema import UnfitError
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
 from ..scenario import TrialConfig, build, load_world
 from ..scoring.truth import truth_of
@@ -49,16 +51,22 @@ AT_A_MARK = (
     *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),
     *("path_length_m", "pose_nees", "joint_anees"),
 )
-SHAPE = {
-    **dict.fromkeys(("world", "backend", "strategy", "mode", "association", "reason"), str),
-    "seed": int,
-    "status": Literal["complete", "stopped", "failed"],
-    **{f"{name}?": float | None for name in NUMBERS},
-    **{f"{name}?": int | None for name in COUNTS},
-    "set_aside?": Maybe(list),
-    "step_ms?": Maybe(Each(float | None)),
-    "marks?": Maybe(Each({**{f"{name}?": float | None for name in AT_A_MARK}, "duplicate_lines?": int | None})),
-}
+AtAMark = defstruct(
+    "AtAMark", [*((name, float | None, None) for name in AT_A_MARK), ("duplicate_lines", int | None, None)]
+)
+Summary = defstruct(
+    "Summary",
+    [
+        *((name, str) for name in ("world", "backend", "strategy", "mode", "association", "reason")),
+        ("seed", int),
+        ("status", Literal["complete", "stopped", "failed"]),
+        *((name, float | None, None) for name in NUMBERS),
+        *((name, int | None, None) for name in COUNTS),
+        ("set_aside", list[Any] | None, None),
+        ("step_ms", dict[str, float | None] | None, None),
+        ("marks", GenericAlias(dict, (str, AtAMark)) | None, None),
+    ],
+)
 """Of a trial's summary, as the tables take it."""
 LAYOUTS = {
     **dict.fromkeys(("path_length_m", "pose_nees", "pose_trace", "pose_error_m"), "float s"),
@@ -134,13 +142,13 @@ def failed(job: Job, reason: str, trace: str = "") -> TrialScores:
 
 def pack(record: TrialScores) -> bytes:
     """Return a record as the bytes of an archive without pickles."""
-    return npz_bytes({SUMMARY: json_bytes(stamp(RECORD) | record.summary).decode(), **record.arrays})
+    return npz_bytes({SUMMARY: json_bytes(stamp() | record.summary).decode(), **record.arrays})
 
 
 def unpack(content: bytes, trial: Trial) -> TrialScores:
     """Return the record in the bytes of a trial's file; raises ArchiveError or UnfitError for anything else."""
     arrays = read_archive(content, {SUMMARY: "text"}, LAYOUTS, others="float")
-    summary = parse_json(str(arrays.pop(SUMMARY)).encode(), RECORD, SHAPE)
+    summary = parse_json(str(arrays.pop(SUMMARY)).encode(), Summary)
     arrays.pop("format", None)
     for group in (HEARD, LATER, tuple(name for name in LAYOUTS if name not in (*HEARD, *LATER))):
         missing = [name for name in group if name not in arrays]

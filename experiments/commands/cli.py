@@ -87,6 +87,9 @@ COMMANDS = {
     "worlds": Entry("listings", "Worlds", "List the bundled worlds and families of worlds."),
     "backends": Entry("listings", "Backends", "List the estimators."),
     "strategies": Entry("listings", "Strategies", "List the exploration strategies."),
+    "schema": Entry(
+        "listings", "Schema", "Print the JSON Schema of config.json: each setting's type, range, unit and default."
+    ),
     "completion": Entry("listings", "Completion", "Print what a shell needs to complete commands and options."),
 }
 

@@ -47,6 +47,22 @@ class Strategies:
 
 
 @dataclass(frozen=True)
+class Schema:
+    """Print the JSON Schema of config.json: each setting's type, range, unit and default."""
+
+    some: bool = False
+    """Of a file for --config that holds some of the settings: none is missing then."""
+
+    def run(self) -> int:
+        """Print it and return the exit status."""
+        from ..artifacts.files import json_bytes
+        from ..views.settings_schema import config_schema
+
+        print(json_bytes(config_schema(self.some)).decode(), end="")
+        return 0
+
+
+@dataclass(frozen=True)
 class Completion:
     """Print what a shell needs to complete commands and options."""
 

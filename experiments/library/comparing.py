@@ -47,7 +47,7 @@ class Comparison:
     @cached_property
     def comparison(self) -> dict[str, Any]:
         """Return `comparison.json`: means, differences and their intervals."""
-        return read_json(self.folder / COMPARISON, {}, REMEDY)
+        return read_json(self.folder / COMPARISON, dict, REMEDY)
 
     @property
     def verdict(self) -> list[str]:

@@ -18,8 +18,10 @@ from sim.logs.archive import regular
 from slam.geometry.lines import directions, normals
 
 from ..artifacts.maps.map_files import read_map
-from ..artifacts.reading import UnfitError, read_json, told
+from ..artifacts.reading import read_json, told
 from ..artifacts.results import SUMMARY
+from ..artifacts.saved import Ended
+from ..artifacts.schema import UnfitError
 from ..usage import UsageError
 
 if TYPE_CHECKING:
@@ -69,7 +71,7 @@ class Run:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Return the keys of `summary.json`; raises UsageError where a file is missing or another, as all here do."""
-        return read_json(self.folder / SUMMARY, {"status": str}, REMEDY)
+        return read_json(self.folder / SUMMARY, Ended, REMEDY)
 
     @cached_property
     def steps(self) -> Any:

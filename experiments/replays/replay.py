@@ -30,8 +30,9 @@ from slam.extraction.extract import extract
 from slam.mapper import Extractor, Mapper
 from slam.robot import MotionCommand, Odometry, Scan
 
-from ..artifacts.reading import fit, told
+from ..artifacts.reading import told
 from ..artifacts.saved import cut_short, read_config, read_trial
+from ..artifacts.schema import fit
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import (
     STRATEGY_OF_REPLAYS,
@@ -96,11 +97,8 @@ def read_options(config: Path) -> ReplayOptions:
     said = read_config(config).replay
     if said is None:
         return ReplayOptions()
-    if isinstance(said, dict):
-        said = {"odometry": "wheels", **said}  # replays that were made before there was a choice
     with told(config, "keep a run's files together, or make it anew"):
-        options: ReplayOptions = fit(ReplayOptions, said, "replay")
-    return options
+        return fit(ReplayOptions, said, "replay")
 
 
 def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:

@@ -29,10 +29,11 @@ from ..artifacts.files import write
 from ..artifacts.maps.map_files import read_map
 from ..artifacts.maps.picture import graph_picture
 from ..artifacts.maps.visibility import VISIBILITY, read_visibility
-from ..artifacts.reading import UnfitError, told
+from ..artifacts.reading import told
 from ..artifacts.results import LOG
 from ..artifacts.run_folder import prepare
 from ..artifacts.saved import REMEDY
+from ..artifacts.schema import UnfitError
 from ..replays.replay import read_run
 from ..scenario import TrialConfig, load_world
 from ..scoring.summary import odometry_poses

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import Struct
 
 from explore.goal import SetAside
 from slam.estimation.backend import Belief, Joint, StaleBeliefError
@@ -15,13 +16,22 @@ from viz.figures.maps import Picture
 
 from ..artifacts.maps.map_files import read_features
 from ..artifacts.maps.picture import over_truth
-from ..artifacts.reading import fit, told
+from ..artifacts.reading import told
 from ..artifacts.saved import REMEDY, read_summary
+from ..artifacts.schema import fit
 from ..scenario import TrialConfig, load_world
 
-_TOLD = ("path_length_m", "coverage_own_frame", "pose_rmse_m", "odometry_rmse_m")
-_COUNTED = ("contours_closed", "contours_reachable", "map_began_step")
-"""What the picture tells of a run's summary."""
+
+class Told(Struct):
+    """What the picture tells of a run's summary."""
+
+    path_length_m: float
+    coverage_own_frame: float
+    pose_rmse_m: float
+    odometry_rmse_m: float
+    contours_closed: int
+    contours_reachable: int
+    map_began_step: int
 
 
 def saved_map(
@@ -35,7 +45,7 @@ def saved_map(
     features = read_features(folder, walls["ids"])
     summary = read_summary(folder)
     with told(folder / "summary.json", REMEDY):
-        fit({**dict.fromkeys(_TOLD, float), **dict.fromkeys(_COUNTED, int)}, summary)
+        fit(Told, summary)
     covs = [
         (np.array(feature["geometry"]["coordinates"]), np.array(feature["properties"]["covariance_xy_m2"]))
         for feature in features["corner"]

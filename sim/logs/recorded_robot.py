@@ -11,9 +11,8 @@ from slam.robot import MotionCommand, Odometry, Scan
 
 from .archive import ArchiveError, read_archive
 
-FORMAT = 2
-"""The number in every log. In logs of format 1, which are read as well, NaN means that nothing came back, and all beams
-have one standard deviation."""
+FORMAT = 1
+"""The number in every log, and in every other file that a run leaves and that is read back."""
 NEEDED = {
     "time_s": "float s",
     "bearings_rad": "float k",
@@ -131,10 +130,8 @@ def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
     name, where = (source.name, str(source)) if isinstance(source, Path) else ("log.npz", "log.npz")
     try:
         said = read_archive(source, {"format": "int"})["format"]
-        if not 1 <= said <= FORMAT:
-            raise ArchiveError(f"format {said}, where this version reads {FORMAT}")
-        if said == 1:
-            return _of_format_1(read_archive(source, NEEDED | {"sigma_m": "float"}, {**TRUTH, **LATER}))
+        if said != FORMAT:
+            raise ArchiveError(f"format {said} of another version, where this one reads {FORMAT}")
         return read_archive(source, NEEDED, {**TRUTH, **LATER})
     except FileNotFoundError as error:
         raise RecordingError(f"expected a run's log.npz, found no file {where}: name a log that exists") from error
@@ -151,12 +148,6 @@ def knows_truth(source: Path) -> bool:
         return any(name.startswith("true_") for name in read_log(source))
     except RecordingError:
         return True
-
-
-def _of_format_1(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    ranges = arrays["ranges_m"]
-    sigma = np.full(len(arrays["bearings_rad"]), float(arrays["sigma_m"]))
-    return arrays | {"ranges_m": np.where(np.isnan(ranges), np.inf, ranges), "sigma_m": sigma}
 
 
 def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:

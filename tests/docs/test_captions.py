@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from experiments.artifacts.files import json_bytes
-from experiments.artifacts.formats import FORMATS
 from experiments.artifacts.results import config_record
 from experiments.scenario import TrialConfig
 from experiments.usage import UsageError
+from sim.logs.recorded_robot import FORMAT
 from studies.results import captions
 from studies.results.captions import CAPTIONS, KEPT, PICTURES, Caption, checksum, read_captions, shown, with_caption
 
@@ -58,7 +58,7 @@ def run(tmp_path, monkeypatch):
     (home / "config.json").write_bytes(json_bytes(config_record(TrialConfig("paper-fig9", backend="graph", seed=3))))
     said = {"status": "complete", "reason": "", "steps": 17, "path_length_m": 4.25}
     said |= {"contours_closed": 1, "contours_reachable": 2}
-    (home / "summary.json").write_text(json.dumps({"format": FORMATS["summary.json"]} | said))
+    (home / "summary.json").write_text(json.dumps({"format": FORMAT} | said))
     return home
 
 

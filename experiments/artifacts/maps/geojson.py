@@ -15,7 +15,7 @@ from slam.map.stochastic_map import StochasticMap
 from ...scoring.corners import Corner, corners
 from ...scoring.records import Log
 from ...scoring.without_truth.certificate import contour_record, frontier_record, obstacle_record, open_end_record
-from ..formats import stamp
+from ..files import stamp
 
 FRAME = "local metres of the map's world frame, x right, y up; not the longitudes and latitudes of RFC 7946"
 LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
@@ -32,7 +32,7 @@ def map_geojson(step: Step, joint: Joint | None, certificate: Certificate, log: 
     return {
         "type": "FeatureCollection",
         "name": "map",
-        **stamp("map.geojson"),
+        **stamp(),
         "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
         "coordinate_system": FRAME,
         "features": [

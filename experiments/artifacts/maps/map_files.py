@@ -4,11 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import defstruct
 
 from sim.logs.archive import ArchiveError
 from sim.logs.recorded_robot import MOST_M, are_covariances, within
 
-from ..reading import UnfitError, fit, read_arrays, read_json, told
+from ..reading import read_arrays, read_json, told
+from ..schema import UnfitError, fit, many
 
 LAYOUT = {
     "pose": "float 3",
@@ -23,11 +25,17 @@ LAYOUT = {
     "cov": "float c c",
 }
 PAIR = tuple[float, float]
-CORNER = {
-    "geometry": {"coordinates": PAIR},
-    "properties": {"chain": int, "walls": tuple[int, int], "covariance_xy_m2": tuple[PAIR, PAIR] | None},
-}
-CHAIN = {"properties": {"closed": bool, "chain": int, "walls": [int]}, "geometry": {"coordinates": list}}
+Kind = defstruct("Kind", [("kind", str)])
+Feature = defstruct("Feature", [("properties", Kind)])
+Features = defstruct("Features", [("features", many(Feature))])
+Point = defstruct("Point", [("coordinates", PAIR)])
+OfCorner = defstruct(
+    "OfCorner", [("chain", int), ("walls", tuple[int, int]), ("covariance_xy_m2", tuple[PAIR, PAIR] | None)]
+)
+Corner = defstruct("Corner", [("geometry", Point), ("properties", OfCorner)])
+Way = defstruct("Way", [("coordinates", list[Any])])
+OfChain = defstruct("OfChain", [("closed", bool), ("chain", int), ("walls", list[int])])
+Chain = defstruct("Chain", [("geometry", Way), ("properties", OfChain)])
 REMEDY = "name the folder of a run"
 
 
@@ -59,14 +67,16 @@ def read_features(folder: Path, ids: np.ndarray) -> dict[str, list[dict[str, Any
     `ids` are those of the map: whatever names another wall belongs to another map.
     """
     path = folder / "map.geojson"
-    said = read_json(path, {"features": [{"properties": {"kind": str}}]}, REMEDY)
+    said = read_json(path, Features, REMEDY)
     features = {kind: [f for f in said["features"] if f["properties"]["kind"] == kind] for kind in ("corner", "chain")}
     known = set(ids.tolist())
     with told(path, REMEDY):
-        for feature in fit([CORNER], features["corner"], "corners"):
+        fit(many(Corner), features["corner"], "corners")
+        for feature in features["corner"]:
             if not within(np.array(feature["geometry"]["coordinates"]), MOST_M):
                 raise UnfitError(f"a corner beyond {MOST_M:g} m")
-        for feature in fit([CHAIN], features["chain"], "chains"):
+        fit(many(Chain), features["chain"], "chains")
+        for feature in features["chain"]:
             _way(feature)
         for feature in (*features["corner"], *features["chain"]):
             if not feature["properties"]["walls"] or not known.issuperset(feature["properties"]["walls"]):
@@ -79,6 +89,6 @@ def _way(feature: dict[str, Any]) -> None:
     way = feature["geometry"]["coordinates"]
     if feature["properties"]["closed"]:
         way = way[0] if len(way) == 1 else []
-    points = fit([PAIR], way, "a chain's coordinates")
+    points = fit(list[PAIR], way, "a chain's coordinates")
     if len(points) < 2 or not within(np.array(points), MOST_M):
         raise UnfitError("a chain that is no way")

@@ -1,28 +1,28 @@
 """A run's visibility graph (paper, section 3.2): `visibility.json` written, read again, and told in words."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import networkx as nx
 import numpy as np
 from jaxtyping import Int
+from msgspec import defstruct
 
 from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
 from explore.step import Step
 
 from ...scoring.records import Log, Route
-from ..formats import stamp
-from ..reading import UnfitError, Word, read_json, told
+from ..files import stamp
+from ..reading import read_json, told
+from ..schema import UnfitError, many
 
 VISIBILITY = "visibility.json"
 REMEDY = "run it anew with this version"
-SHAPE = {
-    "graph": {
-        "nodes": [{"id": int}],
-        "edges": [{"source": int, "target": int, "kind": Word(NEIGHBOUR, SIGHT)}],
-    },
-    "route": {"step": int, "walls": [int]},
-}
+Node = defstruct("Node", [("id", int)])
+Edge = defstruct("Edge", [("source", int), ("target", int), ("kind", Literal[NEIGHBOUR, SIGHT])])
+Planned = defstruct("Planned", [("step", int), ("walls", list[int])])
+NodeLinks = defstruct("NodeLinks", [("nodes", many(Node)), ("edges", many(Edge))])
+Visibility = defstruct("Visibility", [("graph", NodeLinks), ("route", Planned)])
 
 
 def visibility_record(last: Step, log: Log) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def visibility_record(last: Step, log: Log) -> dict[str, Any]:
     graph.add_nodes_from(sorted(last.graph))
     graph.add_edges_from(sorted(last.graph.edges(data=True), key=lambda edge: edge[:2]))
     route = {"step": log.longest_route.step, "walls": log.longest_route.walls}
-    return {**stamp(VISIBILITY), "graph": nx.node_link_data(graph, edges="edges"), "route": route}
+    return {**stamp(), "graph": nx.node_link_data(graph, edges="edges"), "route": route}
 
 
 def read_visibility(folder: Path, ids: Int[np.ndarray, " n"]) -> tuple["nx.DiGraph[int]", Route]:
@@ -40,7 +40,7 @@ def read_visibility(folder: Path, ids: Int[np.ndarray, " n"]) -> tuple["nx.DiGra
     `ids` are those of the map. Walls of a route may have gone since.
     """
     path = folder / VISIBILITY
-    said = read_json(path, SHAPE, REMEDY)
+    said = read_json(path, Visibility, REMEDY)
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(node["id"] for node in said["graph"]["nodes"])
     with told(path, REMEDY):

@@ -15,9 +15,9 @@ from sim.logs.archive import regular
 from slam.association.matching import MatchingConfig
 from slam.evaluation.consistency import chi2_band, pooled_band
 
-from ...artifacts.files import csv_bytes, json_bytes, write
-from ...artifacts.formats import stamp
-from ...artifacts.reading import UnfitError, told
+from ...artifacts.files import csv_bytes, json_bytes, stamp, write
+from ...artifacts.reading import told
+from ...artifacts.schema import UnfitError
 from ...scoring.measurements import Z_95
 from ..plan import Campaign, Trial, gate_of, is_errorless
 from ..scores.score import END, TrialScores
@@ -214,6 +214,6 @@ def write_tables(
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
     claims = [] if is_errorless(campaign) else findings(said["pooled"], gate)
-    said |= {**stamp("comparison.json"), "hypothesis": hypothesis(marks), "findings": claims}
+    said |= {**stamp(), "hypothesis": hypothesis(marks), "findings": claims}
     write(folder / "comparison.json", json_bytes(said))
     return said

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import shapely
 from jaxtyping import Float
+from msgspec import defstruct
 
 from explore.strategies import STRATEGIES
 from sim.worlds import DrawingOptions
@@ -16,7 +17,8 @@ from viz.figures.maps import png
 from viz.figures.plots import draw_coverage
 from viz.reports.report import PagePicture
 
-from ...artifacts.reading import fit, told
+from ...artifacts.reading import told
+from ...artifacts.schema import fit, many
 from ...scenario import load_world
 from ...usage import UsageError
 from ..comparison.comparison import BASELINE_BACKEND, BASELINE_STRATEGY
@@ -33,13 +35,14 @@ RATIO_LABELS = {
 
 _NAMES = ("world", "strategy", "backend", "mode", "association")
 _CURVE = ("path_length_m", "pose_anees", "band_low", "band_high")
+Row = defstruct("Row", [*((name, str) for name in _NAMES), *((name, float | None) for name in _CURVE)])
 
 
 def curve_pictures(folder: Path, campaign: Campaign) -> tuple[PagePicture, ...]:
     """Return the ANEES along the way, a picture for each world and arm, by the baseline strategy."""
     rows = read_rows(folder / "steps.parquet", (*_NAMES, *_CURVE))
     with told(folder / "steps.parquet", "run the same `compare` to its end"):
-        fit([{**dict.fromkeys(_NAMES, str), **dict.fromkeys(_CURVE, float | None)}], rows, "rows")
+        fit(many(Row), rows, "rows")
     arrays = {name: np.array([row[name] for row in rows]) for name in (*_NAMES, *_CURVE)}
     strategy = BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
     pictures = []

@@ -12,7 +12,7 @@ from ..frame.frame import Frame
 
 Seen = tuple[float, float, float, float, float]
 """One observation of a line: alpha rad, r m, C_alpha_alpha, C_alpha_r, C_r_r, in the robot frame."""
-FORMAT = 2
+FORMAT = 1
 """Number of the form in which a record is stored; others are refused."""
 
 

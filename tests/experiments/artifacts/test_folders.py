@@ -7,8 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.commands.cli import main
+from sim.logs.recorded_robot import FORMAT
 
 CAMPAIGN = (
     *("--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"),
@@ -19,7 +19,7 @@ CONTENTS = {
     "a list": b"[]",
     "null": b"null",
     "no campaign": b'{"campaign": null}',
-    "no campaign of this format": b'{"format": %d, "campaign": null, "trial": null, "merged": null}' % FORMATS[CONFIG],
+    "no campaign of this format": b'{"format": %d, "campaign": null, "trial": null, "merged": null}' % FORMAT,
     "no format": b"{}",
     "another format": b'{"format": 99}',
     "400 digits": b'{"format": ' + b"1" * 400 + b"}",
@@ -27,11 +27,11 @@ CONTENTS = {
     "a number beyond all": b'{"format": 1e999}',
     "NaN": b'{"format": NaN}',
     "deep nesting": b"[" * 200_000,
-    "nesting that is too deep": b'{"format": %d, "more": ' % FORMATS[CONFIG] + b"[" * 200 + b"]" * 200 + b"}",
-    "a lone surrogate": b'{"format": %d, "more": "\\ud800"}' % FORMATS[CONFIG],
-    "text that moves the cursor": b'{"format": %d, "more": "\\u001b[2J"}' % FORMATS[CONFIG],
+    "nesting that is too deep": b'{"format": %d, "more": ' % FORMAT + b"[" * 200 + b"]" * 200 + b"}",
+    "a lone surrogate": b'{"format": %d, "more": "\\ud800"}' % FORMAT,
+    "text that moves the cursor": b'{"format": %d, "more": "\\u001b[2J"}' % FORMAT,
     "binary": bytes(range(256)) * 9,
-    "cut short": b'{"format": %d, "tri' % FORMATS[CONFIG],
+    "cut short": b'{"format": %d, "tri' % FORMAT,
 }
 
 FEW = ("a list", "no campaign", "no campaign of this format", "400 digits", "deep nesting")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from experiments.commands.cli import main
-from sim.logs.recorded_robot import read_log, recording_of
 
 
 @pytest.fixture(scope="module")
@@ -109,21 +108,6 @@ def test_what_is_no_log_at_all_gets_one_line_and_status_2(run, tmp_path, capsys)
         log.unlink() if not log.is_dir() else log.rmdir()
         make()
         told(capsys, ["replay", str(log)], tmp_path)
-
-
-def test_a_log_of_format_1_is_read_as_it_was_meant(run, tmp_path):
-    """There NaN was no return, and one sigma held for all beams."""
-    now = read_log(run / "log.npz")
-    older = dict(np.load(run / "log.npz")) | {"format": np.int64(1), "sigma_m": np.float64(0.01)}
-    older["ranges_m"] = np.where(np.isposinf(older["ranges_m"]), np.nan, older["ranges_m"])
-    del older["sigma_share"], older["scan_start_s"]
-    np.savez(tmp_path / "log.npz", **older)
-    read = read_log(tmp_path / "log.npz")
-    assert np.isposinf(now["ranges_m"]).any()
-    assert not {"sigma_share", "scan_start_s"} & set(read)
-    assert np.isnan(recording_of(read).scan(0).start_s)
-    for name, values in read.items():
-        np.testing.assert_array_equal(values, now[name], err_msg=name)
 
 
 def test_a_replay_knows_the_noise_that_grew_with_the_range(tmp_path):

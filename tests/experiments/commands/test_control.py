@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from experiments.artifacts.files import json_bytes
-from experiments.artifacts.formats import CONFIG, FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.commands import cli
@@ -25,6 +24,7 @@ from experiments.scoring.summary import TIMED
 from experiments.terminal.interrupts import STOPS, first_interrupt_waits, nothing_half_built_speaks
 from experiments.usage import UsageError
 from explore.goals.explorer_config import ExplorerConfig
+from sim.logs.recorded_robot import FORMAT
 
 ROOT = Path(__file__).parents[3]
 
@@ -109,16 +109,16 @@ def test_settings_are_read_as_they_were_written(tmp_path):
     trial = said["trial"]
     wrong = {
         "trial should be an object": {**said, "trial": []},
-        "no trial": {"format": FORMATS[CONFIG]},
+        "no trial": {"format": FORMAT},
         "no format": {"trial": trial},
         "format 0": {**said, "format": 0},
         "trial.seed should be a whole number": {**said, "trial": {**trial, "seed": "one"}},
         "trial.errorless should be true or false": {**said, "trial": {**trial, "errorless": 1}},
         "trial.robot should be an object": {**said, "trial": {**trial, "robot": 3}},
-        "an unknown 'trial.more'": {**said, "trial": {**trial, "more": 1}},
+        "the unknown key 'trial.more'": {**said, "trial": {**trial, "more": 1}},
         "no trial.world": {**said, "trial": {key: value for key, value in trial.items() if key != "world"}},
-        "an unknown 'more'": {**said, "more": 1},
-        "p0 should be one of zero": {**said, "trial": {**trial, "p0": "huge"}},
+        "the unknown key 'more'": {**said, "more": 1},
+        "p0 should be one of large, small, zero": {**said, "trial": {**trial, "p0": "huge"}},
     }
     for found, content in wrong.items():
         path.write_bytes(json_bytes(content))

@@ -49,8 +49,8 @@ def test_compare_takes_them_for_all_its_worlds(plan):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--scale", "-1"], "a scale above 0"),
-        (["--threshold", "7"], "a threshold above 0"),
+        (["--scale", "-1"], "-1.0 where scale should be a number from 1e-09"),
+        (["--threshold", "7"], "7.0 where threshold should be a number from 1e-06 to 1"),
         (["--level", "2"], "no --level for an SVG file"),
         (["--layers", "walls"], "--layers of the drawing ('furniture')"),
         (["--set", "drawing.negate=true"], "no --negate"),

@@ -114,8 +114,8 @@ def test_every_message_about_size_names_the_option(shape, scale, capsys, tmp_pat
         (["report", "PLACE"], "found no folder PLACE"),
         (["view", "PLACE.rrd"], "found no PLACE.rrd"),
         (["replay", "PLACE/log.npz"], "found no file PLACE/log.npz"),
-        (["explore", "rooms", "--set", "mission.maper.matching.gate=0.9"], "(is it mission.mapper.matching.gate?)"),
-        (["explore", "rooms", "--set", "mision.mapper.x=1"], "(is it mission.mapper.x?)"),
+        (["explore", "rooms", "--set", "mission.maper.matching.gate=0.9"], "(is it mission.mapper?)"),
+        (["explore", "rooms", "--set", "mision.mapper.x=1"], "(is it mission?)"),
     ],
 )
 def test_a_line_names_what_is_missing_or_meant(words, told, tmp_path, capsys):

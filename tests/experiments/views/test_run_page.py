@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 from experiments.artifacts.files import json_bytes
-from experiments.artifacts.formats import FORMATS
 from experiments.artifacts.results import config_record
 from experiments.artifacts.saved import read_trial
 from experiments.commands.cli import _parse, main
 from experiments.views.run_page import run_page
+from sim.logs.recorded_robot import FORMAT
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_back_ends_stand_side_by_side(run, tmp_path):
 
 def test_a_run_without_a_step_and_a_lost_file_are_told_in_words(run, tmp_path, capsys):
     summary = {
-        "format": FORMATS["summary.json"],
+        "format": FORMAT,
         "status": "failed",
         "reason": "no wall",
         "steps": 0,
@@ -74,9 +74,7 @@ def test_a_run_without_a_step_and_a_lost_file_are_told_in_words(run, tmp_path, c
 def test_the_command_on_the_page_makes_the_very_run(tmp_path, more):
     trial = _parse(["explore", "my hall.svg", *more.split()]).trial
     (tmp_path / "config.json").write_bytes(json_bytes(config_record(trial)))
-    (tmp_path / "summary.json").write_text(
-        json.dumps({"format": FORMATS["summary.json"], "status": "failed", "reason": "", "steps": 0})
-    )
+    (tmp_path / "summary.json").write_text(json.dumps({"format": FORMAT, "status": "failed", "reason": "", "steps": 0}))
     assert _parse(shlex.split(run_page(tmp_path).command)[1:]).trial == trial
 
 

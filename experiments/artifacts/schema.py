@@ -1,0 +1,132 @@
+"""Values held against what they may be, by msgspec: settings (dataclasses) and what results hold (structs).
+
+Settings are read strictly, since one that is not understood would be another run: none is missing, none is unknown.
+What a struct does not name is left alone, since a later version may keep more.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
+from types import GenericAlias
+from typing import Any, get_args, get_type_hints
+
+from msgspec import ValidationError, convert
+from msgspec.json import schema
+
+from slam.quantities import allowed
+from slam.robot import STATED
+
+STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
+"""Of the place that msgspec tells: the key of an object, the number of an entry, or some key of many."""
+
+
+def many(kind: Any) -> Any:
+    """Return the kind of a list of one kind."""
+    return GenericAlias(list, (kind,))
+
+
+class UnfitError(ValueError):
+    """A value of another kind than expected: which one, and what it is."""
+
+
+class UnknownKeyError(UnfitError):
+    """A key that stands for nothing."""
+
+    def __init__(self, key: str, near: str = "") -> None:
+        super().__init__(f"the unknown key {key[:80]!r}{near}")
+        self.key = key
+
+
+def fit(kind: Any, value: Any, name: str = "") -> Any:
+    """Return plain values as one of a kind; raises UnfitError, or what the kind itself raises, for any other."""
+    check_keys(kind, value, name)
+    try:
+        return convert(value, kind)
+    except ValidationError as error:
+        if isinstance(error.__cause__, ValueError):
+            raise error.__cause__ from None
+        raise UnfitError(_words(str(error), kind, value, name)) from error
+
+
+@cache
+def settings_in(group: Any) -> dict[str, Any]:
+    """Return the types of the settings of a group by their names, without what is stated elsewhere."""
+    hints = get_type_hints(group, include_extras=True)
+    return {each.name: hints[each.name] for each in fields(group) if not each.metadata.get(STATED)}
+
+
+def group_of(kind: Any) -> Any:
+    """Return the dataclass that a type is, or may be beside None; None where it is none."""
+    options = [kind, *get_args(kind)]
+    return next((option for option in options if isinstance(option, type) and is_dataclass(option)), None)
+
+
+def check_keys(kind: Any, value: Any, name: str = "", some: bool = False) -> None:
+    """Raise UnfitError for keys of settings that there are not, and for those that are missing.
+
+    Where `some` settings will do, none is missing, and each is held against what it may be by itself; else values are
+    left to whoever fits the whole.
+    """
+    group = group_of(kind)
+    if group is None or not isinstance(value, Mapping):
+        if some:
+            fit(kind, value, name)
+        return
+    known = settings_in(group)
+    for key, inner in value.items():
+        if key not in known:
+            raise UnknownKeyError(_under(name, key))
+        check_keys(known[key], inner, _under(name, key), some)
+    for key in known.keys() - value.keys() if not some else ():
+        raise UnfitError(f"no {_under(name, key)}")
+    if some and name and not value:
+        raise UnfitError(f"nothing in {name}, which holds several settings")
+
+
+def shown(value: Any) -> str:
+    """Return a value in few letters."""
+    if isinstance(value, dict | list | tuple):
+        return "an object" if isinstance(value, dict) else f"a list of {len(value)}"
+    text = repr(value) if isinstance(value, str) else json.dumps(value, default=repr)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def part_of(whole: Mapping[str, Any], said: Mapping[str, Any], step: str) -> Mapping[str, Any]:
+    """Return what a JSON Schema says of a key or an entry below one of its parts; nothing where it says nothing."""
+    for each in said.get("anyOf", [said]):
+        each = resolved(whole, each)
+        inner = each.get("properties", {}).get(step)
+        if inner is None and step.isdecimal() and each.get("type") == "array":
+            first = each.get("prefixItems", [])[int(step) : int(step) + 1]
+            inner = first[0] if first else each.get("items") or None
+        if inner is not None:
+            return resolved(whole, inner)
+    return {}
+
+
+def resolved(whole: Mapping[str, Any], said: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a part of a JSON Schema, or the one that it refers to."""
+    return whole["$defs"][said["$ref"].rpartition("/")[2]] if "$ref" in said else said
+
+
+def _words(told: str, kind: Any, value: Any, name: str) -> str:
+    """Return what is wrong with a value by what msgspec tells of it: what stands where, and what should."""
+    words, _, place = told.partition(" - at `$")
+    whole = schema(kind)
+    said = resolved(whole, whole)
+    for key, number in STEP.findall(place):
+        step = key or number
+        name = _under(name, step)
+        if step == "...":
+            return f"{words[:1].lower()}{words[1:]} in {name}"
+        value = value[int(number)] if number else value[key]
+        said = part_of(whole, said, step)
+    if words.startswith("Object missing required field"):
+        return f"no {_under(name, words.split('`')[1])}"
+    return f"{shown(value)} where {name or 'the file'} should be {allowed(said)}"
+
+
+def _under(name: str, key: str) -> str:
+    return f"{name}.{key}" if name else key

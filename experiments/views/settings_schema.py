@@ -1,0 +1,100 @@
+"""The settings of a trial as a JSON Schema: their ranges and units, and the words that stand below them."""
+
+import inspect
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from docstring_parser import parse_from_object
+from msgspec.json import schema
+
+from sim.logs.recorded_robot import FORMAT
+from slam.quantities import allowed
+
+from ..artifacts.saved import SavedConfig
+from ..artifacts.schema import group_of, settings_in
+from ..artifacts.settings import defaults, leaves
+from ..scenario import TrialConfig
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of settings at its place."""
+
+    key: str
+    """Dotted, as `--set` takes it; empty for the settings of the trial itself."""
+    kind: Any
+
+
+def groups() -> Iterator[Group]:
+    """Yield all groups of settings of a trial, each before those that it holds."""
+    waiting = [Group("", TrialConfig)]
+    while waiting:
+        group = waiting.pop()
+        yield group
+        inner = [(name, group_of(kind)) for name, kind in settings_in(group.kind).items()]
+        waiting += [Group(f"{group.key}.{name}".strip("."), kind) for name, kind in reversed(inner) if kind is not None]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting of a trial, in words."""
+
+    group: Group
+    name: str
+    default: str
+    """As JSON."""
+    allows: str
+    """What it may be: a kind of value, from where to where, in which unit."""
+    says: str
+    """What it is."""
+
+    @property
+    def key(self) -> str:
+        """Dotted, as `--set` takes it."""
+        return f"{self.group.key}.{self.name}".strip(".")
+
+
+def settings() -> Iterator[Setting]:
+    """Yield every setting of a trial, group by group."""
+    known = dict(leaves(defaults()))
+    for group in groups():
+        told = words_of(group.kind)
+        for name, kind in settings_in(group.kind).items():
+            if group_of(kind) is None:
+                key = f"{group.key}.{name}".strip(".")
+                yield Setting(group, name, json.dumps(known[key]), allowed(schema(kind)), told.get(name, ""))
+
+
+def config_schema(some: bool = False) -> dict[str, Any]:
+    """Return the JSON Schema of a run's `config.json`; with `some`, that of a file with some of its settings.
+
+    It says what msgspec holds values against, and the words below each setting.
+    """
+    whole: dict[str, Any] = schema(TrialConfig if some else SavedConfig)
+    for group in groups():
+        own = whole["$defs"][group.kind.__name__]
+        known, told = settings_in(group.kind), words_of(group.kind)
+        own["properties"] = {
+            name: said | ({"description": told[name]} if name in told else {})
+            for name, said in own["properties"].items()
+            if name in known
+        }
+        own |= {"required": [] if some else list(known), "additionalProperties": False}
+        own["description"] = inspect.cleandoc(group.kind.__doc__ or "")
+    said = whole.pop("$defs")
+    top = said.pop("TrialConfig" if some else "SavedConfig")
+    if not some:
+        top["properties"]["format"] = {"const": FORMAT}
+        top["additionalProperties"] = False
+    whole.pop("$ref")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **top, "$defs": said}
+
+
+def words_of(kind: Any) -> dict[str, str]:
+    """Return what the source says below each field of a group of settings, also below those that it inherits."""
+    found: dict[str, str] = {}
+    for each in reversed(kind.__mro__[:-1]):
+        found |= {told.arg_name: " ".join((told.description or "").split()) for told in parse_from_object(each).params}
+    return found
