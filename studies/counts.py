@@ -17,6 +17,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from experiments.views.settings_schema import settings
+
 ROOMS = ("slam", "explore", "sim", "viz", "experiments", "studies")
 TUNED = ("slam", "explore")
 """The rooms whose numbers decide what is mapped and where the robot drives."""
@@ -26,15 +28,20 @@ LAYOUT = ("POSE", "POSE_ROWS", "LINE_ROWS", "FORMAT", "NANO", "ROOM", "SPARE", "
 """Constants that are no choice: shapes of arrays and files, room that is kept for more, and where arithmetic ends."""
 HALF = 0.5
 """No choice either, but in a comparison: the middle of two."""
-PREFACE = """# Numbers that one may tune
+PREFACE = """# Settings, and numbers that one may tune
 
 <!-- made by `make settings` -->
 
-Every number of `slam/` and `explore/` that was chosen: settings (`XConfig.name`, and what a robot states, `XSpec.name`;
-reachable by `--set`), constants, and numbers in the middle of the code: in conditions, and all others with a point but
-0, 1, 2 and a half. The end of a name is its unit (`_m`, `_rad`, `_s`, `_steps`); others are counts or ratios.
-Numbers in the code that have no words guard the arithmetic or count in geometry (a ring has three corners).
-`make counts` counts them.
+Every setting of a run by its key, as `--set` and `--config` take it, with its default and what it may be. The page is
+made of the JSON Schema of `config.json`, which `chainslam schema` prints. The unit stands behind the range. Any other
+value, and a key that is none, ends in one line and exit status 2.
+"""
+IN_CODE = """## Numbers in the code
+
+Numbers of `slam/` and `explore/` that were chosen and are no settings: constants, and numbers in the middle of the
+code: in conditions, and all others with a point but 0, 1, 2 and a half. Those that have no words guard the arithmetic
+or count in geometry (a ring has three corners). `make counts` counts them; the settings of a folder count in this
+table, too.
 """
 NO_ENTRIES = {"__pycache__", "__init__.py", "py.typed"}
 
@@ -61,7 +68,7 @@ class Asked:
     root: Path = Path()
     """The sources: a checkout."""
     numbers: bool = False
-    """List every number that one may tune instead, as the page docs/settings.md."""
+    """List every setting of a run and every number that one may tune instead, as the page docs/settings.md."""
 
 
 def tunable(root: Path, rooms: tuple[str, ...] = TUNED) -> list[Number]:
@@ -178,14 +185,21 @@ def arrows(rooms: tuple[str, ...] = ROOMS) -> dict[str, tuple[int, int]]:
 
 
 def page(numbers: Iterable[Number]) -> str:
-    """Return a page in Markdown: the numbers of each file, with their values and what they are."""
+    """Return a page in Markdown: every setting of a run by its key, and the numbers of each file that are none."""
     numbers = list(numbers)
-    lines = [PREFACE, "| folder | numbers |", "|---|---|"]
+    lines = [PREFACE]
+    for group, own in groupby(settings(), lambda each: each.group):
+        place = f"{group.kind.__module__.replace('.', '/')}.py"
+        lines += [f"## `{group.key or 'trial'}`: `{group.kind.__name__}`, `{place}`", ""]
+        lines += ["| key | default | what it may be | what it is |", "|---|---|---|---|"]
+        lines += [f"| `{each.key}` | `{_cell(each.default)}` | {each.allows} | {_cell(each.says)} |" for each in own]
+        lines.append("")
+    lines += [IN_CODE, "| folder | numbers |", "|---|---|"]
     lines += [f"| `{folder}/` | {count} |" for folder, count in by_folder(numbers).items()]
     lines.append("")
-    for file, own in groupby(numbers, lambda each: each.file):
-        lines += [f"## `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
-        lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in own]
+    for file, found in groupby((each for each in numbers if each.kind != "setting"), lambda each: each.file):
+        lines += [f"### `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
+        lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in found]
         lines.append("")
     return "\n".join(lines)
 
