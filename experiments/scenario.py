@@ -20,10 +20,10 @@ from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
 from slam.estimation.backend import Backend
 from slam.estimation.mounting import start_of_scanner
+from slam.geometry.quantities import Count, Period, Place, Size, fault
 from slam.odometry.config import ScanMatchingConfig
 from slam.odometry.matched_robot import MatchedRobot
 from slam.odometry.scan_matching import ScanMatcher
-from slam.quantities import Count, Period, Place, Size, fault
 from slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean

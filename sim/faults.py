@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from slam.geometry.poses import inverse, to_world
-from slam.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Place, Share, Weight
+from slam.geometry.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Place, Share, Weight
 
 from .chance import Chance, Channel
 from .drive import Slip

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals, through
-from slam.quantities import Beams, Count, Deviation, Share, Size, View
+from slam.geometry.quantities import Beams, Count, Deviation, Share, Size, View
 
 from .kernels import nearest, seen_from
 

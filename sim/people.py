@@ -8,7 +8,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from slam.geometry.lines import distance_to_segments
-from slam.quantities import Body, Distance, Pace, Place, Wait
+from slam.geometry.quantities import Body, Distance, Pace, Place, Wait
 from slam.robot import RobotError
 
 from .chance import Chance, Channel

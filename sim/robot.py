@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
-from slam.quantities import Period, Pitch, Speed
+from slam.geometry.quantities import Period, Pitch, Speed
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Chance, Channel, world_key

@@ -15,7 +15,7 @@ from typing import Any, get_args, get_type_hints
 from msgspec import ValidationError, convert
 from msgspec.json import schema
 
-from slam.quantities import allowed
+from slam.geometry.quantities import allowed
 from slam.robot import STATED
 
 STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")

@@ -10,7 +10,7 @@ from docstring_parser import parse_from_object
 from msgspec.json import schema
 
 from sim.logs.recorded_robot import FORMAT
-from slam.quantities import allowed
+from slam.geometry.quantities import allowed
 
 from ..artifacts.saved import SavedConfig
 from ..artifacts.schema import group_of, settings_in

@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
+from slam.geometry.quantities import Count, Distance, Number, Size
 from slam.map.stochastic_map import StochasticMap
-from slam.quantities import Count, Distance, Number, Size
 from slam.robot import Odometry, RobotSpec, Scan, of_robot
 
 from .free_space import FreeSpace

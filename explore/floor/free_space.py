@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from msgspec import Meta
 
 from slam.geometry.poses import compose
-from slam.quantities import Count, Distance, Place, Size
+from slam.geometry.quantities import Count, Distance, Place, Size
 from slam.robot import RobotSpec, Scan, of_robot
 
 from .kernels import Box, squared_distances, take_in

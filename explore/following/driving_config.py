@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slam.quantities import Angle, Distance, Number, Size
+from slam.geometry.quantities import Angle, Distance, Number, Size
 from slam.robot import RobotSpec, of_robot
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.association.joint_compatibility import NO_NIS, Nis
+from slam.geometry.quantities import Count, Distance, Number, Size
 from slam.map.stochastic_map import StochasticMap
-from slam.quantities import Count, Distance, Number, Size
 from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
 from ..floor.free_space import FreeSpace

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from slam.quantities import Count, Distance, Number, Share, Size, Wait
+from slam.geometry.quantities import Count, Distance, Number, Share, Size, Wait
 from slam.robot import RobotSpec, of_robot
 
 from ..following.wall_following import FollowingConfig

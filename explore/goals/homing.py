@@ -8,8 +8,8 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
+from slam.geometry.quantities import Number
 from slam.map.chains import Chain
-from slam.quantities import Number
 from slam.robot import RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
+from slam.geometry.quantities import Factor
 from slam.map.chains import Chain
-from slam.quantities import Factor
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour

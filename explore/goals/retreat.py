@@ -8,8 +8,8 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
+from slam.geometry.quantities import Distance, Number, Share, Size
 from slam.map.chains import Chain
-from slam.quantities import Distance, Number, Share, Size
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns

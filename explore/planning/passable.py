@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
-from slam.quantities import Distance, Size, Weight
+from slam.geometry.quantities import Distance, Size, Weight
 from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.lines import directions, normals
+from slam.geometry.quantities import Count, Distance, Size, Turn
 from slam.map.chains import OpenEnd
 from slam.map.stochastic_map import StochasticMap
-from slam.quantities import Count, Distance, Size, Turn
 
 
 @dataclass(frozen=True)

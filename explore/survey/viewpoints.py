@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.lines import directions, normals
+from slam.geometry.quantities import Distance
 from slam.map.chains import HEAD, OpenEnd
 from slam.map.stochastic_map import StochasticMap
-from slam.quantities import Distance
 from slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace

@@ -15,7 +15,7 @@ from ..estimation.backend import Joint, Observations
 from ..estimation.gates import gate_level, pair_levels
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
-from ..quantities import Angle, Distance, Factor, Probability
+from ..geometry.quantities import Angle, Distance, Factor, Probability
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
 from .kernels.matching_kernels import matched, refused
 

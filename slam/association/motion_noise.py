@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from ..estimation.backend import Joint, Observations
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.compiled import plain
-from ..quantities import Count
+from ..geometry.quantities import Count
 from ..robot import Odometry
 from .joint_compatibility import NO_NIS, Nis, seen_halfway
 from .kernels import motion_kernels

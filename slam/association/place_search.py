@@ -11,12 +11,12 @@ from jaxtyping import Bool, Float
 
 from ..extraction.segments import Segments
 from ..geometry.poses import rotation, wrap
+from ..geometry.quantities import Angle, Distance, Share, Size, Turn
 from ..map.stochastic_map import StochasticMap
 from ..odometry.config import ScanMatchingConfig
 from ..odometry.field_kernels import field_of
 from ..odometry.point_kernels import joined
 from ..odometry.search_kernels import refine
-from ..quantities import Angle, Distance, Share, Size, Turn
 from .kernels.correlation_kernels import best_in_blocks, largest_ahead
 
 BLOCK = 8

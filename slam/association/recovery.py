@@ -17,10 +17,10 @@ from ..estimation.backend import Joint
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..geometry.poses import compose, inverse
+from ..geometry.quantities import Deviation, Number, Share, Spread
 from ..map.kernels.ray_evidence import ray_evidence
 from ..map.stochastic_map import StochasticMap
 from ..odometry.diagnosis import DiagnosisConfig
-from ..quantities import Deviation, Number, Share, Spread
 from ..robot import Odometry, Scan
 from .joint_compatibility import NO_NIS, Nis
 from .matching import Matches

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import Angle, Count, Distance, Probability, Sigmas, Size, Spread
+from ..geometry.quantities import Angle, Count, Distance, Probability, Sigmas, Size, Spread
 from ..robot import STATED
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..estimation.shared import SharedConfig, of_shared
-from ..quantities import Beams, Count, Number, Sigmas, Turn, Weight
+from ..geometry.quantities import Beams, Count, Number, Sigmas, Turn, Weight
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions
-from ..quantities import Angle, Distance
+from ..geometry.quantities import Angle, Distance
 from .segments import Segments
 from .straightness_kernels import faces_cov, misfit_variances
 

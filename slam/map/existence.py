@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.gates import gate_level
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
-from ..quantities import Distance, Probability
+from ..geometry.quantities import Distance, Probability
 from ..robot import RobotSpec, Scan, of_robot
 from .kernels.existence_kernels import Odds, crossing, look
 from .kernels.few_beams_kernels import Same, distances, lines_of, paired

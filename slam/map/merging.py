@@ -15,7 +15,7 @@ from ..estimation.gates import gate_level
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.lines import directions, normals
 from ..geometry.numerics import LEAST_SIGMA
-from ..quantities import Distance
+from ..geometry.quantities import Distance
 from .kernels import merging_kernels
 from .stochastic_map import StochasticMap
 

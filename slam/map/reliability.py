@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from ..estimation.shared import SharedConfig, of_shared
 from ..extraction.segments import Segments
 from ..extraction.straightness import StraightnessConfig, cov_of_faces
-from ..quantities import Angle, Distance
+from ..geometry.quantities import Angle, Distance
 from .kernels import reliability_kernels
 from .kernels.reliability_kernels import add_fits, add_lengths, keep_longest
 from .records import Merger, Records

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..quantities import Angle, Count, Deviation, Distance, Part, Pitch, Share, Sigmas, Size, Spread, Turn
+from ..geometry.quantities import Angle, Count, Deviation, Distance, Part, Pitch, Share, Sigmas, Size, Spread, Turn
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from ..quantities import Body, Heading, Place, Turn, fault
+from ..geometry.quantities import Body, Heading, Place, Turn, fault
 from .errors import RobotError
 from .wheels import WheelSpec
 

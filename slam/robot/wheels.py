@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..geometry.poses import arc, compose, inverse, rotation
-from ..quantities import Body, Distance
+from ..geometry.quantities import Body, Distance
 from .messages import Odometry
 
 

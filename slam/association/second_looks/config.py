@@ -6,8 +6,20 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
+from ...geometry.quantities import (
+    Angle,
+    Count,
+    Deviation,
+    Distance,
+    Factor,
+    Number,
+    Share,
+    Sigmas,
+    Size,
+    Spread,
+    Weight,
+)
 from ...odometry.config import ScanMatchingConfig
-from ...quantities import Angle, Count, Deviation, Distance, Factor, Number, Share, Sigmas, Size, Spread, Weight
 from ..place_search import PlaceSearchConfig
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ...quantities import Angle, Count, Distance, Factor, Number, Probability, Sigmas, Weight
+from ...geometry.quantities import Angle, Count, Distance, Factor, Number, Probability, Sigmas, Weight
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from ...estimation.shared import SharedConfig, of_shared
 from ...extraction.segments import Segments
 from ...extraction.visible_extent import beam_step
-from ...quantities import Count, Sigmas, Size
+from ...geometry.quantities import Count, Sigmas, Size
 from ...robot import Scan
 from ..records import Merger, Records
 from .kernels.change_point_kernels import places_between, surest, turns_of_beams

@@ -19,7 +19,7 @@ from experiments.commands.cli import main
 from experiments.scenario import TrialConfig, check
 from experiments.usage import UsageError
 from experiments.views.settings_schema import config_schema
-from slam.quantities import fault
+from slam.geometry.quantities import fault
 from slam.robot import RobotError
 
 LEAVES = dict(leaves(defaults()))
