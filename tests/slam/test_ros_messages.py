@@ -31,6 +31,8 @@ def test_a_scan_says_of_each_beam_what_came_back():
     np.testing.assert_array_equal(scan.ranges_m, told)
     np.testing.assert_allclose(scan.bearings_rad, -0.4 + 0.1 * np.arange(8))
     assert (scan.start_s, scan.end_s, scan.range_max_m) == (3.25, 3.25, 8.0)
+    near = timed_scan(laser_scan(3.25, [0.0, 5e-4, 0.05], low=-0.4, step=0.1, range_min=0.0))
+    np.testing.assert_array_equal(near.ranges_m, [np.nan, np.nan, 0.05])
 
 
 @pytest.mark.parametrize("upside_down", [False, True])

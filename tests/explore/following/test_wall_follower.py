@@ -9,17 +9,19 @@ import pytest
 import shapely
 
 from explore.floor.free_space import FreeSpace
+from explore.following import wall_follower as module
 from explore.following.behaviour import Behaviour
 from explore.following.wall_follower import WallFollower
 from explore.following.wall_following import FollowingConfig, Surroundings
 from sim.lidar import LidarConfig, RangeFinder
 from slam.geometry.poses import arc, compose
 from slam.map.chains import HEAD, TAIL
-from slam.robot import Scan
+from slam.robot import MotionCommand, Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
 CONFIG = FollowingConfig()
+BACK = MotionCommand(-0.05, 0.0)
 STANDOFF_M = CONFIG.viewpoints.standoff_m
 
 
@@ -123,6 +125,40 @@ def test_a_narrow_passage_takes_the_standoff_but_not_the_clearance(scene_of, loo
     assert shapely.distance(shapely.MultiPoint(poses[:, :2]), room.boundary) > CONFIG.robot.radius_m
     assert poses[:, 0].max() > 4.5
     assert Behaviour.FOLLOW in words
+
+
+def test_where_thirty_steps_lead_no_farther_the_robot_turns_back(hall_with_board):
+    """Wheels that slip: it is told to drive and stays where it is."""
+    follower, pose = WallFollower(7, HEAD, CONFIG), np.array([4.0, 3.0 - STANDOFF_M, np.pi])
+    finder = RangeFinder(hall_with_board.faces, LidarConfig())
+    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+    around, turns = Surroundings(hall_with_board.walls(pose), hall_with_board.grid, scan), []
+    for _ in range(140):
+        follower.command(around)
+        turns.append(follower.ping_pongs)
+    assert [turns.index(1), turns.index(2)] == pytest.approx([2 * 31, 4 * 31], abs=4)
+
+
+@pytest.mark.parametrize(
+    ("safe", "turns"), [("yes no yes", [0, 0, 0]), ("no yes no", [0, 0, 0]), ("yes no no", [0, 0, 1])]
+)
+def test_one_scan_without_a_safe_step_is_followed_by_another_and_two_turn_the_robot(
+    hall_with_board, monkeypatch, safe, turns
+):
+    follower, pose = WallFollower(7, HEAD, CONFIG), np.array([4.0, 3.0 - STANDOFF_M, np.pi])
+    finder = RangeFinder(hall_with_board.faces, LidarConfig())
+    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+    around, sides = Surroundings(hall_with_board.walls(pose), hall_with_board.grid, scan), []
+    for word in safe.split():
+        with monkeypatch.context() as patched:
+            if word == "no":
+                patched.setattr(module, "step_towards", lambda *_: None)
+                patched.setattr(module, "step_away", lambda *_: BACK)
+            command = follower.command(around)
+        sides.append(int(follower.behaviour is Behaviour.REVERSE))
+        waits = MotionCommand(0.0, 0.0) if not sides[-1] else BACK
+        assert command == waits if word == "no" else command.forward_m > 0.1
+    assert sides == turns
 
 
 def test_a_wall_that_is_gone_is_not_followed(scene_of):
