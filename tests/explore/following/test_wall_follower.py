@@ -11,6 +11,8 @@ import shapely
 from explore.floor.free_space import FreeSpace
 from explore.following import wall_follower as module
 from explore.following.behaviour import Behaviour
+from explore.following.driving import Ahead
+from explore.following.track import Track
 from explore.following.wall_follower import WallFollower
 from explore.following.wall_following import FollowingConfig, Surroundings
 from sim.lidar import LidarConfig, RangeFinder
@@ -159,6 +161,47 @@ def test_one_scan_without_a_safe_step_is_followed_by_another_and_two_turn_the_ro
         waits = MotionCommand(0.0, 0.0) if not sides[-1] else BACK
         assert command == waits if word == "no" else command.forward_m > 0.1
     assert sides == turns
+
+
+TRACK = Track(np.array([0.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, -1.0]), 2.0, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("was_on", "position_m", "distance_m", "is_on"),
+    [
+        (False, 1.0, 0.5, True), (False, 1.0, 0.55, False), (False, 1.0, 0.3, True), (False, 1.0, 0.25, False),
+        (True, 1.0, 0.55, True), (True, 1.0, 0.79, True), (True, 1.0, 0.81, False), (True, 1.0, 0.02, True),
+        (False, -1.2, 0.4, True), (False, -1.3, 0.4, False), (True, -1.3, 0.4, True),
+        (False, 3.2, 0.4, True), (False, 3.3, 0.4, False), (True, 3.3, 0.4, True),
+    ],
+)  # fmt: skip
+def test_the_track_begins_near_the_standoff_and_ends_at_twice_it(was_on, position_m, distance_m, is_on):
+    """Round an end by half a circle at most; who is on it may have gone round farther."""
+    follower = WallFollower(0, TAIL, CONFIG)
+    assert follower._on_track(TRACK, 1.0, 0.4 if was_on else 4.0) == was_on
+    assert follower._on_track(TRACK, position_m, distance_m) == is_on
+
+
+@pytest.mark.parametrize("side", [TAIL, HEAD])
+def test_without_a_side_the_nearer_end_is_first(hall_with_board, side):
+    follower = WallFollower(7, None, CONFIG)
+    start = np.array([4.0 + (0.5 if side == TAIL else -0.5), 3.0 - STANDOFF_M, 0.0 if side == TAIL else np.pi])
+    poses, _ = drive(hall_with_board, follower, start, 4)
+    assert np.sign(poses[-1, 0] - start[0]) == (1.0 if side == TAIL else -1.0)
+
+
+def test_where_no_step_is_safe_at_the_standoff_nearer_places_are_tried(hall_with_board, monkeypatch):
+    """At each distance the farther aim first."""
+    follower, pose = WallFollower(7, HEAD, CONFIG), np.array([4.0, 3.0 - STANDOFF_M, np.pi])
+    finder, aims = RangeFinder(hall_with_board.faces, LidarConfig()), []
+    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+    monkeypatch.setattr(module, "step_towards", lambda aim, *_: aims.append(aim))
+    monkeypatch.setattr(module, "ahead_of", lambda aim, *_: Ahead(aim, np.zeros((0, 2)), np.inf, False))
+    follower.command(Surroundings(hall_with_board.walls(pose), hall_with_board.grid, scan))
+    ahead, aside = np.array(aims).T
+    np.testing.assert_allclose(ahead, [0.3, 0.15] * 3, atol=1e-9)
+    nearer = STANDOFF_M - np.linspace(STANDOFF_M, CONFIG.viewpoints.close_m, 3)
+    np.testing.assert_allclose(-aside, np.repeat(nearer, 2), atol=1e-9)
 
 
 def test_a_wall_that_is_gone_is_not_followed(scene_of):
