@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks, too_late
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
+from ..terminal.word_order import with_files
 from ..usage import UsageError, choose
 from .parsing import parsed
 
@@ -183,7 +184,7 @@ def _parse(arguments: Sequence[str] | None) -> Command:
         choose("command", words[0], COMMANDS)
     _refuse_empty(words)
     classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
-    command = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
+    command = with_files(parsed(words, classes, f"{ABOUT} --version tells which version this is."))
     asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
     return asked
 

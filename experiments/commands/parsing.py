@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, g
 
 import tyro
 
+from ..terminal.word_order import in_order, swallowed
 from ..usage import UsageError, choose, did_you_mean
 
 FOLDERS = ("out", "resume", "merge", "against")
@@ -30,6 +31,8 @@ NO_NUMBER = re.compile(
 BOX = " |│╭╮╰╯─+\n"
 """What tyro draws boxes with; where there are no letters for them, it draws lines of dashes."""
 HELP = "-h", "--help"
+MISSING = re.compile(r"Missing from [^:]*: (--\S+ \S+|\S+)|Missing value for argument '(\w+)'")
+"""How tyro says that a word is not there."""
 
 
 def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> Any:
@@ -37,6 +40,8 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> An
     known: dict[str, Callable[..., Any]] = {name: readable(command) for name, command in commands.items()}
     asked = commands.get(words[0]) if words else None
     said = io.StringIO()
+    if asked is not None:
+        words = in_order(words, asked)
     try:
         with redirect_stderr(said):
             made = tyro.extras.subcommand_cli_from_dict(known, prog="chainslam", description=about, args=words)
@@ -153,6 +158,10 @@ def _told(message: str, words: Sequence[str], command: type | None) -> str:
             return f"expected no more words for {name}, found {rest[0]!r}: {see}"
         near = did_you_mean(options[0], [*options_of(command), *HELP])
         return f"expected an option of {name}, found {options[0]}{near}: {see}"
+    if missing := MISSING.match(message):
+        took = swallowed(words, command)
+        what = missing[1] or missing[2].upper()
+        return f"expected {what} for {name}, found none{took}: {'put it first' if took else see}"
     choice = re.match(r"invalid choice '(.*)' for argument '(.*?)'\. Expected one of \((.*)\)\.?$", message)
     if choice:
         known = [word for word in re.findall(r"'([^']*)'", choice[3]) if word != "None"]

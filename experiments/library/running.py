@@ -24,6 +24,7 @@ from ..replays.replay import Association
 from ..replays.sources import RECORDED
 from ..replays.unwitnessed import run_unwitnessed, unwitnessed
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..terminal.word_order import file_in
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError, choose
 from .runs import Home, Run
@@ -139,7 +140,7 @@ def replay(
     Returns the run, or with several names the runs by name. Raises UsageError, in one line, for bad input.
     """
     names = (backend,) if isinstance(backend, str) else tuple(backend)
-    path = log.folder / "log.npz" if isinstance(log, Run) else Path(log)
+    path = file_in(log.folder if isinstance(log, Run) else Path(log), "log.npz")
     command = Replay(path, backend=names, association=association, set=tuple(_words(settings or {})))
     for name in names:
         choose("back end", name, BACKENDS)
