@@ -115,7 +115,7 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
             if step.outcome is not None:
                 return Ending(step.outcome, step.decision.words)
     except KeyboardInterrupt as interrupt:
-        return Ending(Outcome.INTERRUPTED, f"interrupted by {interrupt or 'Ctrl-C'}")
+        return Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'}")
     except UsageError:
         raise
     except Exception as error:  # a run that fails keeps what it has computed; the trace goes beside the results

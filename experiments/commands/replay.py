@@ -189,6 +189,8 @@ class Replay:
                 show(step)
                 stop_if_asked()
 
-            if isinstance(source, RealLog):
-                return source.go(name, recording.watch(name, None, watch, source.wheels_pose))
-            return source.go(name, recording.watch(name, source.true_pose, watch))
+            if isinstance(source, OwnLog):
+                return source.go(name, recording.watch(name, source.true_pose, watch))
+            mapped = source.mapped(name, recording.watch(name, None, watch, source.wheels_pose))
+        # Second looks take as long as the map: here an interrupt ends them at once, and the map is kept.
+        return source.looked_over(mapped)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from explore.mission import ride_mission
+from explore.outcome import Outcome
 from explore.step import Step
 from sim.logs.bag_topics import TopicsWanted
 from sim.logs.keyframes import KeyframesConfig, RecordedLog
@@ -21,7 +22,7 @@ from slam.mapper import Mapper
 from ..artifacts.saved import cut_short, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
 from ..scenario import STRATEGY_OF_REPLAYS, OdometrySource, Scenario, TrialConfig, heard_by
-from ..scoring.summary import odometry_poses
+from ..scoring.summary import Ending, odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
 from .looked_again import looked_again
@@ -139,6 +140,11 @@ def replayed_real(run: RealRun, backend: str) -> TrialConfig:
 
 def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
     """Map a real robot's log with one back end, to its end or to what ends it early; raises UsageError before."""
+    return looked_over(run, mapped_real(run, backend, watch))
+
+
+def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
+    """Map it, without second looks."""
     scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
@@ -146,5 +152,20 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
         mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
         return ride_mission(heard, mapper, len(run.log.recording), run.cut_short, run.unread)
 
-    result = run_unwitnessed(scenario, watch, mission, run.log)
-    return looked_again(result) if run.options.second_looks or result.smoothed is not None else result
+    return run_unwitnessed(scenario, watch, mission, run.log)
+
+
+def looked_over(run: RealRun, result: TrialResult) -> TrialResult:
+    """Return what second looks make of a log that was mapped; without them where nobody asked, or it was interrupted.
+
+    One that is interrupted in them keeps what was mapped.
+    """
+    asked_for = run.options.second_looks or result.smoothed is not None
+    if not asked_for or result.ending.outcome is Outcome.INTERRUPTED:
+        return result
+    try:
+        return looked_again(result)
+    except KeyboardInterrupt as interrupt:
+        ending = Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'} in second looks")
+        said = {"status": ending.status, "reason": ending.reason, "outcome": str(ending.outcome)}
+        return replace(result, ending=ending, smoothed=None, summary=result.summary | said)

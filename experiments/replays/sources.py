@@ -13,7 +13,7 @@ from sim.worlds import World
 from ..artifacts.results import REPLAY, config_record
 from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
-from .real_log import RealRun, replay_real, replayed_real
+from .real_log import RealRun, looked_over, mapped_real, replay_real, replayed_real
 from .replay import RecordedRun, ReplayOptions, replay, replayed
 
 RECORDED = "recorded"
@@ -84,8 +84,16 @@ class RealLog:
         return config_record(replayed_real(self.run, backend)) | {REPLAY: {RECORDED: said}}
 
     def go(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
-        """Map it."""
+        """Map it, and look at it again."""
         return replay_real(self.run, backend, watch)
+
+    def mapped(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
+        """Map it."""
+        return mapped_real(self.run, backend, watch)
+
+    def looked_over(self, result: TrialResult) -> TrialResult:
+        """Look again at what was mapped."""
+        return looked_over(self.run, result)
 
     @property
     def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:

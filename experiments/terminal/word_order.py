@@ -73,7 +73,8 @@ def _values(command: type) -> dict[str, int]:
     """Return how many values each option takes at most."""
     hints, most = get_type_hints(command, include_extras=True), dict[str, int]()
     for each in fields(command):
-        if is_dataclass(inner := _plain(hints[each.name])):
+        inner = _plain(hints[each.name])
+        if isinstance(inner, type) and is_dataclass(inner):
             most |= _values(inner)
             continue
         parts = (inner, *getattr(hints[each.name], "__metadata__", ()))

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from functools import lru_cache, update_wrapper
 from hashlib import blake2b
 from pathlib import Path
+from time import thread_time
 from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
@@ -29,6 +30,7 @@ _R = TypeVar("_R")
 _FINGERPRINTS: dict[str, str] = {}
 """By module, of all that its kernels are made of."""
 _KERNELS: list["Kernel[..., Any]"] = []
+_SPENT_S = [0.0]
 _FROZEN = (int, float, bool, str, tuple)
 """What a kernel reads of its module is compiled into it."""
 
@@ -67,8 +69,11 @@ class Kernel(Generic[_P, _R]):
 
     def _by_numba(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Run what numba compiles or loads, and keep it so that the next process does without numba."""
+        began, known = thread_time(), self._known()
         machine: Any = self.machine()
         result: _R = machine(*args, **kwargs)
+        if self._known() != known:
+            _SPENT_S[0] += thread_time() - began
         if (file := self._file()) is not None and not kwargs and decide(args):
             types = tuple(map(machine.typeof_pyval, args))
             if types in machine.overloads and types in machine._cache.made:
@@ -76,6 +81,11 @@ class Kernel(Generic[_P, _R]):
                 self._made[kinds(args)] = machine.overloads[types].entry_point
                 keep(file, kinds(args), machine._cache.made[types])
         return result
+
+    def _known(self) -> int:
+        """Return for how many kinds of arguments numba has machine code here."""
+        machine: Any = self._machine
+        return -1 if machine is None else len(machine.overloads)
 
     def _file(self) -> Path | None:
         """Return where the machine code is kept, or None where numba has to load it."""
@@ -98,6 +108,11 @@ class Kernel(Generic[_P, _R]):
             _let_numba_call_kernels()
         assert self._machine is not None
         return self._machine
+
+
+def compiling_s() -> float:
+    """Return the processor time so far, s, of first calls, in which numba is loaded and compiles."""
+    return _SPENT_S[0]
 
 
 def link_kernels() -> None:

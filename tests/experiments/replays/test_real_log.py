@@ -9,6 +9,7 @@ from PIL import Image
 from rerun.chunk import RrdReader
 
 from experiments.commands.cli import main
+from experiments.replays import real_log
 from experiments.replays.real_log import RealOptions, read_real_run
 from experiments.scenario import TrialConfig
 from slam.geometry.lines import directions, normals
@@ -266,3 +267,19 @@ def test_what_cannot_be_replayed_is_told_in_one_line(tmp_path, capsys, case):
 def test_every_and_noise_are_refused_for_a_runs_own_log(replayed, capsys, option):
     assert main(["replay", str(replayed / "out" / "full-ekf" / "log.npz"), *option]) == 2
     assert "leave it out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stop", ["SIGTERM", ""])
+def test_an_interrupt_in_second_looks_ends_them_and_keeps_the_map(stop, tmp_path, monkeypatch, capsys):
+    def interrupted(result):
+        raise KeyboardInterrupt(stop) if stop else KeyboardInterrupt
+
+    monkeypatch.setattr(real_log, "looked_again", interrupted)
+    log = write_log(tmp_path / "room.log")
+    assert main(["replay", str(log), "--second-looks", "--out", str(tmp_path / "out")]) == 130
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["status"], summary["outcome"]) == ("stopped", "interrupted")
+    assert summary["reason"] == f"interrupted by {stop or 'Ctrl-C'} in second looks"
+    assert summary["lines"] >= 3
+    assert (tmp_path / "out" / "map.npz").exists()
+    assert "Traceback" not in capsys.readouterr().err

@@ -50,7 +50,7 @@ def test_what_took_the_log_is_told(capsys):
     assert main(["replay"]) == 2
     assert capsys.readouterr().err == "chainslam: expected LOG for replay, found none: see `chainslam replay --help`\n"
     assert main(["measure"]) == 2
-    assert capsys.readouterr().err.startswith("chainslam: expected FOLDER for measure, found none: see ")
+    assert capsys.readouterr().err.startswith("chainslam: expected DIR for measure, found none: see ")
     assert swallowed(["replay", "a.log"], Replay) == ""
 
 
