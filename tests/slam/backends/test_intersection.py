@@ -80,3 +80,26 @@ def test_weights_of_the_intersection_leave_next_to_the_least_trace(seed):
         )
         assert np.trace(after[part, part]) < 1.03 * least
     assert np.array_equal(map_._fresh, np.zeros((3, 3)))
+
+
+def test_walls_in_several_pieces_leave_an_update_that_can_be_solved():
+    """Weights next to zero divide a wall's block; two pieces of one wall then differ by their noise alone.
+
+    With a least weight of 1e-13 such a scan of an apartment ended in "Singular matrix".
+    """
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        lines, seen = 6, np.array([0, 0, 1, 2, 3, 3, 4, 5])
+        map_ = IntersectionMap(np.zeros(3), np.diag([3e-4, 4e-4, 6e-4]))
+        covs = np.array([np.diag(10.0 ** rng.uniform([-5.3, -4.0], [-1.8, -3.4])) for _ in range(lines)])
+        map_.append(np.zeros((lines, 2)), np.zeros((lines, 2)), np.zeros((lines, 2, 3)), covs)
+        H, R = np.zeros((len(seen), 2, 3 + 2 * lines)), np.zeros(2 * len(seen))
+        for k, row in enumerate(seen):
+            H[k, 0, 2], H[k, 0, 3 + 2 * row], H[k, 1, 4 + 2 * row] = -1.0, 1.0, 1.0
+            angle = rng.uniform(-np.pi, np.pi)
+            H[k, 1, :2], H[k, 1, 2:4] = (-np.cos(angle), -np.sin(angle)), rng.uniform(-1, 1)
+            H[k, 1, 3:5] = 0.0
+            H[k, 1, 3 + 2 * row : 5 + 2 * row] = rng.uniform(-1, 1), 1.0
+            R[2 * k : 2 * k + 2] = 10.0 ** rng.uniform([-6.0, -6.3], [-0.7, -4.0])
+        map_.condition(Linear(np.arange(lines), H.reshape(-1, 3 + 2 * lines), np.full(2 * len(seen), 1e-3), np.diag(R)))
+        assert np.linalg.eigvalsh(map_.joint(np.arange(lines)).cov)[0] > 0.0
