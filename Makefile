@@ -176,7 +176,8 @@ study: setup
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out $(ROWS)/intervals.jsonl
 
-# The paper's question in real plans: every fourth apartment, explored once and replayed through six back ends.
+# The paper's question in real plans: every fourth apartment, explored once and replayed through every back end. The stored rows
+# are of six back ends, and of all by their own matches in five apartments (`--every 32 --stages own`).
 real-plans: setup
 	$(BIN)/python -m studies.consistency.real_plans --plans $(PLANS) --out $(ROWS)/real-plans.jsonl
 

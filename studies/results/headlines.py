@@ -26,6 +26,8 @@ class Headline:
     make: Callable[[Sequence[Row]], Found]
     page: str = "results.md"
     """Where it stands in `docs`."""
+    each: str = ""
+    """Rows are of one code; or, for each value under this name, those of one code."""
 
 
 HEADLINES = (
@@ -73,12 +75,13 @@ HEADLINES = (
         REAL_PLANS,
     ),
     Headline(
-        "The paper's question in real plans: six back ends on the same drives",
+        "The paper's question in real plans: several back ends on the same drives",
         "Map ANEES: median 0.9 to 1.15, mean below 1.5; pose ANEES 0.9 to 1.15; 93 to 97 % of the intervals hold.",
         "make real-plans",
         STORED / "real-plans.jsonl",
         real_plans,
         REAL_PLANS,
+        "code",
     ),
     Headline(
         "Schools and offices, the first 1,500 steps",
@@ -117,5 +120,6 @@ HEADLINES = (
         STORED / "rivals.jsonl",
         rides,
         SHORTCUT,
+        "place",
     ),
 )

@@ -28,7 +28,7 @@ class Results:
 
     def run(self) -> None:
         """Write the pages and print a line for each table."""
-        found = [(headline, newest(headline.rows)) for headline in HEADLINES]
+        found = [(headline, newest(headline.rows, headline.each)) for headline in HEADLINES]
         for name in dict.fromkeys(headline.page for headline in HEADLINES):
             page = self.docs / name
             text = page.read_text()
@@ -43,16 +43,22 @@ def state(rows: Sequence[Row]) -> str:
     """Return in one word how rows stand to the code as it is."""
     if not rows:
         return "missing"
-    return "current" if rows[0]["code"] == fingerprint() else "stale"
+    return "current" if all(row["code"] == fingerprint() for row in rows) else "stale"
 
 
-def newest(path: Path) -> list[Row]:
-    """Return the rows of the code that has most of them in a file, the last one where several have."""
+def newest(path: Path, each: str = "") -> list[Row]:
+    """Return the rows of the code that has most of them in a file, the last one where several have.
+
+    With `each`, of every value under this name: what is made one by one may be of several codes.
+    """
     if not path.exists():
         return []
-    rows: list[Row] = [json.loads(line) for line in path.read_text().splitlines()]
-    counts = Counter(row["code"] for row in reversed(rows))
-    return [row for row in rows if row["code"] == counts.most_common(1)[0][0]] if rows else []
+    groups: dict[str, list[Row]] = {}
+    for line in path.read_text().splitlines():
+        row: Row = json.loads(line)
+        groups.setdefault(row[each] if each else "", []).append(row)
+    counts = {name: Counter(row["code"] for row in reversed(rows)) for name, rows in groups.items()}
+    return [row for name, rows in groups.items() for row in rows if row["code"] == counts[name].most_common(1)[0][0]]
 
 
 def section(headline: Headline, rows: Sequence[Row]) -> str:

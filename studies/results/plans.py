@@ -65,7 +65,22 @@ def _anees(rows: Sequence[Row]) -> str:
 
 
 def real_plans(rows: Sequence[Row]) -> Found:
-    """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones."""
+    """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones.
+
+    Rows of several versions of the code, of other apartments or other back ends, make a table each.
+    """
+    made = list(grouped([{"code": ""} | row for row in rows], "code").values())
+    if len(made) == 1:
+        return _real_plans(made[0])
+    return Found([], "", {_counted(own): _real_plans(own) for own in made})
+
+
+def _counted(rows: Sequence[Row]) -> str:
+    plans, names = ({row[key] for row in rows} for key in ("world", "backend"))
+    return f"{len(names)} back ends in {len(plans)} apartments"
+
+
+def _real_plans(rows: Sequence[Row]) -> Found:
     words, pose = pose_score(rows)
     head = ["back end", f"{words}: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
     table: Table = [["matches", *head, WRONG, "duplicate walls", NOISE]]

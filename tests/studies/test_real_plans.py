@@ -54,3 +54,7 @@ def test_a_table_has_means_and_medians_over_plans_and_intervals_weighed_by_pairs
     (told,) = cells(table_of_backends([row("graph", "own", "a") | noise]))
     assert told[-3:] == ("1.50", "1.50", "0.70, 20 %: smaller than stated")
     assert found.verdict == "The mean map ANEES over 3 apartments: `graph` 3."
+    older = [row("block-ekf", "own", plan) | {"code": "old"} for plan in "ab"]
+    both = real_plans([*older, *(each | {"code": "new"} for each in rows)])
+    assert list(both.parts) == ["1 back ends in 2 apartments", "1 back ends in 3 apartments"]
+    assert both.parts["1 back ends in 3 apartments"].table == found.table

@@ -35,6 +35,10 @@ def test_rows_of_the_code_that_has_most_of_them_count_and_the_last_of_equals(tmp
     rows = [row("a", "x"), row("a", "y"), row("b", "x"), row("b", "y"), row("c", "x")]
     path.write_text("".join(json.dumps(each) + "\n" for each in rows))
     assert [each["code"] for each in newest(path)] == ["b", "b"]
+    rows = [row("a", "x"), row("a", "x"), row("b", "x"), row("b", "y")]
+    path.write_text("".join(json.dumps(each) + "\n" for each in rows))
+    assert [(each["code"], each["world"]) for each in newest(path, "world")] == [("a", "x"), ("a", "x"), ("b", "y")]
+    assert state([row(fingerprint(), "x"), row("a", "y")]) == "stale"
 
 
 @pytest.mark.parametrize(("code", "told"), [("other", "stale"), (fingerprint(), "current")])
@@ -116,7 +120,7 @@ def test_rides_stand_place_by_place_with_intervals_over_drives_and_the_price_of_
     made = section(Headline("Rides", "All.", "make rivals", tmp_path, rides), rows)
     assert made.count("\n### ") == 2
     assert made.count("**Verdict.**") == 2
-    assert f"{len(rows)} rows, made at a commit not recorded: `make rivals`." in made
+    assert f"{len(rows)} rows, made by `make rivals`." in made
 
 
 def test_the_pose_is_scored_from_the_start_where_all_rows_can_tell():

@@ -76,6 +76,14 @@ def test_the_nis_of_a_scan_is_that_of_all_its_lines_together_and_each_call_is_he
     assert ear.dofs == [4, 2]
 
 
+def test_the_share_in_the_band_counts_scans_whose_nis_is_neither_too_large_nor_too_small():
+    """Two lines have four degrees of freedom: from 0.484 to 11.1; one has two: from 0.0506 to 7.38."""
+    ear = InnovationEar(ReliabilityConfig())
+    assert ear.in_band() is None
+    ear.values, ear.dofs = [0.4, 0.4, 5.0, 8.0, 8.0, 12.0], [2, 4, 4, 4, 2, 4]
+    assert ear.in_band() == pytest.approx(3 / 6)
+
+
 def whitened(row, off):
     e, S = stacked(JOINT, np.array([row]), LINES[[row]] + off, COV[None])
     return np.linalg.solve(np.linalg.cholesky(S), e)
