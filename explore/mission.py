@@ -65,7 +65,7 @@ def explore_mission(
     explorer = Explorer(strategy, start, config.explorer)
     inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
     floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
-    driver = Lost(Retreat(inner, floor, config.retreat, following), config.lost)
+    driver = Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
     return _mission(robot, mapper, driver, floor)
 
 
@@ -115,6 +115,7 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
             seen=tuple(seen),
             nis=localisation.nis,
             is_lost=localisation.is_lost,
+            is_leap_pending=localisation.is_leap_pending,
             fault=localisation.fault,
         )
         decision = driver.decide(around, update.chains, graph.graph)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .association.joint_compatibility import Nis
+from .association.leap import Leap
 from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
@@ -95,6 +96,7 @@ class Mapper:
         self._keeper = MapKeeper(backend, config)
         noise = None if config.recovery is None else config.recovery.noise
         self._noise = None if noise is None else MotionNoise(noise)
+        self._leap = None if config.recovery is None else Leap(config.recovery.place)
         diagnosis = None if config.recovery is None else config.recovery.diagnosis
         self._diagnosis = None if diagnosis is None else Diagnosis(diagnosis)
         self._odometry = AT_REST
@@ -119,6 +121,8 @@ class Mapper:
         odometry = odometry_of_scanner(odometry, self.config.robot.scanner)
         self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
         self.backend.predict(self._odometry)
+        if self._leap is not None:
+            self._leap.move(self._odometry)
 
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up.
@@ -164,7 +168,7 @@ class Mapper:
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = self._keeper.connect(walls, scan, set_aside)
-        localisation = Localisation(found.nis, motion, False, self._weighed(found, motion))
+        localisation = Localisation(found.nis, motion, noise_factor=self._weighed(found, motion))
         return self._told(MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation))
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
@@ -189,7 +193,7 @@ class Mapper:
 
     def _recovery(self, scan: Scan, found: Localised, walls: StochasticMap) -> Odometry | None:
         """Return the motion that the odometry did not report and this scan shows; notes whether the robot is lost."""
-        if self.config.recovery is None:
+        if self.config.recovery is None or self._leap is None:
             return None
         motion, is_lost = unstated_motion(
             scan,
@@ -199,7 +203,11 @@ class Mapper:
             self._is_lost,
             self.config.recovery,
             lambda: self._view(scan, found.view.segments, walls, may_have_moved=True),
+            self._leap,
+            not self._odometry.by_scans,
         )
+        if not is_lost:
+            self._leap.drop()
         # Where scans told the motion it is walls that are wrong, and only a map that goes on can mend them.
         self._is_lost = is_lost and not self._odometry.by_scans
         return motion
@@ -208,7 +216,8 @@ class Mapper:
         """Return the map as it was: a scan from nobody knows where tells nothing of it."""
         nobody = np.full(len(segments), -1, dtype=np.int64)
         factor = 1.0 if self._noise is None else self._noise.factor
-        localisation = Localisation(is_lost=True, noise_factor=factor)
+        is_pending = self._leap is not None and self._leap.is_pending
+        localisation = Localisation(is_lost=True, is_leap_pending=is_pending, noise_factor=factor)
         return self._told(MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation))
 
     def _told(self, update: MapUpdate) -> MapUpdate:

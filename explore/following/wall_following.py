@@ -90,6 +90,8 @@ class Surroundings:
     """How far they lay from where the belief predicted them."""
     is_lost: bool = False
     """The scan fits nowhere in the map, so nobody knows where the robot is."""
+    is_leap_pending: bool = False
+    """It fits elsewhere in the map, and a scan from another place has to say the same."""
     fault: str = ""
     """What is wrong with the robot, in words, where the last scans say so."""
 

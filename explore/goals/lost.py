@@ -1,6 +1,7 @@
 """What a robot does while its scans fit nowhere in the map: it turns on the spot, and gives up after a turn.
 
-It gives up at once where the scans say what is wrong with the robot itself.
+Where a scan fits elsewhere it drives on, for another one to say the same. It gives up at once where the scans say what
+is wrong with the robot itself.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ from slam.geometry.quantities import Factor
 from slam.map.chains import Chain
 from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
+from ..floor.accumulated_returns import returns
 from ..following.behaviour import Behaviour
+from ..following.driving_config import DrivingConfig
+from ..following.safe_steps import keeps_clear
 from ..following.wall_following import Surroundings
 from ..goal import GivenUp
 from ..outcome import Outcome
@@ -38,8 +42,8 @@ class LostConfig:
 class Lost:
     """Leaves all to another driver but the steps at which the robot does not know where it is."""
 
-    def __init__(self, inner: Driver, config: LostConfig = LostConfig()) -> None:
-        self._inner, self._config = inner, config
+    def __init__(self, inner: Driver, config: LostConfig, driving: DrivingConfig) -> None:
+        self._inner, self._config, self._driving = inner, config, driving
         self._step, self._since = -1, -1
         self._given_up = GivenUp()
 
@@ -63,6 +67,19 @@ class Lost:
         if self._step - self._since >= self._config.steps:
             words = f"lost at step {self._since}: its scans contradict the map, and no place in it fits"
             return Decision(None, words, given_up=self._given_up, outcome=Outcome.FAILED)
+        if around.is_leap_pending:
+            words = f"lost since step {self._since}: drives on to see whether it is where a scan has shown it"
+            return Decision(self._onward(around), words, given_up=self._given_up, behaviour=Behaviour.LOST)
         words = f"lost since step {self._since}: turns to find its place"
         turn = MotionCommand(0.0, self._config.robot.turn_rad)
         return Decision(turn, words, given_up=self._given_up, behaviour=Behaviour.LOST)
+
+    def _onward(self, around: Surroundings) -> MotionCommand:
+        """Return the straightest step ahead that the scan alone shows free, or a turn."""
+        robot = self._config.robot
+        points = returns(around.scan, robot.scanner)
+        for turn in (0.0, robot.turn_rad, -robot.turn_rad):
+            command = MotionCommand(robot.step_m, turn)
+            if keeps_clear(command, points, self._driving):
+                return command
+        return MotionCommand(0.0, robot.turn_rad)

@@ -43,6 +43,11 @@ class PlaceSearchConfig:
     apart_rad: Angle = float(np.deg2rad(10.0))
     """... this, are others."""
 
+    @property
+    def cov(self) -> Float[np.ndarray, "3 3"]:
+        """The covariance of a place that was found: a cell and a step of the search."""
+        return np.diag([self.cell_m, self.cell_m, self.step_rad]) ** 2
+
 
 @dataclass(frozen=True)
 class Window:

@@ -4,7 +4,8 @@ After it no wall is where the belief puts it: each segment of the scan would bec
 them agree with a pose that is wrong. So before a scan is taken in, the belief is asked whether it explains more of the
 scan once the robot may have moved by more than it said. A motion that did not happen explains nothing more: where
 the robot stands where it believes, a wall that nobody has seen fits no known one together with those around it. If no
-such motion explains the scan and beams go through known walls, the robot is lost; the whole map is searched then.
+such motion explains the scan and beams go through known walls, the robot is lost; the whole map is searched then. A
+place elsewhere has to be earned (`leap`).
 """
 
 from collections.abc import Callable
@@ -23,6 +24,7 @@ from ..map.stochastic_map import StochasticMap
 from ..odometry.diagnosis import DiagnosisConfig
 from ..robot import Odometry, Scan
 from .joint_compatibility import NO_NIS, Nis
+from .leap import Leap
 from .matching import Matches
 from .motion_noise import MotionNoiseConfig
 from .place_search import PlaceSearchConfig, place_of
@@ -63,6 +65,8 @@ class Localisation:
     """A motion that the odometry did not report, where the scan showed one."""
     is_lost: bool = False
     """The scan fits nowhere: it was not taken in."""
+    is_leap_pending: bool = False
+    """It fits elsewhere, and a scan from another place has to say the same."""
     noise_factor: float = 1.0
     """How many times as large as stated the standard deviation of the wheels' noise was taken to be."""
     fault: str = ""
@@ -90,12 +94,15 @@ def unstated_motion(
     was_lost: bool,
     config: RecoveryConfig,
     moved: Callable[[], View],
+    leap: Leap,
+    may_begin: bool,
 ) -> tuple[Odometry | None, bool]:
     """Return the motion that explains far more of a scan than `matches` do, as odometry to add, or None; and whether
     the robot is lost, since such a motion must be and none explains the scan.
 
     Its covariance is as wide as it was sought: where the robot is, the scan tells once it is taken in. `moved` shows
-    the scan beside all walls that it may be of after such a motion.
+    the scan beside all walls that it may be of after such a motion. A motion that leads farther than that covariance
+    is a leap, which begins only where it `may_begin`.
     """
     if not _leaves_much(view.segments, matches, config):
         return None, False
@@ -106,7 +113,12 @@ def unstated_motion(
     place = place_of(view.segments, walls, config.place, near)
     if place is None:
         return None, True
-    return Odometry(compose(inverse(view.joint.mean[:3]), place), unstated_cov(config)), False
+    motion = compose(inverse(view.joint.mean[:3]), place)
+    if np.hypot(*motion[:2]) <= config.shared.outlier_sigmas * config.shift_m:
+        return Odometry(motion, unstated_cov(config)), False
+    if not leap.is_earned(place, may_begin):
+        return None, True
+    return Odometry(motion, config.place.cov), False
 
 
 def _nearby(view: View, matches: Matches, config: RecoveryConfig) -> Float[np.ndarray, "3"] | None:

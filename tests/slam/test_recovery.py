@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from sim.lidar import LidarConfig, RangeFinder, noisy
+from slam.association.leap import Leap
+from slam.association.place_search import PlaceSearchConfig
 from slam.association.recovery import RecoveryConfig
 from slam.backends import BACKENDS
 from slam.config import MapperConfig
@@ -124,12 +126,56 @@ def test_a_robot_that_tells_the_truth_is_never_doubted(seed):
     assert 0.8 < sum(one.nis.squared for one in told) / dof < 1.2
 
 
-def test_a_robot_carried_across_the_hall_is_found_by_a_search_of_the_map():
+def carried_across_the_hall():
+    """A drive, and its updates since the robot was carried: one there, and others on the way from there."""
     drive = Drive()
-    relative = _relative(drive.pose, np.array([0.8, 2.8, -2.5]))
-    update = drive.move(np.zeros(3), relative)
-    assert update.localisation.unstated_motion is not None
+    told = [drive.move(np.zeros(3), _relative(drive.pose, np.array([0.8, 2.8, -0.7])))]
+    return drive, told
+
+
+def test_a_robot_carried_across_the_hall_is_found_by_a_search_of_the_map_once_two_places_say_the_same():
+    drive, told = carried_across_the_hall()
+    while told[-1].localisation.is_lost and len(told) < 30:
+        assert told[-1].localisation.is_leap_pending
+        told.append(drive.move(STEP))
+    least = PlaceSearchConfig.apart_m / np.hypot(*STEP[:2])
+    assert least <= len(told) - 1 <= least + 1
+    assert told[-1].localisation.unstated_motion is not None
+    np.testing.assert_array_equal(told[-1].localisation.unstated_motion.cov, RecoveryConfig().place.cov)
     assert drive.off[0] < 0.1
+    assert not drive.move(STEP).localisation.is_lost
+
+
+def test_a_robot_that_stands_or_turns_where_it_was_carried_earns_no_leap():
+    drive, told = carried_across_the_hall()
+    told += [drive.move(np.array([0.0, 0.0, 0.1])) for _ in range(12)]
+    assert all(update.localisation.is_lost and update.localisation.is_leap_pending for update in told)
+
+
+def test_where_scans_tell_that_nobody_carried_the_robot_it_does_not_leap():
+    drive = Drive()
+    told = [drive.move(np.zeros(3), _relative(drive.pose, np.array([0.8, 2.8, -0.7])), by_scans=True)]
+    told += [drive.move(STEP, by_scans=True) for _ in range(14)]
+    far = [update.localisation.unstated_motion for update in told if update.localisation.unstated_motion is not None]
+    assert all(np.hypot(*motion.motion[:2]) < 1.0 for motion in far)
+
+
+def test_a_leap_begins_anew_where_a_scan_shows_another_place():
+    config = PlaceSearchConfig()
+    leap, ahead = Leap(config), Odometry(np.array([0.3, 0.0, 0.0]), 1e-6 * np.eye(3))
+    here, there = np.array([5.0, 1.0, 0.0]), np.array([9.0, 4.0, 1.0])
+    assert not leap.is_earned(here, True)
+    leap.move(ahead)
+    assert not leap.is_earned(here + ahead.motion, True)
+    leap.move(ahead)
+    assert not leap.is_earned(there, True)
+    leap.move(ahead)
+    assert not leap.is_earned(compose(there, ahead.motion), True)
+    leap.move(ahead)
+    assert leap.is_earned(compose(there, 2.0 * ahead.motion), True)
+    leap.drop()
+    assert not leap.is_earned(here, False)
+    assert not leap.is_pending
 
 
 def test_a_robot_carried_to_another_building_is_lost_and_keeps_its_map():

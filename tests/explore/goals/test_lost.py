@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 
 import networkx as nx
+import numpy as np
 import pytest
 
+from explore.following.driving_config import DrivingConfig
 from explore.goals.decider import Decision
 from explore.goals.lost import Lost, LostConfig
 from explore.goals.replay_driver import ReplayDriver
 from explore.outcome import Outcome
-from slam.robot import MotionCommand
+from slam.robot import MotionCommand, Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 """The surroundings are stood in for."""
@@ -19,6 +21,8 @@ pytestmark = pytest.mark.usefixtures("_unchecked")
 class Around:
     is_lost: bool
     fault: str = ""
+    is_leap_pending: bool = False
+    scan: object = None
 
 
 class Inner:
@@ -36,7 +40,7 @@ class Inner:
 
 def drive(lost):
     inner = Inner()
-    driver = Lost(inner, LostConfig(turns=3 * 10.0 / 360.0))
+    driver = Lost(inner, LostConfig(turns=3 * 10.0 / 360.0), DrivingConfig())
     return inner, [driver.decide(Around(is_lost), (), nx.DiGraph()) for is_lost in lost]
 
 
@@ -82,9 +86,19 @@ def test_a_recording_that_ends_while_the_robot_is_lost_says_so(lost, outcome, wo
 
 def test_a_robot_with_a_fault_gives_up_at_once_and_says_why():
     inner = Inner()
-    driver = Lost(inner, LostConfig())
+    driver = Lost(inner, LostConfig(), DrivingConfig())
     for fault in ("", "the scans are late"):
         decision = driver.decide(Around(True, fault), (), nx.DiGraph())
     assert decision.command is None
     assert decision.outcome is Outcome.FAILED
     assert decision.words == "at step 1: the scans are late"
+
+
+@pytest.mark.parametrize(("walls_m", "forward"), [(2.0, True), (0.25, False)])
+def test_where_a_scan_fits_elsewhere_the_robot_drives_on_as_far_as_the_scan_shows_free(walls_m, forward):
+    bearings = np.linspace(-np.pi, np.pi, 90, endpoint=False)
+    scan = Scan(bearings, np.full(90, walls_m), 0.01, 4.0, 0.0)
+    decision = Lost(Inner(), LostConfig(), DrivingConfig()).decide(Around(True, "", True, scan), (), nx.DiGraph())
+    assert (decision.command.forward_m > 0.0) == forward
+    assert forward or decision.command.turn_rad > 0.0
+    assert decision.behaviour == "lost"
