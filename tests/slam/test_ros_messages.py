@@ -73,6 +73,7 @@ def test_a_scanner_inside_something_sees_it_on_both_sides():
     beams = np.arange(180)
     assert is_covered(laser_scan(1.0, np.where(beams % 3, 0.05, 0.4)))
     assert not is_covered(laser_scan(1.0, np.where(beams < 90, 0.05, 2.0))), "beside a wall"
+    assert not is_covered(laser_scan(1.0, np.where(beams % 90 < 2, 0.05, 2.0))), "four beams and those opposite"
     assert not is_covered(laser_scan(1.0, np.zeros(180))), "a driver's word for nothing"
     assert not is_covered(laser_scan(1.0, np.full(60, 0.05), low=-0.5, step=1.0 / 60)), "a sector has no opposite side"
 

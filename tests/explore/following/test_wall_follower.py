@@ -204,6 +204,48 @@ def test_where_no_step_is_safe_at_the_standoff_nearer_places_are_tried(hall_with
     np.testing.assert_allclose(-aside, np.repeat(nearer, 2), atol=1e-9)
 
 
+def test_what_stands_in_the_way_unseen_turns_it_back_on_its_track_only():
+    follower = WallFollower(0, TAIL, CONFIG)
+    follower.interrupt(None)
+    assert follower.behaviour is Behaviour.APPROACH
+    assert follower._on_track(TRACK, 1.0, 0.4)
+    follower.interrupt(None)
+    follower.interrupt(None)
+    assert (follower.behaviour, follower.ping_pongs) == (Behaviour.REVERSE, 1)
+
+
+def test_over_floor_that_was_not_seen_its_steps_are_short(hall_with_board):
+    pose = np.array([4.0, 3.0 - STANDOFF_M, np.pi])
+    finder, floor = RangeFinder(hall_with_board.faces, LidarConfig()), FreeSpace()
+    scan, steps = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0), []
+    floor.integrate(np.array([7.0, 5.0, 0.0]), Scan(finder.bearings_rad, np.full(180, 0.3), 0.01, 4.0, 0.0))
+    for seen in (hall_with_board.grid, floor):
+        around = Surroundings(hall_with_board.walls(pose), seen, scan)
+        steps.append(WallFollower(7, HEAD, CONFIG).command(around).forward_m)
+    assert steps[0] > CONFIG.driving.slow_m == steps[1]
+
+
+@pytest.mark.parametrize("trouble", ["", "no way leads there"])
+def test_an_approach_that_comes_as_near_as_the_floor_allows_is_followed_one_in_trouble_is_not(
+    hall_with_board, monkeypatch, trouble
+):
+    class Arrived:
+        def __init__(self, *_):
+            self.trouble = trouble
+
+        def command(self, around):
+            return None
+
+    monkeypatch.setattr(module, "PlaceErrand", Arrived)
+    pose = np.array([4.0, 3.0 - 1.6 * STANDOFF_M, np.pi])
+    finder, follower = RangeFinder(hall_with_board.faces, LidarConfig()), WallFollower(7, HEAD, CONFIG)
+    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
+    command = follower.command(Surroundings(hall_with_board.walls(pose), hall_with_board.grid, scan))
+    assert (command is None) == bool(trouble)
+    assert follower.trouble == trouble
+    assert follower._is_on_track == (not trouble)
+
+
 def test_a_wall_that_is_gone_is_not_followed(scene_of):
     scene = scene_of(0)
     follower = WallFollower(999, None, CONFIG)

@@ -118,10 +118,16 @@ def test_the_motions_are_those_of_the_scanner_on_the_robot(tmp_path, offset):
 
 
 def test_a_corrected_path_beside_the_wheels_is_no_place_of_the_scanner(tmp_path):
-    lines = [flaser(0.2 * k, laser=(0.2 * k, 0.02 * k, 0.01 * k)) for k in range(6)]
+    lines = [flaser(0.2 * k, laser=(0.1 + 0.2 * k, 0.02 * k, 0.01 * k)) for k in range(6)]
     log = read(tmp_path, lines)
     assert not log.scanner_on_robot.any()
     np.testing.assert_allclose(log.recording.odometry[1:, 1], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("ahead_m", "found_m"), [(1.9, 1.9), (2.1, 0.0)])
+def test_no_scanner_sits_farther_than_two_metres_from_the_middle_of_its_robot(tmp_path, ahead_m, found_m):
+    log = read(tmp_path, [flaser(0.2 * k, laser=(ahead_m + 0.2 * k, 0.0, 0.0)) for k in range(6)])
+    np.testing.assert_allclose(log.scanner_on_robot, [found_m, 0.0, 0.0], atol=1e-9)
 
 
 def test_robotlaser_tells_its_beams_its_range_and_where_it_sits(tmp_path):

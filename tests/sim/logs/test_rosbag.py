@@ -112,6 +112,16 @@ def test_scans_without_odometry_are_no_recording_unless_somebody_tells_their_mot
             bag.transform(1.0, "base", "laser", (0, 0, 0))
     with pytest.raises(RecordingError, match="expected odometry, found none"):
         read_recorded_log(tmp_path / "a.bag")
+    notes = []
+    assert len(list(rosbag.read_bag(tmp_path / "a.bag", notes=notes))) == 1
+    assert "the scans alone tell the motion" in notes[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_motion_of_a_scanner_is_that_of_the_robot_seen_from_where_it_sits(seed):
+    motion, place = np.random.default_rng(seed).normal(size=(2, 3))
+    by_scanner = compose(place, rosbag._at_scanner(motion, place).motion)
+    np.testing.assert_allclose(by_scanner, compose(motion, place), atol=1e-9)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9])
