@@ -56,6 +56,18 @@ def test_by_building_it_is_students_interval_of_the_buildings_means():
     assert estimate({(f"b{k}", seed): float(k) for k in range(LEAST - 1) for seed in range(3)}).low_buildings is None
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_building_counts_by_its_runs(seed):
+    """Against a jackknife of the buildings, of which some have many runs and some few."""
+    rng = np.random.default_rng(seed)
+    groups = [rng.normal() + 0.1 * rng.normal(size=n) for n in (2, 2, 3, 3, 4, 4, 5, 20, 40, 60)]
+    found = estimate({(f"b{k}", run): x for k, group in enumerate(groups) for run, x in enumerate(group)})
+    without = np.array([np.concatenate(groups[:k] + groups[k + 1 :]).mean() for k in range(10)])
+    error = np.sqrt(9 / 10 * np.sum((without - without.mean()) ** 2))
+    stated = (found.high_buildings - found.low_buildings) / 2 / stats.t.ppf(0.975, 9)
+    assert 0.6 < stated / error < 1.1
+
+
 def test_over_runs_it_is_welchs_test_of_the_buildings_sum():
     """Of two buildings of equally many runs the mean is half of the sum: Welch's test of one and minus the other."""
     one, other = np.random.default_rng(3).normal(size=(2, 8)) * [[1.0], [5.0]]
