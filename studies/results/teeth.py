@@ -43,7 +43,7 @@ STILL_SIGMAS = 1e-6, 1e-6, 1e-7
 WHEELS = 0.0044, 0.0019, float(np.deg2rad(0.19))
 """Standard deviations along m, across m, of the heading rad in one metre; they grow with the square root of the way."""
 TOLD: tuple[Literal["all", "R/2", "Q/2"], ...] = ("all", "R/2", "Q/2")
-DRAWN = 2000
+DRAWN = 1000
 """Campaigns drawn from all runs together."""
 
 

@@ -184,13 +184,15 @@ def test_halves_of_a_noise_are_found_out_from_the_start_and_not_by_the_plain_pos
 
 @pytest.mark.long
 def test_of_100_campaigns_95_reject_half_a_noise_and_5_a_true_filter(capsys):
-    TeethStudy(backends=("invariant-ekf",), first_seed=10_001, jobs=1).run()
+    """Shares: of 40 campaigns each with half of a noise, and of all that can be drawn from 1,000 true runs."""
+    TeethStudy(("invariant-ekf",), ("R/2", "Q/2"), campaigns=40, first_seed=10_001, jobs=1).run()
+    TeethStudy(("invariant-ekf",), ("all",), campaigns=50, first_seed=10_001, jobs=1).run()
     rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if "invariant-ekf" in line]
     found = {row[2].strip(): row[4].split() for row in rows}
-    assert int(found["R/2"][0]) >= 95
-    assert int(found["Q/2"][0]) >= 95
-    # A hundred campaigns know a share of 5 % to 4 % only; of the two thousand drawn from their runs it is told.
-    assert int(found["all"][0]) <= 11
+    assert int(found["R/2"][0]) >= 38
+    assert int(found["Q/2"][0]) >= 38
+    # Fifty campaigns know a share of 5 % to 6 % only; of the thousand drawn from their runs it is told.
+    assert int(found["all"][0]) <= 7
     assert 3.0 <= float(found["all"][-1]) <= 7.0
 
 
