@@ -3,9 +3,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from sim.robot import SimulatedRobot
+from sim.robot import RobotConfig, SimulatedRobot
 from slam.geometry.lines import distance_to_segments
-from slam.robot import MotionCommand, Robot
+from slam.robot import MotionCommand, Robot, ScannerSpec
 
 
 @dataclass(frozen=True)
@@ -124,3 +124,44 @@ def test_time_goes_on_and_the_record_follows_the_scans():
     assert robot.record.drive_time_s == pytest.approx(0.5)
     assert len(robot.record.poses_world) == len(robot.record.faces_of_beams) == 2
     assert np.all((robot.record.faces_of_beams[0] >= 0) == np.isfinite(first.ranges_m))
+
+
+def test_way_and_time_of_the_record_add_up_over_all_drives():
+    robot, way, times = SimulatedRobot(room(), seed=2), 0.0, []
+    for _ in range(4):
+        before = robot.true_pose
+        robot.drive(MotionCommand(0.1, 0.3))
+        way += np.hypot(*(robot.true_pose - before)[:2])
+        times.append(robot.record.drive_time_s)
+    assert robot.record.path_length_m == pytest.approx(way)
+    assert times == pytest.approx(times[0] * np.arange(1, 5))
+    assert times[0] > 0.0
+
+
+def test_a_body_touches_what_is_in_its_way_from_anywhere():
+    """The robot looks at the faces about the cell that it is in alone: a post before it, all over a plane.
+
+    Where it stops it touches nothing, and it stops where its way would lead into the post.
+    """
+    rng, touched = np.random.default_rng(4), 0
+    for seed in range(150):
+        start = np.append(rng.uniform(-4.0, 4.0, 2), rng.uniform(-np.pi, np.pi))
+        radius, toward = RobotConfig().radius_m, start[2] + rng.uniform(-0.8, 0.8)
+        at = start[:2] + (radius + rng.uniform(0.02, 0.2)) * np.array([np.cos(toward), np.sin(toward)])
+        post = np.array([[at, at + np.array([0.01, 0.0])]])
+        robot = SimulatedRobot(Room(post, start), seed, errorless=True)
+        told = robot.drive(MotionCommand(0.15, 0.0))
+        way = start[:2] + np.linspace(0.0, 0.15, 301)[:, None] * [np.cos(start[2]), np.sin(start[2])]
+        clear = distance_to_segments(way, post).min()
+        assert distance_to_segments(robot.true_pose[None, :2], post).min() >= radius
+        if abs(clear - radius) > 1e-3:
+            assert told.touched == (clear < radius)
+            touched += told.touched
+    assert 50 < touched < 140
+
+
+def test_a_scanner_off_the_axle_sees_from_where_it_sits():
+    config = RobotConfig(scanner=ScannerSpec(0.1, 0.0, 0.0))
+    scan = SimulatedRobot(room(), seed=1, errorless=True, config=config).sense()
+    ahead, behind = np.argmin(np.abs(scan.bearings_rad)), np.argmax(np.abs(scan.bearings_rad))
+    assert scan.ranges_m[[ahead, behind]] == pytest.approx([1.9, 2.1], abs=1e-9)
