@@ -7,10 +7,16 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from slam.backends.blocks.intersection_ekf import IntersectionMap
-from slam.estimation.models import Linear
+from slam.estimation.models import Initialisation, Linear, Motion
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
+
+
+def unrelated(lines):
+    """Return new lines whose error has nothing of the pose's."""
+    none = np.zeros((lines, 2))
+    return Initialisation(none, none, np.zeros((lines, 2, 3)), np.tile(np.eye(2), (lines, 1, 1)))
 
 
 def blocks(rng, lines=3):
@@ -21,9 +27,9 @@ def blocks(rng, lines=3):
     map_ = IntersectionMap(np.zeros(3), true[:3, :3])
     rows = np.arange(lines)
     covs = true[3:, 3:].reshape(lines, 2, lines, 2)[rows, :, rows, :]
-    map_.append(np.zeros((lines, 2)), np.zeros((lines, 2)), np.zeros((lines, 2, 3)), covs)
+    map_.append(unrelated(lines), covs)
     fresh = np.diag(rng.uniform(0.1, 1.0, 3))
-    map_.move(np.zeros(3), np.eye(3), fresh)
+    map_.move(Motion(np.zeros(3), np.eye(3), np.eye(3)), fresh)
     true[:3, :3] += fresh
     noise = rng.standard_normal((2 * lines, 2 * lines))
     H = rng.standard_normal((2 * lines, size))
@@ -92,7 +98,7 @@ def test_walls_in_several_pieces_leave_an_update_that_can_be_solved():
         lines, seen = 6, np.array([0, 0, 1, 2, 3, 3, 4, 5])
         map_ = IntersectionMap(np.zeros(3), np.diag([3e-4, 4e-4, 6e-4]))
         covs = np.array([np.diag(10.0 ** rng.uniform([-5.3, -4.0], [-1.8, -3.4])) for _ in range(lines)])
-        map_.append(np.zeros((lines, 2)), np.zeros((lines, 2)), np.zeros((lines, 2, 3)), covs)
+        map_.append(unrelated(lines), covs)
         H, R = np.zeros((len(seen), 2, 3 + 2 * lines)), np.zeros(2 * len(seen))
         for k, row in enumerate(seen):
             H[k, 0, 2], H[k, 0, 3 + 2 * row], H[k, 1, 4 + 2 * row] = -1.0, 1.0, 1.0
