@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from slam.geometry.poses import inverse, to_world
-from slam.geometry.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Place, Share, Weight
+from slam.geometry.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Offset, Share, Times
 
 from .chance import Chance, Channel
 from .drive import Slip
@@ -38,15 +38,15 @@ class FaultsConfig:
     """How far a bump turns the robot rad; the wheels report nothing of it."""
     moving: Share = 0.0
     """Share of the scans that are taken over the end of the drive, not after it; nobody corrects them for that."""
-    slip: Weight = 1.0
+    slip: Times = 1.0
     """How many times as far as stated the wheels slip."""
-    scanner_ahead_m: Place = 0.0
+    scanner_ahead_m: Offset = 0.0
     """How much farther ahead than stated the scanner sits m."""
-    scanner_left_m: Place = 0.0
+    scanner_left_m: Offset = 0.0
     """How much farther to the left m."""
     scanner_turned_rad: Heading = 0.0
     """By how much more than stated it is turned rad, counter-clockwise."""
-    range_bias_m: Place = 0.0
+    range_bias_m: Offset = 0.0
     """How much too long each range is m."""
     range_scale: Factor = 1.0
     """How many times too long each range is."""

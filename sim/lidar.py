@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals, through
-from slam.geometry.quantities import Beams, Count, Deviation, Share, Size, View
+from slam.geometry.quantities import Beams, Count, Deviation, Share, Sight, Size, View
 
 from .kernels import nearest, seen_from
 
@@ -19,7 +19,7 @@ class LidarConfig:
     """Number of beams."""
     fov_rad: View = 2 * np.pi
     """Field of view rad: a full turn without repeating its end, or anything less with both ends included."""
-    range_max_m: Size = 4.0
+    range_max_m: Sight = 4.0
     """Returns beyond this m are rejected."""
     sigma_m: Deviation = 0.010
     """Standard deviation m of the radial error of one beam."""

@@ -26,6 +26,8 @@ Factor: TypeAlias = Annotated[float, Meta(ge=1e-9, le=1e9)]
 """How many times."""
 Weight: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e9)]
 """A cost, a gain, or a factor that may be nothing."""
+Times: TypeAlias = Annotated[float, Meta(ge=0.0, le=100.0)]
+"""As much as stated; it may be nothing."""
 Sigmas: TypeAlias = Annotated[float, Meta(ge=1e-3, le=1e6)]
 """So many standard deviations."""
 
@@ -33,6 +35,8 @@ Size: TypeAlias = Annotated[float, Meta(ge=1e-3, le=1e6, extra_json_schema=_M)]
 """Of a cell, a step, a body, a range: something that others are divided by or made of."""
 Body: TypeAlias = Annotated[float, Meta(ge=1e-3, le=10.0, extra_json_schema=_M)]
 """Of a robot, a person, or one step of theirs."""
+Sight: TypeAlias = Annotated[float, Meta(ge=1e-3, le=200.0, extra_json_schema=_M)]
+"""How far a scanner sees."""
 Pitch: TypeAlias = Annotated[float, Meta(ge=1e-4, le=1e6, extra_json_schema=_M)]
 """Between places that are tried one after the other."""
 Distance: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e6, extra_json_schema=_M)]
@@ -40,7 +44,12 @@ Distance: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e6, extra_json_schema=_M
 Deviation: TypeAlias = Annotated[float, Meta(ge=1e-6, le=1e6, extra_json_schema=_M)]
 """A standard deviation that weights are made of."""
 Place: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7, extra_json_schema=_M)]
-"""A coordinate, or an offset to either side."""
+"""A coordinate."""
+
+Offset: TypeAlias = Annotated[float, Meta(ge=-10.0, le=10.0, extra_json_schema=_M)]
+"""Of a device on its robot."""
+Slip: TypeAlias = Annotated[float, Meta(ge=0.0, le=1.0, extra_json_schema=_M)]
+"""A standard deviation of the wheels; it may be nothing."""
 
 Angle: TypeAlias = Annotated[float, Meta(ge=0.0, le=pi, extra_json_schema=_RAD)]
 """Between two directions, whichever is first; it may be nothing."""

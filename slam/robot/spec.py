@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.quantities import Body, Heading, Place, Turn, fault
+from ..geometry.quantities import Body, Heading, Offset, Turn, fault
 from .errors import RobotError
 from .wheels import WheelSpec
 
@@ -20,9 +20,9 @@ TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
 class ScannerSpec:
     """Where the range finder sits, in the robot frame: the origin is the middle of the axle, x points ahead."""
 
-    x_m: Place = 0.0
+    x_m: Offset = 0.0
     """Ahead of the axle."""
-    y_m: Place = 0.0
+    y_m: Offset = 0.0
     """To the left."""
     heading_rad: Heading = 0.0
     """Where its bearing zero points, counter-clockwise from straight ahead."""

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..geometry.poses import arc, compose, inverse, rotation
-from ..geometry.quantities import Body, Distance
+from ..geometry.quantities import Body, Slip
 from .messages import Odometry
 
 
@@ -17,11 +17,11 @@ class WheelSpec:
 
     base_m: Body = 0.4
     """Distance m between the wheels."""
-    slip: Distance = 0.02
+    slip: Slip = 0.02
     """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
-    lateral_slip: Distance = 0.006
+    lateral_slip: Slip = 0.006
     """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
-    floor: Distance = 1e-6
+    floor: Slip = 1e-6
     """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
 
     def ways(self, forward_m: float, turn_rad: float) -> tuple[float, float]:
