@@ -87,7 +87,7 @@ class FaultsStudy:
     """Number of processes."""
     any_code: bool = False
     """Whether rows of other versions of the code count, too."""
-    out: Path = Path("studies/results/rows/in_text/robots.jsonl")
+    out: Path = Path("studies/robots/rows.jsonl")
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
     page: Path = Path("docs/robots.md")
     """Where the table goes."""
