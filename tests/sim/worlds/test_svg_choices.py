@@ -4,8 +4,11 @@ import gzip
 
 import numpy as np
 import pytest
+import shapely
 
 from sim.worlds import DrawingOptions, World, WorldError, load
+from sim.worlds.readers.svg.reader import read_svg
+from sim.worlds.solid import solid_of
 from tests.fuzzing.drawn_svg import UNKNOWN
 
 INKSCAPE = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
@@ -124,3 +127,22 @@ def test_a_compressed_file_is_read_and_a_cut_one_refused(tmp_path):
     (tmp_path / "a.svgz").write_bytes(gzip.compress(bytes(70 * 2**20)))
     with pytest.raises(WorldError, match="64 MB"):
         load(tmp_path / "a.svgz")
+
+
+def _is_wall_in_the_middle(body: str) -> bool:
+    return bool(shapely.intersects_xy(solid_of(read_svg(f"{HEAD}{ROOM}{body}</svg>".encode())), 5.0, 4.0))
+
+
+@pytest.mark.parametrize("broad_m", [0.1, 0.2])
+@pytest.mark.parametrize(("share", "stands"), [(0.65, True), (0.75, False)])
+def test_a_stroke_of_which_more_than_seven_tenths_are_hidden_is_no_wall(broad_m, share, stands):
+    """One side of its width, from end to end."""
+    stroke = f'<path d="M2 4H8" stroke="black" stroke-width="{broad_m}"/>'
+    hiding = f'<rect x="1.5" y="{4 - broad_m / 2}" width="7" height="{share * broad_m}" fill="white"/>'
+    assert _is_wall_in_the_middle(stroke + hiding) == stands
+
+
+@pytest.mark.parametrize(("grey", "stands"), [("#404040", True), ("#a8a8a8", True), ("#bcbcbc", False)])
+def test_what_is_darker_than_seven_tenths_of_white_is_wall(grey, stands):
+    """A grey of 168 of 255 is, one of 188 is not."""
+    assert _is_wall_in_the_middle(f'<rect x="4" y="3" width="2" height="2" fill="{grey}"/>') == stands

@@ -180,3 +180,16 @@ def test_of_a_scanner_off_the_axle_the_motion_is_that_of_the_body():
     true = np.array([compose(inverse(before), after) for before, after in pairwise(poses)])
     assert np.abs(errors_of(told[0], true)[:, :2]).max() < 0.012
     assert np.abs(errors_of(told[1], true)[:, :2]).max() > 0.03, "without its place the scanner's own motion is told"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_scan_with_nothing_in_common_with_those_before_it_takes_the_motion_of_the_wheels(seed):
+    """Points strewn at random where the room before was seen free: wherever they are laid, few lie on its walls."""
+    rng, matcher = np.random.default_rng(seed), ScanMatcher(ScanMatchingConfig())
+    first = scan_at(ROOM, walk()[0])
+    matcher.begin(first)
+    strewn = Scan(first.bearings_rad, rng.uniform(0.2, 0.6, len(first.ranges_m)), 0.01, 4.0, 0.0)
+    wheels = Odometry(np.array([0.1, 0.02, 0.05]), WHEELS_COV)
+    told = matcher.match(strewn, wheels)
+    np.testing.assert_array_equal(told.motion, wheels.motion)
+    np.testing.assert_array_equal(told.cov, wheels.cov)
