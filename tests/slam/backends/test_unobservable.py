@@ -122,11 +122,11 @@ class Recorder(DenseMap):
         if self.transition is not None:
             self.transition = part @ self.transition
 
-    def move(self, pose_world, F, Q):
-        super().move(pose_world, F, Q)
+    def move(self, motion, Q):
+        super().move(motion, Q)
         if self.transition is not None:
             whole = np.eye(len(self.transition))
-            whole[:3, :3] = F
+            whole[:3, :3] = motion.F
             self._then(whole)
 
     def shear(self, by_pose, by_line):
