@@ -17,8 +17,8 @@ ROUNDS = 30
 """Of finding weights. Any are safe; after so many the trace is within hundredths of the least."""
 LONGEST = 10.0
 """How far weights are extrapolated, in rounds."""
-LEAST_WEIGHT = 1e-9
-"""A smaller one makes noise of less than a millionth of what it divides: nothing is left of it, and S is singular."""
+LEAST_WEIGHT = 1e-11
+"""Next to a smaller one nothing is left of the noise of two pieces of one wall, and S is singular."""
 
 
 class IntersectionMap(BlockMap):
