@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from slam.evaluation.consistency import pose_errors
-from viz.figures.floor_plan import Dimension, floor_plan
+from viz.floor_plan import Dimension, floor_plan
 
 from ..scenario import TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis

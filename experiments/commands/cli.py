@@ -8,6 +8,8 @@ from dataclasses import dataclass, make_dataclass, replace
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
+from ..artifacts.files import json_bytes
+from ..terminal.answers import Output, answering
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks, too_late
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
 from ..terminal.word_order import with_files
@@ -142,7 +144,9 @@ def _is_lost(out: Lasting | None) -> bool:
 
 def _run(arguments: Sequence[str] | None) -> int:
     try:
-        return _parse(arguments).run()
+        command, output = _parse(arguments)
+        with answering(output, json_bytes):
+            return command.run()
     except UsageError as error:
         _tell(error)
         return error.exit_status
@@ -171,8 +175,8 @@ def _tell(message: object) -> None:
     print(f"chainslam: {one_line(message)}", file=sys.stderr)
 
 
-def _parse(arguments: Sequence[str] | None) -> Command:
-    """Return the command that the arguments name; raises UsageError, in one line, where they make none."""
+def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
+    """Return the command that the arguments name, and what it is to print; raises UsageError, in one line."""
     words = [_at_home(word) for word in (sys.argv[1:] if arguments is None else arguments)]
     if words in (["--version"], ["-V"], ["version"]):
         from importlib.metadata import version  # takes as long as the rest of the help
@@ -184,9 +188,10 @@ def _parse(arguments: Sequence[str] | None) -> Command:
         choose("command", words[0], COMMANDS)
     _refuse_empty(words)
     classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
-    command = with_files(parsed(words, classes, f"{ABOUT} --version tells which version this is."))
+    made, output = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
+    command = with_files(made)
     asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
-    return asked
+    return asked, output
 
 
 def _at_home(word: str) -> str:

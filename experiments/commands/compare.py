@@ -27,6 +27,7 @@ from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened
 from ..replays.replay import Association
 from ..scenario import P0, load_world
+from ..terminal.answers import found
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED
 from ..terminal.progress import print_pooled
@@ -173,7 +174,9 @@ class Compare:
         print(tally.words())
         arm = decisive_arm(campaign)
         print_pooled([row for row in said["pooled"] if row["arm"] == arm], f"means over the runs, {ARMS_SHORT[arm]}")
-        for words in story_of(campaign, said).verdict:
+        verdict_words = story_of(campaign, said).verdict
+        found(verdict=list(verdict_words), folder=str(self.out))
+        for words in verdict_words:
             say(words)
         for words in left_out(campaign, said):
             print(words)
@@ -194,7 +197,10 @@ class Compare:
             merge(self.merge, self.out)
         else:
             contrast(*self.against, self.out)
-            for words in verdict(read_contrast(self.out)):
+            told = verdict(read_contrast(self.out))
+            found(verdict=list(told))
+            for words in told:
                 print(words)
+        found(folder=str(self.out))
         say(f"results in {self.out}")
         return 0

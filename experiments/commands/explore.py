@@ -36,6 +36,7 @@ from ..artifacts.settings import (
     trial_of,
 )
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..terminal.answers import found
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import print_summary, progress
@@ -281,6 +282,7 @@ class Explore:
 def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
     """Print what came of a run, and return the exit status."""
     print_summary(result.summary)
+    found(folder=str(folder))
     say(f"results in {folder}")
     if result.ending.exit_status:
         say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)

@@ -12,6 +12,8 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from ..terminal.answers import found
+
 
 @dataclass(frozen=True)
 class Worlds:
@@ -72,9 +74,9 @@ class Completion:
     def run(self) -> int:
         """Print the script and return the exit status."""
         from .cli import COMMANDS
-        from .parsing import readable
+        from .parsing import typed
 
-        classes: dict[str, Callable[..., Any]] = {name: readable(entry.load()) for name, entry in COMMANDS.items()}
+        classes: dict[str, Callable[..., Any]] = {name: typed(entry.load()) for name, entry in COMMANDS.items()}
         script = _completed(_tyros(classes, "bash" if self.shell == "fish" else self.shell))
         if self.shell == "fish":
             script = "\n".join(_fish({name: COMMANDS[name].words for name in classes}, _spec(script)))
@@ -134,6 +136,7 @@ def _fish(about: dict[str, str], spec: dict[str, Any]) -> list[str]:
 
 
 def _print(descriptions: dict[str, str]) -> int:
+    found(names=descriptions)
     width = max(len(name) for name in descriptions)
     for name, description in descriptions.items():
         print(f"{name:<{width}}  {description}")

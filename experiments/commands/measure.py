@@ -3,7 +3,7 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -11,6 +11,7 @@ from rich.table import Table
 from ..artifacts.maps.mapped import MappedCorners, read_corners
 from ..artifacts.saved import read_config
 from ..scoring.measurements import Measured
+from ..terminal.answers import found
 from ..terminal.console import plain_console
 from ..usage import UsageError
 
@@ -35,6 +36,7 @@ class Measure:
         first, second = (_corner(name, mapped, self.folder) for name in self.corners)
         measured = mapped.distance(first, second)
         low, high = measured.interval
+        found(distance_m=measured.value, sigma_m=measured.sigma, interval_m=[low, high])
         print(
             f"corner {first} to corner {second}: {measured.value:.3f} m, 95 % interval {low:.3f} to {high:.3f} m"
             f" (sigma {1e3 * measured.sigma:.1f} mm{_estimator(self.folder)})"
@@ -54,6 +56,10 @@ def _corner(name: str, mapped: MappedCorners, folder: Path) -> int:
 
 def _list(mapped: MappedCorners, folder: Path) -> None:
     console = plain_console(width=None)
+    found(
+        corners=[_corner_record(mapped, k) for k in range(len(mapped))],
+        rooms=[_room_record(mapped, room) for room in mapped.rooms],
+    )
     corners = Table(title=f"corners of {folder}{_estimator(folder)}", title_justify="left")
     for title in ("corner", "x m", "y m", "sigma mm", "walls", "chain"):
         corners.add_column(title, justify="right")
@@ -74,6 +80,23 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         values = (_words(mapped.area(room)), _words(mapped.perimeter(room)))
         rooms.add_row(str(room.chain), kind, str(len(room.corners)), *values)
     console.print(rooms)
+
+
+def _corner_record(mapped: MappedCorners, k: int) -> dict[str, Any]:
+    cov = mapped.points.cov[k, :, k] if mapped.sharp[k] else None
+    return {
+        "corner": k, "position_m": mapped.points.positions_world[k], "cov_m2": cov, "walls": list(mapped.walls[k]),
+        "chain": mapped.chains[k],
+    }  # fmt: skip
+
+
+def _room_record(mapped: MappedCorners, room: Any) -> dict[str, Any]:
+    area, length = mapped.area(room), mapped.perimeter(room)
+    return {
+        "chain": room.chain, "is_island": room.is_island, "corners": len(room.corners),
+        "area_m2": area.value, "area_interval_m2": list(area.interval),
+        "length_m": length.value, "length_interval_m": list(length.interval),
+    }  # fmt: skip
 
 
 def _words(measured: Measured) -> str:

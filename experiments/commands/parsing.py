@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, g
 
 import tyro
 
+from ..terminal.answers import Output
 from ..terminal.word_order import in_order, swallowed
 from ..usage import UsageError, choose, did_you_mean
 
@@ -31,13 +32,14 @@ NO_NUMBER = re.compile(
 BOX = " |│╭╮╰╯─+\n"
 """What tyro draws boxes with; where there are no letters for them, it draws lines of dashes."""
 HELP = "-h", "--help"
+COMMON = "--json", "--quiet"
 MISSING = re.compile(r"Missing from [^:]*: (--\S+ \S+|\S+)|Missing value for argument '(\w+)'")
 """How tyro says that a word is not there."""
 
 
-def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> Any:
-    """Return the command that some words name; raises UsageError, in one line, where they make none."""
-    known: dict[str, Callable[..., Any]] = {name: readable(command) for name, command in commands.items()}
+def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> tuple[Any, Output]:
+    """Return the command that some words name, and what it is to print; raises UsageError, in one line."""
+    known: dict[str, Callable[..., Any]] = {name: typed(command) for name, command in commands.items()}
     asked = commands.get(words[0]) if words else None
     said = io.StringIO()
     if asked is not None:
@@ -50,10 +52,25 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> An
             raise
         raise UsageError(_told(_first_words(said.getvalue()), words, asked)) from leaving
     assert asked is not None
+    if made.json and made.quiet:
+        raise UsageError("expected --json or --quiet, found both: leave one of them out")
+    output = Output.JSON if made.json else Output.NOTHING if made.quiet else Output.WORDS
     try:
-        return _as(asked, made)
+        return _as(asked, made), output
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+def typed(command: type) -> type:
+    """Return a command as it is typed: its readable class, with the options that every command has."""
+    told = {"json": "Print what was found as JSON, and no words.", "quiet": "Print nothing but errors."}
+    flag = cast(Any, tyro.conf.FlagCreatePairsOff)[bool]
+    common = [
+        (name, Annotated[flag, tyro.conf.arg(help=words, help_behavior_hint="")], field(default=False))
+        for name, words in told.items()
+    ]
+    bases, own = (readable(command),), {"__doc__": command.__doc__}
+    return make_dataclass(command.__name__, common, bases=bases, frozen=True, namespace=own)
 
 
 def _as(kind: type, made: Any) -> Any:
@@ -156,7 +173,7 @@ def _told(message: str, words: Sequence[str], command: type | None) -> str:
         options = [word.partition("=")[0] for word in rest if word.startswith("-")]
         if not options:
             return f"expected no more words for {name}, found {rest[0]!r}: {see}"
-        near = did_you_mean(options[0], [*options_of(command), *HELP])
+        near = did_you_mean(options[0], [*options_of(command), *COMMON, *HELP])
         return f"expected an option of {name}, found {options[0]}{near}: {see}"
     if missing := MISSING.match(message):
         took = swallowed(words, command)

@@ -23,6 +23,7 @@ from ..replays.replay import Association, ReplayOptions, read_run, retuned
 from ..replays.sources import OwnLog, RealLog
 from ..scenario import OdometrySource, load_world
 from ..scoring.without_truth.references import read_references
+from ..terminal.answers import found
 from ..terminal.console import say
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.measured_tables import print_references
@@ -125,6 +126,7 @@ class Replay:
             elif outcome == Outcome.FAILED:
                 say(f"chainslam: failed: {words}", stderr=True)
         print_references(summaries)
+        found(folder=str(out))
         print(f"results in {out}")
         for problem in problems:
             print(f"chainslam: not written: {problem}", file=sys.stderr)

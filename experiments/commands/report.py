@@ -12,6 +12,7 @@ from ..artifacts.files import replacing, write
 from ..campaign.contrast import CONTRAST
 from ..campaign.pages.contrast_page import contrast_page
 from ..campaign.pages.page import page_of
+from ..terminal.answers import found
 from ..usage import UsageError
 from ..views.gif import gif_of
 from ..views.run_page import is_run, run_page
@@ -34,15 +35,18 @@ class Report:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
         replaced = replacing(self.folder / REPORT)
         page = self.write()
+        found(report=str(self.folder / REPORT))
         print(f"report in {self.folder / REPORT}{replaced}")
         if self.latex:
             tables = [table for section in page.sections for table in section.tables]
             replaced = replacing(self.folder / TABLES)
             write(self.folder / TABLES, latex(tables))
+            found(tables=str(self.folder / TABLES))
             print(f"tables in {self.folder / TABLES}{replaced}")
         if self.gif:
             replaced = replacing(self.folder / GIF)
             write(self.folder / GIF, gif_of(self.folder))
+            found(animation=str(self.folder / GIF))
             print(f"animation in {self.folder / GIF}{replaced}")
         return 0
 

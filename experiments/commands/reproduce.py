@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -15,6 +15,7 @@ from ..artifacts.files import json_bytes, replacing, write
 from ..artifacts.run_folder import prepare
 from ..reproductions import REPRODUCTIONS, Reproduction
 from ..reproductions.reproduction import Value
+from ..terminal.answers import found
 from ..terminal.console import plain_console
 from ..terminal.progress import bar_of, duration
 from ..usage import UsageError, choose
@@ -40,7 +41,7 @@ class Reproduce:
             raise UsageError(f"expected a seed from 0 to 2^32 - 1, found {self.seed}: choose another")
         prepare(self.out)
         console = plain_console(width=max(plain_console().width, 130))
-        started = time.perf_counter()
+        started, records = time.perf_counter(), dict[str, Any]()
         for done, name in enumerate(names):
             began, worked = time.perf_counter(), time.process_time()
             with bar_of(f"{_far(done, len(names), began - started)}{name}: {REPRODUCTIONS[name].about}", None):
@@ -50,7 +51,8 @@ class Reproduce:
                 for kind in ("png", "svg"):
                     write(self.out / f"{name}.{kind}", saved(made.figure, kind))
                 command = f"chainslam reproduce {name} --seed {self.seed}"
-                write(self.out / f"{name}.json", json_bytes({"name": name, **made.record(command)}))
+                records[name] = {"name": name, **made.record(command)}
+                write(self.out / f"{name}.json", json_bytes(records[name]))
             console.print(table_of(made))
             for note in made.notes:
                 console.print(note, style="dim")
@@ -58,6 +60,7 @@ class Reproduce:
                 f"{self.out / name}.png, .svg, .json{replaced}; computing time"
                 f" {duration(time.process_time() - worked)}\n"
             )
+        found(figures=records, folder=str(self.out))
         return 0
 
 

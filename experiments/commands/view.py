@@ -18,6 +18,7 @@ from ..campaign.pages.film import record_campaign
 from ..campaign.store import read_campaigns
 from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
 from ..scenario import load_world
+from ..terminal.answers import found
 from ..terminal.console import say
 from ..usage import UsageError
 from ..views.timelines import TimelineOutput
@@ -51,6 +52,7 @@ class View:
         except ViewerError as error:
             print(f"chainslam: {error}", file=sys.stderr)
             return 1
+        found(opened=[str(file) for file in files])
         print(f"opened {', '.join(map(str, files))}")
         return 0
 
@@ -59,6 +61,7 @@ def _serve(files: list[Path]) -> int:
     """Serve recordings to a browser until the process is asked to stop; raises ViewerError."""
     viewer = WebViewer(files)
     page, data = viewer.page_port, viewer.port
+    found(url=viewer.url)
     say(f"open {viewer.url}")
     say(f"from another machine first: ssh -L {page}:127.0.0.1:{page} -L {data}:127.0.0.1:{data} {socket.gethostname()}")
     say("Ctrl-C ends it")

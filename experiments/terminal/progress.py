@@ -19,6 +19,7 @@ from rich.table import Column, Table
 from explore.step import Step
 from slam.evaluation.consistency import verdict_on_noise
 
+from .answers import found, is_quiet
 from .console import plain_console
 
 ALMOST = 0.95
@@ -60,7 +61,7 @@ def bar_of(title: str, total: float | None, *columns: ProgressColumn) -> Iterato
         TimeElapsedColumn(table_column=Column(no_wrap=True, min_width=7)),
         *left,
     )
-    with Progress(*shown, console=console, disable=not console.is_terminal, transient=True) as bar:
+    with Progress(*shown, console=console, disable=not console.is_terminal or is_quiet(), transient=True) as bar:
         yield bar, bar.add_task(title, total=total, words="")
 
 
@@ -83,6 +84,7 @@ def duration(seconds: float) -> str:
 
 def print_summary(summary: dict[str, Any]) -> None:
     """Print the one table of a run on standard output."""
+    found(summary=summary)
     noise = "errorless" if summary["errorless"] else f"seed {summary['seed']}, P0 {summary['p0']}"
     table = Table(
         title=f"{summary['world']}: {summary['backend']}, {summary['strategy']}, {noise}", title_justify="left"
@@ -214,6 +216,7 @@ def print_recorded(summaries: Sequence[dict[str, Any]], title: str) -> None:
 
 def _print_columns(summaries: Sequence[dict[str, Any]], title: str, keys: dict[str, str]) -> None:
     """Print a column for each summary, of the values under these keys, each under its name."""
+    found(summaries={summary["backend"]: summary for summary in summaries})
     table = Table(title=title, title_justify="left")
     table.add_column("", no_wrap=True)
     for summary in summaries:
@@ -231,6 +234,7 @@ def _short(value: Any) -> str:
 
 def print_pooled(rows: Sequence[dict[str, Any]], title: str) -> None:
     """Print one row for each back end of a campaign, pooled over its worlds and strategies, on standard output."""
+    found(pooled=rows)
     table = Table(title=title, title_justify="left")
     for name in ("back end", "complete", "ANEES from the start", "map ANEES", "walls cm", "path cm"):
         table.add_column(name, justify="left" if name == "back end" else "right")

@@ -7,7 +7,7 @@ import pytest
 from ezdxf import recover, units
 
 from experiments.artifacts.maps.dxf import DIMENSIONS, NOTES, OPEN_ENDS, PATH, TENTATIVE, WALLS, map_dxf
-from viz.figures.floor_plan import Dimension
+from viz.floor_plan import Dimension
 
 
 def _read(content):

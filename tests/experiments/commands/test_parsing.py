@@ -61,7 +61,7 @@ def test_what_is_nearly_a_name_is_asked_for(words, near, capsys, tmp_path, monke
     assert len(told.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize("words", [["zebra"], [*WORLD, "--quux"], [*WORLD, "--backend", "magic"], ["explore", "?"]])
+@pytest.mark.parametrize("words", [["zebra"], [*WORLD, "--xyzzy"], [*WORLD, "--backend", "magic"], ["explore", "?"]])
 def test_what_is_near_to_nothing_is_not_guessed(words, capsys):
     assert main(words) == 2
     assert "did you mean" not in capsys.readouterr().err

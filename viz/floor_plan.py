@@ -16,8 +16,7 @@ from explore.certificate import Certificate
 from slam.map.chains import Chain
 from slam.map.stochastic_map import StochasticMap
 
-from .. import palette
-from . import own_look
+from . import palette
 
 WALL_M = 0.1
 MARGIN_M = 0.8
@@ -67,7 +66,6 @@ class Dimension:
         return turn - 180.0 if turn > 90.0 else turn + 180.0 if turn <= -90.0 else turn
 
 
-@own_look()
 def floor_plan(
     walls: StochasticMap,
     chains: tuple[Chain, ...],
