@@ -17,6 +17,7 @@ from jaxtyping import Float
 from ..estimation.mounting import odometry_of_scanner
 from ..estimation.shared import SharedConfig, of_shared
 from ..geometry.poses import J, compose, rotation, wrap
+from ..geometry.quantities import Count
 from ..robot import Odometry, RobotSpec, Scan, ScannerSpec, of_robot
 from .scan_matching import told_by_scans
 
@@ -40,14 +41,14 @@ class DiagnosisConfig:
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
-    window: int = 20
+    window: Count = 20
     """Faults are tried on so many of the last scans, and on the last few of these alone."""
-    agree: int = 5
+    agree: Count = 5
     """So many scans must speak for a fault, one more for each that speaks against it. It is proved where what is stated
     is so much less likely (`shared.chance`)."""
-    rescues: int = 20
+    rescues: Count = 20
     """A map that was rescued at so many ..."""
-    within: int = 40
+    within: Count = 40
     """... of so many steps is given up, whatever the reason."""
 
 

@@ -20,7 +20,7 @@ STEPS, BEAMS = 3, 5
 def arrays_of(**changes):
     """A log of three scans of five beams."""
     arrays = {
-        "format": np.int64(2),
+        "format": np.int64(1),
         "time_s": np.arange(float(STEPS)),
         "bearings_rad": np.linspace(-1.0, 1.0, BEAMS),
         "ranges_m": np.array([[1.0, 2.0, np.inf, np.nan, 4.0]] * STEPS),
@@ -92,7 +92,7 @@ def test_what_rounding_leaves_of_a_covariance_is_one_still():
 @pytest.mark.parametrize("said", [0, 2])
 def test_a_log_of_another_format_is_refused(tmp_path, said):
     np.savez(tmp_path / "log.npz", **arrays_of(format=np.int64(said)))
-    with pytest.raises(RecordingError, match=f"format {said}, of another version, where this one reads 1"):
+    with pytest.raises(RecordingError, match=f"format {said} of another version, where this one reads 1"):
         read_log(tmp_path / "log.npz")
 
 
