@@ -85,7 +85,7 @@ class Kernel(Generic[_P, _R]):
     def _known(self) -> int:
         """Return for how many kinds of arguments numba has machine code here."""
         machine: Any = self._machine
-        return -1 if machine is None else len(machine.overloads)
+        return -1 if machine is None else len(getattr(machine, "overloads", ()))
 
     def _file(self) -> Path | None:
         """Return where the machine code is kept, or None where numba has to load it."""

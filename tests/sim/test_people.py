@@ -108,11 +108,11 @@ def test_who_stands_is_seen_touched_and_gone():
     people = PeopleConfig(standing=(1.6, 1.0), leave_s=1.0)
     world = room()
     start = np.array([1.0, 1.0, 0.0])
-    config = RobotConfig(lidar=LidarConfig(sigma_m=1e-9), faults=FaultsConfig(people=people))
+    config = RobotConfig(lidar=LidarConfig(sigma_m=1e-6), faults=FaultsConfig(people=people))
     robot = SimulatedRobot(type("Drawn", (), {"faces": world.faces, "start": start})(), 1, True, config)
     scan = robot.sense()
     ahead = int(np.argmin(np.abs(scan.bearings_rad)))
-    assert scan.ranges_m[ahead] == pytest.approx(0.4, abs=1e-6)
+    assert scan.ranges_m[ahead] == pytest.approx(0.4, abs=1e-5)
     assert robot.record.faces_of_beams[0][ahead] == -1
     reports = [robot.drive(MotionCommand(0.1, 0.0)) for _ in range(3)]
     assert [report.touched for report in reports] == [False, True, True]
@@ -126,4 +126,4 @@ def test_who_stands_is_seen_touched_and_gone():
 @pytest.mark.parametrize("wrong", [{"walking": -1}, {"standing": (1.0,)}, {"radius_m": 0.0}, {"speed_m_s": -1.0}])
 def test_people_that_cannot_be_are_told(wrong):
     with pytest.raises(RobotError, match="expected"):
-        PeopleConfig(**wrong)
+        RobotConfig(faults=FaultsConfig(people=PeopleConfig(**wrong)))

@@ -1,18 +1,24 @@
 """The table at the end of a run."""
 
 import json
-from pathlib import Path
 
 import pytest
 
+from experiments.commands.cli import main
 from experiments.terminal.progress import bar_of, duration, print_summary, total_of
 
-RUN = Path(__file__).parents[2] / "data" / "format1" / "run"
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("told") / "run"
+    assert main(["explore", "paper-fig8", "--max-steps", "3", "--out", str(folder)]) == 0
+    return (folder / "summary.json").read_text()
 
 
 @pytest.fixture
-def summary():
-    return json.loads((RUN / "summary.json").read_text())
+def summary(told, capsys):
+    capsys.readouterr()
+    return json.loads(told)
 
 
 def test_names_in_a_drawing_that_are_no_corners_get_no_row(summary, capsys):

@@ -151,8 +151,8 @@ def test_dpslam_logs_have_no_times_and_the_pose_before_each_scan(tmp_path):
     log = read(tmp_path, lines)
     np.testing.assert_allclose(log.scan_time_s, [0.0, 1.0, 2.0])
     np.testing.assert_allclose(log.recording.odometry[1:], [[0.2, 0, 0]] * 2, atol=1e-12)
-    assert read(tmp_path, [*lines, "Laser 180 1"]).left_out.first.startswith("line 7: ")
-    assert read(tmp_path, [*lines, "Odometry 1 x 0", lines[-1]]).left_out.first.startswith("line 8: line 7: ")
+    assert read(tmp_path, [*lines, "Laser 180 1"]).trouble.startswith("line 7: ")
+    assert read(tmp_path, [*lines, "Odometry 1 x 0", lines[-1]]).trouble.startswith("line 8: line 7: ")
 
 
 def test_gzip_reads_as_plain_text_does(tmp_path):
