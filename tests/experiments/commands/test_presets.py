@@ -23,11 +23,11 @@ PRESET = ("--preset", "paper-method")
 
 
 def trial(*words):
-    return _parse(["explore", "paper-fig9", *words]).trial
+    return _parse(["explore", "paper-fig9", *words])[0].trial
 
 
 def campaign(*words):
-    return _parse(["compare", "--out", "DIR", *words]).campaign
+    return _parse(["compare", "--out", "DIR", *words])[0].campaign
 
 
 def test_the_preset_is_what_the_page_says():
@@ -99,7 +99,7 @@ def test_the_campaign_holds_the_method_against_todays_mapper_on_the_same_driving
     assert paper.mission.mapper == trial(*PRESET).mission.mapper
     for words in ((), ("--set", f"{METHOD}=joint"), ("--set", "mission.mapper.matching.gate=0.9")):
         asked = campaign(*PRESET, *words)
-        assert _parse(shlex.split(command_of(asked))[1:]).campaign == asked
+        assert _parse(shlex.split(command_of(asked))[1:])[0].campaign == asked
     by_joint, on_floor = campaign(*PRESET, "--set", f"{METHOD}=joint"), campaign(*PRESET, "--navigation", "floor")
     assert of("paper-method", by_joint).mission.mapper.matching.method == "joint"
     assert of("paper-method", on_floor).mission.explorer.following.navigation == "floor"
