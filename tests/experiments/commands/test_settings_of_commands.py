@@ -28,7 +28,7 @@ def run(tmp_path_factory):
 
 def campaign(*words):
     preset = () if "--preset" in words else ("--preset", "smoke")
-    return _parse(["compare", *preset, "--out", "DIR", *words]).campaign
+    return _parse(["compare", *preset, "--out", "DIR", *words])[0].campaign
 
 
 def test_a_campaign_takes_from_a_file_what_no_option_says(tmp_path):
@@ -75,7 +75,7 @@ def test_a_group_that_may_be_none_is_switched_off_and_stays_so():
     assert gate_of(settled) == trial.mission.mapper.matching.gate == 0.9
     assert gate_of(campaign()) == 0.99
     # The command that a report names makes the same campaign.
-    assert _parse(shlex.split(command_of(settled))[1:]).campaign == settled
+    assert _parse(shlex.split(command_of(settled))[1:])[0].campaign == settled
 
 
 def test_double_entries_are_held_against_the_gate_of_the_campaign():
@@ -123,7 +123,7 @@ def test_a_replay_has_the_settings_of_its_run_until_others_are_asked_for(run, tm
     assert (changed.seed, changed.world, changed.max_steps) == (1, "paper-fig4", 3)
     mine = replayed("mine", "--config", str(path), "--set", f"{GATE}=0.8", "--set", "backend_options.ekf.at_wall=false")
     assert (mine.mission.mapper.matching.gate, mine.backend_options.ekf.at_wall) == (0.8, False)
-    page = _parse(shlex.split(run_page(tmp_path / "mine").command)[1:])
+    page = _parse(shlex.split(run_page(tmp_path / "mine").command)[1:])[0]
     assert asked(page.config, page.set, ()) == {
         "mission": {"mapper": {"matching": {"gate": 0.8}}}, "backend_options": {"ekf": {"at_wall": False}},
     }  # fmt: skip
@@ -144,4 +144,4 @@ def test_a_saved_run_goes_on_with_its_own_settings(run, more, capsys):
 
 def test_the_command_on_the_page_of_a_run_names_its_settings(run):
     trial = read_trial(run / "config.json")
-    assert _parse(shlex.split(run_page(run).command)[1:]).trial == trial
+    assert _parse(shlex.split(run_page(run).command)[1:])[0].trial == trial

@@ -72,10 +72,10 @@ def test_a_run_without_a_step_and_a_lost_file_are_told_in_words(run, tmp_path, c
     ],
 )
 def test_the_command_on_the_page_makes_the_very_run(tmp_path, more):
-    trial = _parse(["explore", "my hall.svg", *more.split()]).trial
+    trial = _parse(["explore", "my hall.svg", *more.split()])[0].trial
     (tmp_path / "config.json").write_bytes(json_bytes(config_record(trial)))
     (tmp_path / "summary.json").write_text(json.dumps({"format": FORMAT, "status": "failed", "reason": "", "steps": 0}))
-    assert _parse(shlex.split(run_page(tmp_path).command)[1:]).trial == trial
+    assert _parse(shlex.split(run_page(tmp_path).command)[1:])[0].trial == trial
 
 
 def test_a_replay_says_what_the_truth_took_the_place_of(run, tmp_path):
@@ -84,7 +84,7 @@ def test_a_replay_says_what_the_truth_took_the_place_of(run, tmp_path):
     assert main(words) == 0
     page = run_page(tmp_path)
     assert page.question.startswith("A recorded drive with true matches and odometry in paper-fig4")
-    said, given = _parse(shlex.split(page.command)[1:]), _parse(words)
+    said, given = _parse(shlex.split(page.command)[1:])[0], _parse(words)[0]
     assert replace(said, log=given.log, out=given.out) == given
     assert read_trial(tmp_path / "config.json").strategy == "none"
     (tmp_path / "config.json").write_text(
