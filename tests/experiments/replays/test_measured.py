@@ -22,7 +22,7 @@ def a_log(path, scans=12):
         angles = np.deg2rad(np.arange(180) - 90.0)
         with np.errstate(divide="ignore"):
             ranges = np.where(np.sin(angles) > 0.05, 2.0 / np.sin(angles), 81.9)
-        ranges[90] += 1e-3 * (k % 2)  # no scanner says the same twice
+        ranges = ranges + 1e-3 * ((np.arange(180) + k) % 2) * (ranges < 81.9)  # no scanner says the same twice
         rows.append(["FLASER", 180, *ranges, *[0.2 * k, 0, 0] * 2, 10.0 * k, "robot", 0])
     return lines(path, rows)
 
