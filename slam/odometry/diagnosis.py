@@ -16,23 +16,18 @@ from jaxtyping import Float
 
 from ..estimation.mounting import odometry_of_scanner
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.poses import J, compose, rotation, wrap
+from ..geometry.poses import compose, rotation, wrap
 from ..geometry.quantities import Count
 from ..robot import Odometry, RobotSpec, Scan, ScannerSpec, of_robot
+from .robot_faults import APART_M, APART_RAD, Fault, expected, tried_first
 from .scan_matching import told_by_scans
 
 AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
 """The motion between two scans that were taken at one place."""
 STILL = 0.01
 """After a smaller motion, m or rad, two scans may be alike."""
-MIRROR = np.array([1.0, -1.0, -1.0])
-"""What swapping left and right makes of a motion."""
 SLIPS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """So many times as far as stated the wheels may slip: not to be taken for a fault."""
-APART_M, APART_RAD = 0.1, float(np.deg2rad(10.0))
-"""Between the places and turns of the scanner that are tried first."""
-FARTHEST_M = 0.5
-"""How far from where it is stated the scanner is sought, ahead and to the left."""
 
 
 @dataclass(frozen=True)
@@ -50,87 +45,6 @@ class DiagnosisConfig:
     """A map that was rescued at so many ..."""
     within: Count = 40
     """... of so many steps is given up, whatever the reason."""
-
-
-@dataclass(frozen=True)
-class Fault:
-    """One thing that may be wrong; what is stated, by default."""
-
-    ahead_m: float = 0.0
-    """So much farther ahead than stated the scanner sits, ..."""
-    left_m: float = 0.0
-    """... so much farther to the left, ..."""
-    turned_rad: float = 0.0
-    """... and it is turned by so much more, counter-clockwise."""
-    is_mirrored: bool = False
-    late: int = 0
-    """Each scan is of so many steps before."""
-    stands: bool = False
-    """Nothing moves, whatever the wheels report."""
-
-    def nearby(self) -> list["Fault"]:
-        """Return the fault and others of its kind, as far as those tried first but closer together."""
-        finer = np.linspace(-1.0, 1.0, 21)
-        if self.turned_rad:
-            return [Fault(turned_rad=self.turned_rad + share * APART_RAD) for share in finer]
-        if self.ahead_m or self.left_m:
-            return [Fault(self.ahead_m + x * APART_M, self.left_m + y * APART_M) for x in finer for y in finer]
-        return [self]
-
-    def __str__(self) -> str:
-        """Say what is wrong."""
-        if self.stands:
-            return "the wheels turn while the robot stands"
-        if self.is_mirrored:
-            return "left and right are swapped, in the scans or in what the wheels report"
-        if self.late:
-            return f"the scans are late by {self.late} step{'s' * (self.late > 1)}"
-        if self.turned_rad:
-            return f"the scanner is turned by about {np.rad2deg(wrap(self.turned_rad)):.0f} degrees more than stated"
-        ways = (self.ahead_m, "ahead", "back"), (self.left_m, "to the left", "to the right")
-        words = " and ".join(f"{abs(way):.2f} m farther {on if way > 0.0 else back}" for way, on, back in ways)
-        return f"the scanner sits about {words} than stated"
-
-
-def tried_first() -> list[Fault]:
-    """Return faults of all kinds, so close to each other that one of them is near any."""
-    turns = np.arange(1, round(2.0 * np.pi / APART_RAD)) * APART_RAD
-    count = round(FARTHEST_M / APART_M)
-    steps = APART_M * np.arange(-count, count + 1)
-    return [
-        Fault(is_mirrored=True), Fault(stands=True), *(Fault(late=late) for late in (1, 2, 3)),
-        *(Fault(turned_rad=float(wrap(turn))) for turn in turns),
-        *(Fault(float(x), float(y)) for x in steps for y in steps if x or y),
-    ]  # fmt: skip
-
-
-def expected(
-    faults: Sequence[Fault], motions: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"], stated: ScannerSpec
-) -> tuple[Float[np.ndarray, "f n 3"], Float[np.ndarray, "f n 3 3"]]:
-    """Return the scanner's motions with each fault, in its frame before each, and their covariances, by the body's.
-
-    NaN where a late scan asks for what was before the first.
-    """
-    sits = stated.pose_robot + np.array([(each.ahead_m, each.left_m, each.turned_rad) for each in faults])
-    cos, sin = np.cos(motions[:, 2]), np.sin(motions[:, 2])
-    away = np.einsum("ijn,fj->fni", np.array([[cos, -sin], [sin, cos]]), sits[:, :2])
-    backs = np.array([rotation(-turn) for turn in sits[:, 2]])
-    A = np.tile(np.eye(3), (len(faults), len(motions), 1, 1))
-    A[..., :2, :2] = backs[:, None]
-    A[..., :2, 2] = np.einsum("fij,fnj->fni", backs @ J, away)
-    told = np.tile(motions, (len(faults), 1, 1))
-    told[..., :2] = np.einsum("fij,fnj->fni", backs, motions[:, :2] + away - sits[:, None, :2])
-    for k, fault in enumerate(faults):
-        if fault.is_mirrored:
-            told[k], A[k] = told[k] * MIRROR, MIRROR[:, None] * A[k]
-        if fault.stands:
-            told[k], A[k] = 0.0, 0.0
-    covs = A @ covs @ A.swapaxes(-1, -2)
-    for k, fault in enumerate(faults):
-        if fault.late:
-            told[k], covs[k] = np.roll(told[k], fault.late, axis=0), np.roll(covs[k], fault.late, axis=0)
-            told[k, : fault.late] = np.nan
-    return told, covs
 
 
 @dataclass
@@ -165,10 +79,14 @@ class Diagnosis:
             self._wheels = Odometry(compose(before.motion, odometry.motion), before.cov + R @ odometry.cov @ R.T)
 
     def repeats(self, scan: Scan) -> bool:
-        """Return whether a scan is the last one again, beam by beam, though the wheels have turned."""
-        if self._scan is None or self._wheels is None or not np.isfinite(scan.ranges_m).any():
+        """Return whether a scan is the last one again, beam by beam, though the wheels led where it does not fit."""
+        if self._scan is None or self._wheels is None or np.abs(self._wheels.motion).max() <= STILL:
             return False
-        return bool(np.abs(self._wheels.motion).max() > STILL) and _are_alike(scan, self._scan)
+        if not _are_alike(scan, self._scan):
+            return False
+        motion, information = self._told(_Moved(self._wheels, self._scan, scan))
+        off = odometry_of_scanner(self._wheels, self._config.robot.scanner).motion - motion
+        return float(off @ information @ off) > self._config.shared.outlier_sigmas**2
 
     def see(self, scan: Scan, was_rescued: bool, is_in_doubt: bool) -> str:
         """Take in one scan; return what is wrong with the robot in words, empty where nothing is known to be.
@@ -197,12 +115,14 @@ class Diagnosis:
         if len(self._last) < self._config.agree:
             return None
         spec, proof = self._config.robot, -float(np.log(self._config.shared.chance))
-        half_m, half_rad = 2.0 * spec.step_m + APART_M, 2.0 * spec.turn_rad + APART_RAD
-        for moved in self._last:
-            if moved.told is None:
-                guess = odometry_of_scanner(moved.wheels, spec.scanner).motion
-                moved.told = told_by_scans(moved.before, moved.after, guess, half_m, half_rad)
-        weighed = _Weighed(self._last, spec.scanner, -float(np.log((2.0 * half_m) ** 2 * 2.0 * half_rad)))
+        half_m, half_rad = self._window()
+        told = [self._told(moved) for moved in self._last]
+        weighed = _Weighed(
+            [each.wheels for each in self._last],
+            told,
+            spec.scanner,
+            -float(np.log((2.0 * half_m) ** 2 * 2.0 * half_rad)),
+        )
         each, tried = proof / self._config.agree, tried_first()
         gains = weighed.gains(tried)
         proved = np.clip(gains, -each, each)[:, ::-1].cumsum(axis=1).max(axis=1)
@@ -212,6 +132,18 @@ class Diagnosis:
         nearby = tried[best].nearby()
         return nearby[int(np.argmax(weighed.gains(nearby)[:, gains[best] > 0.0].sum(axis=1)))]
 
+    def _window(self) -> tuple[float, float]:
+        """Return how far from where the wheels say a motion is sought, m and rad."""
+        spec = self._config.robot
+        return 2.0 * spec.step_m + APART_M, 2.0 * spec.turn_rad + APART_RAD
+
+    def _told(self, moved: _Moved) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+        """Return what the scans before and after a motion tell of it, and how surely."""
+        if moved.told is None:
+            guess = odometry_of_scanner(moved.wheels, self._config.robot.scanner).motion
+            moved.told = told_by_scans(moved.before, moved.after, guess, *self._window())
+        return moved.told
+
 
 def _are_alike(one: Scan, other: Scan) -> bool:
     return bool(np.array_equal(one.ranges_m, other.ranges_m, equal_nan=True))
@@ -220,31 +152,45 @@ def _are_alike(one: Scan, other: Scan) -> bool:
 class _Weighed:
     """Motions by the wheels beside those by the scans."""
 
-    def __init__(self, last: Sequence[_Moved], stated: ScannerSpec, least: float) -> None:
+    def __init__(
+        self,
+        wheels: Sequence[Odometry],
+        told: Sequence[tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]],
+        stated: ScannerSpec,
+        least: float,
+    ) -> None:
         """No motion is less likely than `least`, the logarithm of a density: the robot may have been pushed."""
-        told = [(each.wheels.motion, each.wheels.cov, *each.told) for each in last if each.told is not None]
-        self._motions, self._covs, self._scans, information = map(np.array, zip(*told, strict=True))
+        self._motions, self._covs = np.array([each.motion for each in wheels]), np.array([each.cov for each in wheels])
+        self._scans, information = map(np.array, zip(*told, strict=True))
         self._says = information.any(axis=(1, 2))
         information[~self._says] = np.eye(3)
         self._scans_cov, self._stated, self._least = np.linalg.inv(information), stated, least
+        self._misfit = 0.5 * self._squared([Fault()], (1.0,))[0][0, 0]
         sound = self._likelihoods([Fault()], SLIPS)[:, 0]
         self._sound, self._slips = sound.max(axis=0), (1.0, SLIPS[int(np.argmax(sound.sum(axis=1)))])
 
     def gains(self, faults: Sequence[Fault]) -> Float[np.ndarray, "f n"]:
         """Return by how much each fault raises the log-likelihood of each motion over that of what is stated.
 
-        However far the wheels of each slip; where a motion does not tell, 0.
+        However far the wheels of each slip; where a motion does not tell, 0. It gains no more than what is stated is
+        off: a robot without any noise fits too well, and that is no fault.
         """
         likely = self._likelihoods(faults, self._slips)
         best = np.argmax(np.nansum(likely, axis=2), axis=0)
-        gains = likely[best, np.arange(len(faults))] - self._sound
+        gains = np.minimum(likely[best, np.arange(len(faults))] - self._sound, self._misfit)
         return np.where(self._says, np.nan_to_num(gains), 0.0)
 
     def _likelihoods(self, faults: Sequence[Fault], slips: Sequence[float]) -> Float[np.ndarray, "s f n"]:
         """Return the log-likelihood of each motion by the scans, for wheels that slip some times as far as stated."""
+        squared, S = self._squared(faults, slips)
+        return np.maximum(-0.5 * (squared + np.log(np.linalg.det(2.0 * np.pi * S))), self._least)
+
+    def _squared(
+        self, faults: Sequence[Fault], slips: Sequence[float]
+    ) -> tuple[Float[np.ndarray, "s f n"], Float[np.ndarray, "s f n 3 3"]]:
+        """Return the squared Mahalanobis distance of each motion by the scans from that by the wheels, and its S."""
         motions, covs = expected(faults, self._motions, self._covs, self._stated)
         off = self._scans - motions
         off[..., 2] = wrap(off[..., 2])
         S = np.square(slips)[:, None, None, None, None] * covs + self._scans_cov
-        squared = np.einsum("...i,...ij,...j->...", off, np.linalg.inv(S), off)
-        return np.maximum(-0.5 * (squared + np.log(np.linalg.det(2.0 * np.pi * S))), self._least)
+        return np.einsum("...i,...ij,...j->...", off, np.linalg.inv(S), off), S

@@ -48,7 +48,8 @@ def told_by_scans(
     pose, score = refine(field, points, coarse, c.step_rad, c.finest_m)
     if score < c.slip_score:
         return nothing
-    normals, known = surface_normals(returns, c.surface_m)
+    # Across a corridor, the last returns of both walls are neighbours, and would tell how far along it they lie.
+    normals, known = surface_normals(returns, c.gap_m)
     earlier = sorted_into_buckets(surface, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)
     surfaces = Surfaces(returns[known], normals[known])
     weak = Prior(pose, np.diag([1e-2, 1e-2, 1e-2]))

@@ -14,7 +14,8 @@ from sim.robot import RobotConfig, SimulatedRobot
 from sim.worlds import World
 from slam.estimation.mounting import odometry_of_scanner
 from slam.geometry.poses import compose, inverse
-from slam.odometry.diagnosis import Diagnosis, DiagnosisConfig, Fault, expected, tried_first
+from slam.odometry.diagnosis import Diagnosis, DiagnosisConfig
+from slam.odometry.robot_faults import Fault, expected, tried_first
 from slam.odometry.scan_matching import told_by_scans
 from slam.robot import MotionCommand, Odometry, ScannerSpec
 
@@ -119,14 +120,22 @@ def test_nobody_else_is_accused_however_often_it_is_asked(kind, mount):
         assert not any(drive(SOUND[kind], 10 + seed, 80, scanner=mount))
 
 
-def test_a_corridor_that_looks_alike_everywhere_is_no_robot_that_stands():
-    """Nor one whose scans are late, or whose scanner is turned: the scans do not tell how far it drove."""
-    corridor = World("corridor", _box(60.0, 1.4), np.array([30.0, 0.7, 0.0]), {})
-    robot, diagnosis, said = SimulatedRobot(corridor, 1), Diagnosis(NO_BUDGET), []
-    for k in range(50):
-        said.append(diagnosis.see(robot.sense(), k % 7 == 0, False))
-        diagnosis.moved(robot.drive(MotionCommand(0.15, 0.02 if k % 2 else -0.02)))
-    assert not any(said)
+@pytest.mark.parametrize("errorless", [False, True])
+@pytest.mark.parametrize("resolution_m", [0.0, 0.02])
+@pytest.mark.parametrize("width_m", [0.9, 1.4, 1.9, 2.6])
+def test_a_corridor_that_looks_alike_everywhere_is_no_robot_that_stands(width_m, resolution_m, errorless):
+    """Nor one whose scans are late or repeat, or whose scanner is turned: the scans do not tell how far it drove."""
+    corridor = World("corridor", _box(60.0, width_m), np.array([30.0, 0.5 * width_m, 0.0]), {})
+    config = RobotConfig(faults=FaultsConfig(resolution_m=resolution_m))
+    for turn_rad in (0.02, 0.0):
+        robot = SimulatedRobot(corridor, 1, errorless=errorless, config=config)
+        diagnosis, said = Diagnosis(NO_BUDGET), []
+        for k in range(50):
+            scan = robot.sense()
+            assert not diagnosis.repeats(scan)
+            said.append(diagnosis.see(scan, k % 7 == 0, False))
+            diagnosis.moved(robot.drive(MotionCommand(0.15, turn_rad if k % 2 else -turn_rad)))
+        assert not any(said)
 
 
 def test_a_fault_that_begins_on_the_way_is_told_within_a_few_scans_of_those_that_show_it():
