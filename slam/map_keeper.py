@@ -1,13 +1,19 @@
-"""A back end's lines and the records of their walls, changed together: a wall begins, merges and ends in both."""
+"""A back end's lines and the records of their walls, changed together: a wall begins, merges and ends in both.
+
+`MapUpdate` tells what a scan changed.
+"""
 
 from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from .association.matching import Matches
+from .association.recovery import Localisation
 from .config import MapperConfig
 from .estimation.backend import Backend
+from .estimation.mounting import belief_of_body, odometry_of_body
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
 from .map.chains import Chain, connect
@@ -18,7 +24,36 @@ from .map.polylines.change_points import ChangePointsConfig
 from .map.polylines.vertices import meetings
 from .map.polylines.wall_beams import WallBeams
 from .map.stochastic_map import StochasticMap
-from .robot import Scan
+from .robot import Scan, ScannerSpec
+
+
+@dataclass(frozen=True)
+class MapUpdate:
+    """What one scan did to the map, in the frame of the scanner; `told` gives it in that of the body."""
+
+    segments: Segments
+    matches: Matches
+    walls_of_segments: Int[np.ndarray, " s"]
+    """For each segment the id of the wall that it was fused into or began; -1 where it was not used, or has few beams:
+    `matches` has these."""
+    map: StochasticMap
+    chains: tuple[Chain, ...]
+    merged: tuple[tuple[int, int], ...]
+    """Ids (kept, dropped) of the landmarks that were found to be one wall."""
+    localisation: Localisation = field(default_factory=Localisation)
+
+    def told(self, scanner: ScannerSpec) -> "MapUpdate":
+        """Return what is told of a scan: all in the frame of the body, and how far walls may be from their lines."""
+        update, motion = replace(self, map=self.map.told), self.localisation.unstated_motion
+        if scanner.is_at_axle:
+            return update
+        of_body = None if motion is None else odometry_of_body(motion, scanner)
+        return replace(
+            update,
+            segments=update.segments.on_body(scanner),
+            map=replace(update.map, belief=belief_of_body(update.map.belief, scanner)),
+            localisation=replace(update.localisation, unstated_motion=of_body),
+        )
 
 
 class MapKeeper:

@@ -1,7 +1,7 @@
 """The paper's seven steps from a scan to a map of chains (section 2.2), the same for every back end."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -16,7 +16,7 @@ from .association.recovery import Localisation, unstated_cov, unstated_motion
 from .association.view import View, may_be_off_m, near_segments
 from .config import MapperConfig
 from .estimation.backend import Backend, Belief, ContradictionError, Observations
-from .estimation.mounting import belief_of_body, odometry_of_body, odometry_of_scanner
+from .estimation.mounting import belief_of_body, odometry_of_scanner
 from .extraction.config import ExtractionConfig
 from .extraction.extract import NO_VERTICES, extract
 from .extraction.segments import Segments
@@ -26,28 +26,12 @@ from .map.polylines.vertices import mistaken, vertices_within
 from .map.polylines.wall_beams import beams_on_walls
 from .map.reliability import are_clear, as_told
 from .map.stochastic_map import StochasticMap
-from .map_keeper import MapKeeper
+from .map_keeper import MapKeeper, MapUpdate
 from .odometry.diagnosis import AT_REST, Diagnosis
 from .robot import Odometry, RobotError, Scan
 
 NONE = np.zeros(0, dtype=np.int64)
 """No rows."""
-
-
-@dataclass(frozen=True)
-class MapUpdate:
-    """What one scan did to the map, in the frame of the body."""
-
-    segments: Segments
-    matches: Matches
-    walls_of_segments: Int[np.ndarray, " s"]
-    """For each segment the id of the wall that it was fused into or began; -1 where it was not used, or has few beams:
-    `matches` has these."""
-    map: StochasticMap
-    chains: tuple[Chain, ...]
-    merged: tuple[tuple[int, int], ...]
-    """Ids (kept, dropped) of the landmarks that were found to be one wall."""
-    localisation: Localisation = field(default_factory=Localisation)
 
 
 @dataclass(frozen=True)
@@ -169,7 +153,8 @@ class Mapper:
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = self._keeper.connect(walls, scan, set_aside)
         localisation = Localisation(found.nis, motion, noise_factor=self._weighed(found, motion))
-        return self._told(MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation))
+        update = MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
+        return update.told(self.config.robot.scanner)
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
@@ -218,21 +203,8 @@ class Mapper:
         factor = 1.0 if self._noise is None else self._noise.factor
         is_pending = self._leap is not None and self._leap.is_pending
         localisation = Localisation(is_lost=True, is_leap_pending=is_pending, noise_factor=factor)
-        return self._told(MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation))
-
-    def _told(self, update: MapUpdate) -> MapUpdate:
-        """Return what is told of a scan: all in the frame of the body, and how far walls may be from their lines."""
-        update = replace(update, map=update.map.told)
-        scanner, motion = self.config.robot.scanner, update.localisation.unstated_motion
-        if scanner.is_at_axle:
-            return update
-        of_body = None if motion is None else odometry_of_body(motion, scanner)
-        return replace(
-            update,
-            segments=update.segments.on_body(scanner),
-            map=replace(update.map, belief=belief_of_body(update.map.belief, scanner)),
-            localisation=replace(update.localisation, unstated_motion=of_body),
-        )
+        update = MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation)
+        return update.told(self.config.robot.scanner)
 
     def _weighed(self, found: Localised, motion: Odometry | None) -> float:
         """Weigh what a scan says of the wheels; return how many times as large as stated their noise was."""
