@@ -99,10 +99,10 @@ class FreeSpace:
 
     def note_touched(self, place_world: Float[np.ndarray, "2"]) -> None:
         """Remember that the body touched something at a place: an obstacle, whatever beams say of it."""
-        cell = self.cells(place_world[None])[0]
-        if self.inside(cell):
-            self._touched[tuple(cell)] = True
-            self._mark(cell[0], cell[0] + 1, cell[1], cell[1] + 1)
+        cells = self.cells(place_world[None])
+        for row, column in cells[self.inside(cells)].tolist():
+            self._touched[row, column] = True
+            self._mark(row, row + 1, column, column + 1)
 
     def note_driven(self, places_world: Float[np.ndarray, "n 2"]) -> None:
         """Remember that the robot's centre was at some places of the grid: the body fits there."""

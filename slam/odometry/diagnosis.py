@@ -7,6 +7,7 @@ last scans; no scan counts for more than a share of the proof, since the robot m
 fault explains is a push, or noise: then the map is rescued, up to a number of times.
 """
 
+import functools
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from jaxtyping import Float
 
 from ..estimation.mounting import odometry_of_scanner
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.poses import compose, rotation, wrap
+from ..geometry.poses import J, compose, rotation, wrap
 from ..geometry.quantities import Count
 from ..robot import Odometry, RobotSpec, Scan, ScannerSpec, of_robot
 from .robot_faults import APART_M, APART_RAD, Fault, expected, tried_first
@@ -26,6 +27,8 @@ AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
 """The motion between two scans that were taken at one place."""
 STILL = 0.01
 """After a smaller motion, m or rad, two scans may be alike."""
+TOGETHER = 4
+"""Faults are tried on so many motions as one, too: where the scanner sits shows little in each."""
 SLIPS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """So many times as far as stated the wheels may slip: not to be taken for a fault."""
 
@@ -64,6 +67,8 @@ class Diagnosis:
     def __init__(self, config: DiagnosisConfig = DiagnosisConfig()) -> None:
         self._config = config
         self._last: deque[_Moved] = deque(maxlen=config.window)
+        self._farther: deque[_Moved] = deque(maxlen=config.window // 2)
+        self._since = 0
         self._rescued: deque[bool] = deque(maxlen=config.within)
         self._wheels: Odometry | None = AT_REST
         self._scan: Scan | None = None
@@ -71,12 +76,7 @@ class Diagnosis:
     def moved(self, odometry: Odometry) -> None:
         """Take note of what the wheels report; where scans have told a motion, there is nothing to judge."""
         before = self._wheels
-        if before is None or odometry.wheels is not None:
-            self._wheels = None
-        else:
-            R = np.eye(3)
-            R[:2, :2] = rotation(before.motion[2])
-            self._wheels = Odometry(compose(before.motion, odometry.motion), before.cov + R @ odometry.cov @ R.T)
+        self._wheels = None if before is None or odometry.wheels is not None else _after(before, odometry)
 
     def repeats(self, scan: Scan) -> bool:
         """Return whether a scan is the last one again, beam by beam, though the wheels led where it does not fit."""
@@ -96,8 +96,14 @@ class Diagnosis:
         """
         if self._wheels is None:
             self._last.clear()
+            self._farther.clear()
+            self._since = 0
         elif self._scan is not None:
             self._last.append(_Moved(self._wheels, self._scan, scan))
+            self._since += 1
+            if self._since == TOGETHER:
+                self._farther.append(_in_one(list(self._last)[-TOGETHER:]))
+                self._since = 0
         self._wheels, self._scan = AT_REST, scan
         self._rescued.append(was_rescued)
         if fault := self._fault() if was_rescued or is_in_doubt else None:
@@ -112,18 +118,23 @@ class Diagnosis:
 
     def _fault(self) -> Fault | None:
         """Return the fault that is proved by the last scans, and best by them."""
-        if len(self._last) < self._config.agree:
+        return self._proved(self._last, 1, tried_first()) or self._proved(
+            self._farther, TOGETHER, [each for each in tried_first() if not each.late]
+        )
+
+    def _proved(self, last: Sequence[_Moved], steps: int, tried: list[Fault]) -> Fault | None:
+        """Return the fault of some that is proved by motions of so many steps each, and best by them."""
+        if len(last) < self._config.agree:
             return None
         spec, proof = self._config.robot, -float(np.log(self._config.shared.chance))
-        half_m, half_rad = self._window()
-        told = [self._told(moved) for moved in self._last]
+        half_m, half_rad = self._window(steps)
         weighed = _Weighed(
-            [each.wheels for each in self._last],
-            told,
+            [each.wheels for each in last],
+            [self._told(each, steps) for each in last],
             spec.scanner,
             -float(np.log((2.0 * half_m) ** 2 * 2.0 * half_rad)),
         )
-        each, tried = proof / self._config.agree, tried_first()
+        each = proof / self._config.agree
         gains = weighed.gains(tried)
         proved = np.clip(gains, -each, each)[:, ::-1].cumsum(axis=1).max(axis=1)
         best = int(np.argmax(proved))
@@ -132,17 +143,30 @@ class Diagnosis:
         nearby = tried[best].nearby()
         return nearby[int(np.argmax(weighed.gains(nearby)[:, gains[best] > 0.0].sum(axis=1)))]
 
-    def _window(self) -> tuple[float, float]:
-        """Return how far from where the wheels say a motion is sought, m and rad."""
+    def _window(self, steps: int) -> tuple[float, float]:
+        """Return how far from where the wheels say a motion of so many steps is sought, m and rad."""
         spec = self._config.robot
-        return 2.0 * spec.step_m + APART_M, 2.0 * spec.turn_rad + APART_RAD
+        return 2.0 * steps * spec.step_m + APART_M, min(2.0 * steps * spec.turn_rad + APART_RAD, np.pi)
 
-    def _told(self, moved: _Moved) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+    def _told(self, moved: _Moved, steps: int = 1) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
         """Return what the scans before and after a motion tell of it, and how surely."""
         if moved.told is None:
             guess = odometry_of_scanner(moved.wheels, self._config.robot.scanner).motion
-            moved.told = told_by_scans(moved.before, moved.after, guess, *self._window())
+            moved.told = told_by_scans(moved.before, moved.after, guess, *self._window(steps))
         return moved.told
+
+
+def _in_one(moved: Sequence[_Moved]) -> _Moved:
+    """Return motions one after the other as one."""
+    return _Moved(functools.reduce(_after, (each.wheels for each in moved)), moved[0].before, moved[-1].after)
+
+
+def _after(first: Odometry, then: Odometry) -> Odometry:
+    """Return two motions one after the other as one, in the frame before the first."""
+    G, R = np.eye(3), np.eye(3)
+    R[:2, :2] = rotation(first.motion[2])
+    G[:2, 2] = J @ R[:2, :2] @ then.motion[:2]
+    return Odometry(compose(first.motion, then.motion), G @ first.cov @ G.T + R @ then.cov @ R.T)
 
 
 def _are_alike(one: Scan, other: Scan) -> bool:

@@ -60,7 +60,7 @@ def test_the_figures_of_the_readme_are_those_of_the_drive_in_its_picture(tmp_pat
         program = [sys.executable, "-m", "experiments.commands.cli", *line.split()]
         subprocess.run(program, cwd=tmp_path, capture_output=True, env=_environment(), check=True)
     scores = [
-        json.loads((tmp_path / "r" / name / "summary.json").read_text())["pose_anees"]
+        json.loads((tmp_path / "r" / name / "summary.json").read_text())["pose_anees_from_start"]
         for name in ("block-ekf", "full-ekf", "graph")
     ]
     told = re.search(r"filter has (\S+), the full EKF (\S+) and the graph (\S+)\.\n", (ROOT / "README.md").read_text())

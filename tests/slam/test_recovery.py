@@ -213,7 +213,7 @@ def test_a_scan_is_laid_beside_the_walls_near_it_and_where_the_robot_may_have_mo
     drive.move(STEP)
     assert set(asked) == {False}
     drive.move(STEP, [0.0, 0.0, np.deg2rad(-8.0)])
-    assert True in asked
+    assert any(asked)
 
 
 def test_where_scans_told_the_motion_the_walls_are_doubted_and_not_the_robot():

@@ -96,6 +96,20 @@ def test_how_far_a_scanner_is_turned_or_moved_is_told(seed):
     assert [float(metres) for metres, _ in found] == pytest.approx([ahead, -left], abs=0.06)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_scanner_that_sits_aside_shows_over_some_turns_what_it_does_not_in_one(seed):
+    """8 cm move it by 14 mm in a turn on the spot by 10 degrees, as much as two scans of 180 beams can be off."""
+    for ahead_m, words in ((0.08, "sits about 0.0"), (0.0, "")):
+        spec = RobotConfig(lidar=LidarConfig(beams=180), faults=FaultsConfig(scanner_ahead_m=ahead_m))
+        robot, diagnosis = SimulatedRobot(ROOMS, seed, config=spec), Diagnosis(replace(NO_BUDGET, robot=spec.spec))
+        said = []
+        for k in range(33):
+            said.append(diagnosis.see(robot.sense(), was_rescued=k % 4 == 0, is_in_doubt=False))
+            diagnosis.moved(robot.drive(MotionCommand(0.0, 0.175)))
+        assert any(said) if words else not any(said)
+        assert words in max(said)
+
+
 SOUND = {
     "sound": FaultsConfig(),
     "pushed": FaultsConfig(bump=0.15),
