@@ -15,6 +15,7 @@ from explore.strategies import STRATEGIES, Strategy, make_strategy
 from sim.chance import SEED_MAX, Chance, Channel
 from sim.robot import RobotConfig, SimulatedRobot, TrueRecord, chance_in
 from sim.worlds import AS_DRAWN, DrawingOptions, World, WorldError, listing, load
+from slam.association.ranges.calibrated_backend import CalibratedBackend
 from slam.association.second_looks.config import SecondLooksConfig
 from slam.backends import BACKENDS, BackendOptions
 from slam.config import MapperConfig
@@ -203,7 +204,7 @@ def fenced(world: World, config: TrialConfig) -> World:
     if corners is None:
         return world
     fence = shapely.Polygon(corners)
-    room = fence.buffer(-config.robot.radius_m)
+    room = fence.buffer(-config.robot.half_width_m)
     if not fence.is_valid or not shapely.contains_xy(room, *world.start[:2]):
         x, y = world.start[:2]
         raise UsageError(
@@ -214,9 +215,13 @@ def fenced(world: World, config: TrialConfig) -> World:
 
 
 def make_backend(config: TrialConfig, start_world: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> Backend:
-    """Return the back end of a trial for a body that is believed to start at a pose: it follows the scanner."""
+    """Return the back end of a trial for a body that is believed to start at a pose: it follows the scanner.
+
+    It knows of errors of ranges where they are to be calibrated.
+    """
     start, start_cov = start_of_scanner(start_world, cov, config.robot.scanner)
-    return BACKENDS[config.backend].make(start.copy(), start_cov.copy(), config.backend_options)
+    backend = BACKENDS[config.backend].make(start.copy(), start_cov.copy(), config.backend_options)
+    return CalibratedBackend(backend) if config.robot.lidar.calibrate else backend
 
 
 def heard_by(odometry: OdometrySource, robot: Robot, config: TrialConfig) -> Robot:

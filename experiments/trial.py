@@ -142,6 +142,7 @@ def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
         " false_matches"
         " false_matches_few_beams merges"
         " nis nis_in_band unstated_motions lost_steps wheel_noise_factor"
+        " range_bias_m range_bias_sigma_m range_scale range_scale_sigma own_beams curved_share"
         " false_merges return_to_start certificate step_ms planning_ms"
     )
     return {

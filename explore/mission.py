@@ -92,8 +92,9 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
     path_length, index = 0.0, 0
     while True:
         began = _working_s()
-        scan = robot.sense() if floor is None else lost.believed(robot.sense())
-        update = mapper.step(scan, given_up.keys)
+        sensed = robot.sense() if floor is None else lost.believed(robot.sense())
+        update = mapper.step(sensed, given_up.keys)
+        scan = sensed if update.heard is None else update.heard.scan
         localisation = update.localisation
         if localisation.unstated_motion is not None:
             recent.move(localisation.unstated_motion)
@@ -127,7 +128,7 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
             index=index,
             time_s=scan.time_s,
             odometry=odometry,
-            scan=scan,
+            scan=sensed,
             segments=update.segments,
             matches=update.matches,
             walls_of_segments=update.walls_of_segments,
@@ -142,6 +143,8 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
             seconds=_working_s() - began,
             planning_seconds=decided,
             robot=spec,
+            own_beams=0 if update.heard is None else update.heard.own_beams,
+            range_errors=update.range_errors,
         )
         if decision.command is None:
             return

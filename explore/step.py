@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.association.matching import Matches
+from slam.association.ranges.errors import RangeErrors
 from slam.association.recovery import Localisation
 from slam.extraction.segments import Segments
 from slam.map.chains import Chain
@@ -54,6 +55,10 @@ class Step:
     """Ids (kept, dropped) of the walls that this scan showed to be one."""
     localisation: Localisation = field(default_factory=Localisation)
     """How well the scan fits where the robot was believed to be, and what was made of that."""
+    own_beams: int = 0
+    """So many beams of the scan ended on the robot itself, and were taken to tell nothing."""
+    range_errors: RangeErrors = field(default_factory=RangeErrors)
+    """What is wrong with the scanner's ranges, as far as all scans up to now tell."""
     robot: RobotSpec = RobotSpec()
     """What the robot states of itself: its body, and where on it the scan was taken."""
 

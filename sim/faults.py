@@ -51,7 +51,7 @@ class FaultsConfig:
     range_scale: Factor = 1.0
     """How many times too long each range is."""
     resolution_m: Distance = 0.0
-    """Ranges come in multiples of this m; 0 for any."""
+    """Ranges come in multiples of this m, unstated; 0 for any."""
     mirrored: bool = False
     """The beams come in the opposite order: what is on the left seems to be on the right."""
     frozen_from: Number = NEVER
@@ -114,13 +114,19 @@ def with_posts(
     return np.where(off <= 0.5 * config.post_rad, np.minimum(ranges, config.post_m), ranges)
 
 
-def misread(ranges: Float[np.ndarray, " k"], config: FaultsConfig, range_max_m: float) -> Float[np.ndarray, " k"]:
-    """Return measured ranges (k,) m as a scanner with a bias, a scale and a resolution tells them."""
-    if config.range_scale == 1.0 and config.range_bias_m == config.resolution_m == 0.0:
+def misread(
+    ranges: Float[np.ndarray, " k"], config: FaultsConfig, range_max_m: float, stated_m: float = 0.0
+) -> Float[np.ndarray, " k"]:
+    """Return measured ranges (k,) m as a scanner with a bias, a scale and a resolution tells them.
+
+    `stated_m` is the resolution that it states, if it has not a coarser one.
+    """
+    resolution_m = max(stated_m, config.resolution_m)
+    if config.range_scale == 1.0 and config.range_bias_m == resolution_m == 0.0:
         return ranges
     told = config.range_scale * ranges + config.range_bias_m
-    if config.resolution_m > 0.0:
-        told = config.resolution_m * np.round(told / config.resolution_m)
+    if resolution_m > 0.0:
+        told = resolution_m * np.round(told / resolution_m)
     return np.where(told > range_max_m, np.inf, np.where(told > 0.0, told, np.nan))
 
 

@@ -6,13 +6,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from slam.geometry.lines import distance_to_segments, normals, through
-from slam.geometry.quantities import Beams, Count, Deviation, Share, Sight, Size, View
+from slam.geometry.quantities import Beams, Count, Deviation, Distance, Share, Sight, Size, View
+from slam.robot import LidarSpec
 
 from .kernels import nearest, seen_from
 
 
 @dataclass(frozen=True)
-class LidarConfig:
+class LidarConfig(LidarSpec):
     """The range finder (section 4 of the paper)."""
 
     beams: Beams = 180
@@ -25,6 +26,8 @@ class LidarConfig:
     """Standard deviation m of the radial error of one beam."""
     sigma_share: Share = 0.0
     """Standard deviation of a beam's radial error as a share of its range, beside `sigma_m`; both add by squares."""
+    resolution_m: Distance = 0.0
+    """Ranges come in multiples of this m, and the scanner says so; 0 for any."""
     cell_m: Size = 1.0
     """Side m of the grid cells that share one list of faces within range."""
     cells_max: Count = 4096

@@ -4,12 +4,13 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+import shapely
+from jaxtyping import Bool, Float, Int
 
 from slam.geometry.lines import distance_to_segments
 from slam.geometry.poses import compose, to_world
 from slam.geometry.quantities import Period, Pitch, Speed
-from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
+from slam.robot import LidarSpec, MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Chance, Channel, world_key
 from .drive import clamp, draw_slip, odometry, seconds, true_motion
@@ -78,7 +79,13 @@ class RobotConfig(RobotSpec):
     @property
     def spec(self) -> RobotSpec:
         """What the robot states, and nothing else."""
-        return RobotSpec(**{each.name: getattr(self, each.name) for each in fields(RobotSpec)})
+        stated = {each.name: getattr(self, each.name) for each in fields(RobotSpec)}
+        return RobotSpec(**stated | {"lidar": LidarSpec(calibrate=self.lidar.calibrate)})
+
+    def stating(self, spec: RobotSpec) -> "RobotConfig":
+        """Return a robot with these devices that states what another does."""
+        stated = {each.name: getattr(spec, each.name) for each in fields(RobotSpec)}
+        return replace(self, **stated | {"lidar": replace(self.lidar, calibrate=spec.lidar.calibrate)})
 
 
 @dataclass
@@ -96,7 +103,7 @@ class TrueRecord:
 
 
 class SimulatedRobot:
-    """A disc with a range finder and slipping wheels in a drawn building."""
+    """A body with a range finder and slipping wheels in a drawn building."""
 
     def __init__(self, world: Building, seed: int, errorless: bool = False, config: RobotConfig | None = None) -> None:
         """Stand at the start of `world`; `errorless` makes ranges and wheels exact but keeps the stated noise."""
@@ -132,7 +139,7 @@ class SimulatedRobot:
         if not self._errorless:
             draws = self._chance.standard_normals(Channel.LASER, step, len(ranges))
             ranges = noisy(ranges, beam_sigmas(ranges, lidar), draws, lidar.range_max_m)
-        ranges = misread(ranges, faults, lidar.range_max_m)
+        ranges = misread(ranges, faults, lidar.range_max_m, lidar.resolution_m)
         ranges = with_dropouts(ranges, faults, self._chance, step)
         ranges, faces = self._as_told(ranges, np.where(np.isfinite(ranges) & ~mixed, faces, -1), step)
         self._record.poses_world.append(self._pose.copy())
@@ -146,6 +153,7 @@ class SimulatedRobot:
             self._time_s,
             lidar.sigma_share,
             start_s,
+            lidar.resolution_m,
         )
 
     def _as_told(
@@ -198,7 +206,8 @@ class SimulatedRobot:
         count = 1 + int(np.ceil((abs(command.forward_m) + abs(slip.lateral_m)) / self.config.sampling_m))
         shares = np.linspace(0.0, 1.0, count + 1)[1:]
         motions = true_motion(command, slip, drive, shares)
-        free = self._free_places(to_world(motions[:, :2], self._pose))
+        places = np.column_stack([to_world(motions[:, :2], self._pose), motions[:, 2] + self._pose[2]])
+        free = self._free_places(places)
         touched = free < count
         if touched:
             self._record.collisions += 1
@@ -217,9 +226,13 @@ class SimulatedRobot:
         self._record.drive_time_s += duration
         return replace(odometry(command, drive), touched=touched)
 
-    def _free_places(self, places_world: Float[np.ndarray, "n 2"]) -> int:
+    def _free_places(self, poses_world: Float[np.ndarray, "n 3"]) -> int:
         """Return how many places, from the first on, keep the body clear of every face and everybody."""
+        places_world = poses_world[:, :2]
         near, people = self._faces_near(places_world[0]), self._people.places_at(self._time_s)
+        if self.config.outline_m is not None:
+            touched = self._touched(poses_world, near, people)
+            return int(np.argmax(touched)) if touched.any() else len(places_world)
         gaps = np.full(len(places_world), np.inf)
         if len(near):
             gaps = distance_to_segments(places_world, near).min(axis=1)
@@ -228,6 +241,21 @@ class SimulatedRobot:
             gaps = np.minimum(gaps, to_people - self.config.faults.people.radius_m)
         touched = gaps < self.config.radius_m
         return int(np.argmax(touched)) if touched.any() else len(places_world)
+
+    def _touched(
+        self,
+        poses_world: Float[np.ndarray, "n 3"],
+        faces: Float[np.ndarray, "m 2 2"],
+        people: Float[np.ndarray, "p 2"],
+    ) -> Bool[np.ndarray, " n"]:
+        """Return at which poses a body with an outline meets a face or somebody."""
+        corners = np.array([to_world(np.array(self.config.outline_m), pose) for pose in poses_world])
+        bodies = shapely.polygons(corners)
+        touched = shapely.intersects(bodies, shapely.multilinestrings(faces))
+        if len(people):
+            gaps = shapely.distance(np.asarray(bodies)[:, None], shapely.points(people)).min(axis=1)
+            touched |= gaps < self.config.faults.people.radius_m
+        return np.asarray(touched)
 
     def _faces_near(self, place_world: Float[np.ndarray, "2"]) -> Float[np.ndarray, "m 2 2"]:
         """Return the faces that one step from anywhere in the grid cell of `place_world` may touch."""

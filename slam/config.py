@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, fields, is_dataclass
 
 from .association.matching import MatchingConfig
+from .association.ranges.errors import RangesConfig
 from .association.recovery import RecoveryConfig
 from .estimation.shared import SharedConfig
 from .extraction.config import ExtractionConfig
@@ -31,6 +32,7 @@ class MapperConfig:
     """None where one wall may stand in the map twice."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
     """None where the robot is taken at its word."""
+    ranges: RangesConfig = field(default_factory=RangesConfig)
 
     def __post_init__(self) -> None:
         """Let every group know what all share."""

@@ -3,16 +3,18 @@
 `MapUpdate` tells what a scan changed.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from .association.matching import Matches
+from .association.ranges.errors import RangeErrors
+from .association.ranges.heard import Heard
 from .association.recovery import Localisation
 from .config import MapperConfig
-from .estimation.backend import Backend
+from .estimation.backend import Backend, Belief
 from .estimation.mounting import belief_of_body, odometry_of_body
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
@@ -41,10 +43,18 @@ class MapUpdate:
     merged: tuple[tuple[int, int], ...]
     """Ids (kept, dropped) of the landmarks that were found to be one wall."""
     localisation: Localisation = field(default_factory=Localisation)
+    heard: Heard | None = None
+    """The scan as it was taken in, without the robot's own body."""
+    range_errors: RangeErrors = field(default_factory=RangeErrors)
+    """What is wrong with the scanner's ranges, as far as all scans tell."""
 
-    def told(self, scanner: ScannerSpec) -> "MapUpdate":
-        """Return what is told of a scan: all in the frame of the body, and how far walls may be from their lines."""
-        update, motion = replace(self, map=self.map.told), self.localisation.unstated_motion
+    def told(self, scanner: ScannerSpec, unsure: Callable[[Belief], Belief]) -> "MapUpdate":
+        """Return what is told of a scan: all in the frame of the body, and how far walls may be from their lines.
+
+        `unsure` adds to a belief about the scanner what is unknown of its ranges.
+        """
+        told, motion = self.map.told, self.localisation.unstated_motion
+        update = replace(self, map=replace(told, belief=unsure(told.belief)))
         if scanner.is_at_axle:
             return update
         of_body = None if motion is None else odometry_of_body(motion, scanner)

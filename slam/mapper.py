@@ -12,6 +12,7 @@ from .association.leap import Leap
 from .association.matching import NO_MATCHES, KnownWalls, Matches
 from .association.methods import METHODS, Matcher
 from .association.motion_noise import MotionInnovation, MotionNoise
+from .association.ranges.heard import Heard, Ranges
 from .association.recovery import Localisation, unstated_cov, unstated_motion
 from .association.view import View, may_be_off_m, near_segments
 from .config import MapperConfig
@@ -83,6 +84,7 @@ class Mapper:
         self._leap = None if config.recovery is None else Leap(config.recovery.place)
         diagnosis = None if config.recovery is None else config.recovery.diagnosis
         self._diagnosis = None if diagnosis is None else Diagnosis(diagnosis)
+        self._ranges = Ranges(backend, config.robot, config.ranges, self._pieces)
         self._odometry = AT_REST
         self._chains: tuple[Chain, ...] = ()
         self._is_lost = False
@@ -91,7 +93,7 @@ class Mapper:
     @property
     def belief(self) -> Belief:
         """Where the body is believed to be, and the map."""
-        return belief_of_body(self.backend.belief, self.config.robot.scanner)
+        return belief_of_body(self._ranges.told(self.backend.belief), self.config.robot.scanner)
 
     def predict(self, odometry: Odometry) -> None:
         """Move the robot's estimate by the odometry; raises RobotError for a motion that states no error at all."""
@@ -104,22 +106,37 @@ class Mapper:
             self._diagnosis.moved(odometry)
         odometry = odometry_of_scanner(odometry, self.config.robot.scanner)
         self._odometry = odometry if self._noise is None else self._noise.believed(odometry)
-        self.backend.predict(self._odometry)
+        self._move(self._odometry)
         if self._leap is not None:
             self._leap.move(self._odometry)
+
+    def _move(self, odometry: Odometry) -> None:
+        """Move the estimate by a motion of the scanner."""
+        self._ranges.move(odometry, self.backend.belief)
+        self.backend.predict(odometry)
 
     def step(self, scan: Scan, set_aside: Collection[tuple[int, int]] = ()) -> MapUpdate:
         """Take in one scan; `set_aside` holds (wall id, side) of ends that exploration gave up.
 
         Raises ContradictionError where no estimate agrees with it, nor with the two that were to be taken in before.
         """
+        heard = self._ranges.hear(scan)
+        update = self._judged(heard, set_aside)
+        if not update.localisation.is_lost:
+            self._ranges.learn(heard, update.segments, update.walls_of_segments)
+        update = replace(update, heard=heard, range_errors=self._ranges.errors)
+        return update.told(self.config.robot.scanner, self._ranges.told)
+
+    def _judged(self, heard: Heard, set_aside: Collection[tuple[int, int]]) -> MapUpdate:
+        """Take in a scan, unless it is the last one again, and tell what is wrong with the robot."""
         if self._diagnosis is None:
-            return self._taken_in(scan, set_aside)
-        repeats, factor = self._diagnosis.repeats(scan), 1.0 if self._noise is None else self._noise.factor
+            return self._taken_in(heard.scan, set_aside)
+        scan, factor = heard.scan, 1.0 if self._noise is None else self._noise.factor
+        repeats = self._diagnosis.repeats(heard.sensed)
         update = self._nothing_taken_in(*self._features(scan)) if repeats else self._taken_in(scan, set_aside)
         found = update.localisation
         is_in_doubt = found.is_lost or (self._noise is not None and self._noise.factor > factor)
-        fault = self._diagnosis.see(scan, found.unstated_motion is not None, is_in_doubt)
+        fault = self._diagnosis.see(heard.sensed, found.unstated_motion is not None, is_in_doubt)
         return replace(update, localisation=replace(found, fault=fault)) if fault else update
 
     def _taken_in(self, scan: Scan, set_aside: Collection[tuple[int, int]]) -> MapUpdate:
@@ -132,7 +149,7 @@ class Mapper:
         if self._is_lost:
             return self._nothing_taken_in(segments, walls)
         if motion is not None:
-            self.backend.predict(motion)
+            self._move(motion)
             segments, walls = self._features(scan)
             found = self._localised(scan, segments, walls)
         matches = found.matches
@@ -153,8 +170,7 @@ class Mapper:
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
         self._chains = self._keeper.connect(walls, scan, set_aside)
         localisation = Localisation(found.nis, motion, noise_factor=self._weighed(found, motion))
-        update = MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
-        return update.told(self.config.robot.scanner)
+        return MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
 
     def _features(self, scan: Scan) -> tuple[Segments, StochasticMap]:
         """Return the segments of a scan, and the map without the walls that these show to be mistaken."""
@@ -203,8 +219,7 @@ class Mapper:
         factor = 1.0 if self._noise is None else self._noise.factor
         is_pending = self._leap is not None and self._leap.is_pending
         localisation = Localisation(is_lost=True, is_leap_pending=is_pending, noise_factor=factor)
-        update = MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation)
-        return update.told(self.config.robot.scanner)
+        return MapUpdate(segments, NO_MATCHES, nobody, walls, self._chains, (), localisation)
 
     def _weighed(self, found: Localised, motion: Odometry | None) -> float:
         """Weigh what a scan says of the wheels; return how many times as large as stated their noise was."""
@@ -242,7 +257,8 @@ class Mapper:
 
     def _pieces(self, scan: Scan, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES) -> Segments:
         config = self.config.extraction
-        return sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
+        pieces = sure_pieces(self._extract(scan, config, vertices_rad=vertices_rad), scan, config)
+        return self._ranges.stated(scan, pieces)
 
     def _bends(self, segments: Segments, walls: StochasticMap) -> Float[np.ndarray, " b"]:
         cut = self._keeper.landmarks.change_points.cut

@@ -12,7 +12,7 @@ from sim.robot import RobotConfig
 from sim.robots import ROBOTS
 from sim.worlds.drawing import WorldError
 from sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
-from slam.robot import RobotSpec, of_outline
+from slam.robot import LidarSpec, RobotSpec
 
 from ..usage import UsageError, did_you_mean
 from .schema import UnfitError
@@ -85,7 +85,7 @@ def robot_of(name: str | None) -> Record:
     """Return the settings of a trial behind a bundled robot's name or a robot's file; none without one.
 
     The file is YAML and holds keys of the group `robot`. An angle may be given in degrees (`turn_deg`), and
-    `outline_m`, corners about the middle of the axle, in place of `radius_m`. Raises UsageError, in one line.
+    `outline_m`, corners about the middle of the axle, stands in place of `radius_m`. Raises UsageError, in one line.
     """
     if name is None:
         return {}
@@ -110,8 +110,11 @@ def robot_of(name: str | None) -> Record:
 
 def stated(robot: Record) -> Record:
     """Return of a robot's settings those that it states of itself; a recorded one has no other."""
-    names = {each.name for each in fields(RobotSpec)}
-    return {"robot": {key: value for key, value in robot.get("robot", {}).items() if key in names}}
+    said: Record = robot.get("robot", {})
+    found = {each.name: said[each.name] for each in fields(RobotSpec) if each.name in said}
+    if "lidar" in found:
+        found["lidar"] = {key: value for key, value in found["lidar"].items() if key in LidarSpec.__dataclass_fields__}
+    return {"robot": found}
 
 
 def _robot_keys(said: Mapping[str, Any], group: Any) -> Record:
@@ -121,7 +124,7 @@ def _robot_keys(said: Mapping[str, Any], group: Any) -> Record:
         name = f"{key.removesuffix('_deg')}_rad" if key.endswith("_deg") else key
         own = getattr(group, name, None)
         if key == "outline_m" and isinstance(group, RobotSpec):
-            name, value = "radius_m", of_outline(_corners(value))
+            value = _corners(value).tolist()
         elif name != key and isinstance(value, float):
             value = float(np.deg2rad(value))
         elif isinstance(value, dict) and is_dataclass(own):

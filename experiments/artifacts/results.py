@@ -183,6 +183,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
         "ranges_m": log.ranges_m,
         "sigma_m": log.sigma_m,
         "sigma_share": log.sigma_share,
+        **({"resolution_m": log.resolution_m} if log.resolution_m > 0.0 else {}),
         "range_max_m": log.range_max_m,
         "odometry": wheels.odometry[: len(log)],
         "odometry_cov": wheels.odometry_cov[: len(log)],

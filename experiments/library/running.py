@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, overload
@@ -88,8 +88,7 @@ def explore(
     )  # fmt: skip
     trial = options.trial
     if spec is not None:
-        stated = {each.name: getattr(spec, each.name) for each in fields(RobotSpec)}
-        trial = replace(trial, robot=replace(trial.robot, **stated))
+        trial = replace(trial, robot=trial.robot.stating(spec))
     check(trial)
     if own is None:
         drawn = load_world(trial.world, trial.start, trial.drawing)

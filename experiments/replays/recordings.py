@@ -29,6 +29,7 @@ def recorded(made: TrialResult) -> RecordedRun:
         log.sigma_share,
         log.scan_start_s,
         log.fans,
+        log.resolution_m,
     )
     return RecordedRun(
         scenario.config, recording, scenario.start_estimate, scenario.start_cov, log.true_world, log.face_of_beam

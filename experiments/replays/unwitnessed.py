@@ -93,7 +93,7 @@ def _own_log(log: Log) -> RecordedLog:
     return every_scan(
         Recording(
             log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
-            log.touched, log.sigma_share, log.scan_start_s, log.fans,
+            log.touched, log.sigma_share, log.scan_start_s, log.fans, log.resolution_m,
         )
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ from explore.step import Step
 from sim.logs.recorded_robot import differing, fan_of
 from slam.estimation.backend import Joint
 from slam.evaluation.from_start import FromStart, as_it_is
+from slam.extraction.curved_share import curved_beams
 
 from ..scenario import WitnessedRobot
 from .association import Votes
@@ -45,6 +46,7 @@ class Log:
     """NaN after the last beam of a scan that has fewer."""
     sigma_m: Float[np.ndarray, " k"]
     sigma_share: float
+    resolution_m: float
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
     """Motion that led to each step as the wheels reported it, robot frame before the motion, m m rad."""
@@ -83,6 +85,10 @@ class Log:
     """Whether the scan fitted nowhere and was not taken in."""
     wheel_noise_factor: Float[np.ndarray, " s"]
     """How many times as large as stated the wheels' noise was taken to be."""
+    curved_beams: Int[np.ndarray, " s"]
+    """How many beams of each scan lie on something curved."""
+    own_beams: Int[np.ndarray, " s"]
+    """How many beams of each scan ended on the robot itself."""
     route_walls: Int[np.ndarray, " s"]
     """How many walls the planned sequence holds; 0 without one."""
     behaviours: tuple[str, ...]
@@ -259,6 +265,8 @@ class Recorder:
                 "unstated_motion": step.localisation.unstated_motion is not None,
                 "is_lost": step.localisation.is_lost,
                 "wheel_noise_factor": step.localisation.noise_factor,
+                "own_beams": step.own_beams,
+                "curved_beams": curved_beams(step.scan, step.segments),
                 "route_walls": len(step.decision.walls_to_follow),
             }
         )
@@ -288,6 +296,7 @@ class Recorder:
             sigma_m=np.resize(np.asarray(scan.sigma_m, dtype=np.float64), int(count)),
             fans=differing(fans),
             sigma_share=scan.sigma_share,
+            resolution_m=scan.resolution_m,
             range_max_m=float(scan.range_max_m),
             reasons=tuple(self._reasons),
             behaviours=tuple(self._behaviours),

@@ -12,6 +12,7 @@ from explore.step import Step
 from slam.estimation.backend import POSE, Joint
 from slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
 from slam.evaluation.own_gauge import OwnGauge, own_gauge
+from slam.extraction.curved_share import SCANS
 from slam.geometry.poses import compose, to_world, wrap
 
 from ..scenario import Scenario
@@ -144,8 +145,22 @@ def summarise(
         **_map_scores(scenario, log, votes, step, joint, sketches),
         **_pose_scores(log, config.errorless),
         **innovation_scores(log),
+        **range_scores(step, log),
         "step_ms": spread_ms(log.seconds),
         "planning_ms": spread_ms(log.planning_seconds),
+    }
+
+
+def range_scores(step: Step, log: Log) -> dict[str, Any]:
+    """Return what the robot found out about its ranges, and what share of them is of its own body, or curved."""
+    errors, returns = step.range_errors, np.count_nonzero(np.isfinite(log.ranges_m[:SCANS]))
+    return {
+        "range_bias_m": errors.bias_m,
+        "range_bias_sigma_m": errors.bias_sigma_m,
+        "range_scale": errors.scale,
+        "range_scale_sigma": errors.scale_sigma,
+        "own_beams": int(log.own_beams.sum()),
+        "curved_share": float(log.curved_beams[:SCANS].sum() / returns) if returns else None,
     }
 
 

@@ -88,11 +88,11 @@ def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
     What the reachable region sees beyond itself, its boundary sees, so looking out from the boundary is enough.
     """
     floor = Floor(world.floor)
-    region = world.reachable(config.radius_m)
+    region = world.reachable(config.half_width_m)
     if region.is_empty:
         return floor.seen
-    floor.cover(region.buffer(config.radius_m))
-    region = world.lookouts(config.radius_m, config.true_scanner.off_m)
+    floor.cover(region.buffer(config.half_width_m))
+    region = world.lookouts(config.half_width_m, config.true_scanner.off_m)
     finder = RangeFinder(world.faces, LidarConfig(LOOKOUT_BEAMS, range_max_m=config.lidar.range_max_m))
     for ring in (region.exterior, *region.interiors):
         places = shapely.get_coordinates(ring.segmentize(LOOKOUT_M))

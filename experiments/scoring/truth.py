@@ -38,7 +38,7 @@ class Truth:
 def truth_of(world: World, config: RobotConfig) -> Truth:
     """Return the truth about a world for a robot of this body and range finder."""
     lines = through(world.faces)
-    contour = world.reachable_contour(config.radius_m, config.lidar.range_max_m, config.true_scanner.off_m)
+    contour = world.reachable_contour(config.half_width_m, config.lidar.range_max_m, config.true_scanner.off_m)
     return Truth(world, world.faces, lines, collinear(world.faces), world.face_rings, contour)
 
 

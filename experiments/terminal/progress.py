@@ -17,7 +17,9 @@ from rich.progress import (
 from rich.table import Column, Table
 
 from explore.step import Step
+from slam.association.ranges.errors import RangeErrors
 from slam.evaluation.consistency import verdict_on_noise
+from slam.extraction.curved_share import MOSTLY, SCANS, curved_beams, few_straight, returns_of_scan
 
 from .answers import found, is_quiet
 from .console import plain_console
@@ -33,9 +35,15 @@ def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step]
     `steps` is how many are expected; without it no time left is told.
     """
     with bar_of(title, steps, TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True))) as (bar, task):
+        curved, returns = 0, 0
 
         def watch(step: Step) -> None:
+            nonlocal curved, returns
             done = step.index + 1
+            if done <= SCANS:
+                curved, returns = curved + curved_beams(step.scan, step.segments), returns + returns_of_scan(step.scan)
+            if done == SCANS and (words := few_straight(curved, returns)):
+                bar.console.print(words)
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
             clock = timedelta(seconds=int(step.time_s))
             words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, robot's clock {clock}"
@@ -156,9 +164,33 @@ def _faults(summary: dict[str, Any]) -> list[tuple[str, str]]:
         "steps without a place in the map": summary.get("lost_steps"),
     }
     rows = [(words, str(count)) for words, count in told.items() if count]
+    rows += [("the scanner's ranges have", words) for words in words_on_ranges(range_errors_of(summary))]
+    if (summary.get("curved_share") or 0.0) > MOSTLY:
+        rows.append(("few straight walls: share of the first returns on curved ones", f"{summary['curved_share']:.2f}"))
+    if beams := summary.get("own_beams"):
+        rows.append(("returns of the robot's own body, taken for nothing", str(beams)))
     if (factor := summary.get("wheel_noise_factor", 1.0)) != 1.0:
         rows.append(("noise of the wheels, times as stated", f"{factor:g}"))
     return rows
+
+
+def words_on_ranges(errors: RangeErrors) -> list[str]:
+    """Return what is to be said of a scanner's ranges; nothing where nothing is sure."""
+    found = []
+    if errors.is_biased():
+        found.append(f"a bias of {1e3 * errors.bias_m:+.1f} mm (sigma {1e3 * errors.bias_sigma_m:.1f} mm)")
+    if errors.is_scaled():
+        grown, sigma = 100.0 * (errors.scale - 1.0), 100.0 * errors.scale_sigma
+        found.append(f"a scale of {grown:+.2f} % against the wheels (sigma {sigma:.2f} %)")
+    return found
+
+
+def range_errors_of(summary: dict[str, Any]) -> RangeErrors:
+    """Return what a summary says of the scanner's ranges; of one that says nothing, nothing is known."""
+    keys = {"bias_m": "range_bias_m", "bias_sigma_m": "range_bias_sigma_m"}
+    keys |= {"scale": "range_scale", "scale_sigma": "range_scale_sigma"}
+    said = {name: value for name, key in keys.items() if (value := summary.get(key)) is not None}
+    return RangeErrors(**said)
 
 
 def _counts(summary: dict[str, Any]) -> str:

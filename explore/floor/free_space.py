@@ -42,7 +42,7 @@ class FreeSpaceConfig:
     @property
     def body_m(self) -> float:
         """Floor this near to the robot is free: it stands there."""
-        return self.robot.radius_m
+        return self.robot.inner_m
 
     @property
     def clearance_limit_m(self) -> float:
@@ -128,6 +128,11 @@ class FreeSpace:
     def evidence(self) -> Int[np.ndarray, "h w"]:
         """The grid itself, to be read only: negative is free, positive is occupied, zero is unknown."""
         return self._evidence
+
+    @property
+    def occupied(self) -> Bool[np.ndarray, "h w"]:
+        """Which cells hold something: a beam ended there, or the body touched it."""
+        return (self._evidence > 0) | self._touched
 
     def is_free(self, box: tuple[slice, slice]) -> Bool[np.ndarray, "h w"]:
         """Return which cells of a part of the grid were seen free."""

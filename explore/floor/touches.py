@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.poses import to_robot
-from slam.robot import MotionCommand, Odometry
+from slam.robot import MotionCommand, Odometry, RobotSpec
+from slam.robot.body import ahead_m, reaches_m
 
 REACH_M = 0.04
 """A return this near to the body, on the side to which it moved, may be what it met."""
@@ -17,9 +18,9 @@ BESIDE_SHARE = 0.25
 class Touches:
     """Places that the body met."""
 
-    def __init__(self, radius_m: float) -> None:
-        """`radius_m` is that of the body."""
-        self._radius_m = radius_m
+    def __init__(self, robot: RobotSpec) -> None:
+        """Remember what the body of a robot meets."""
+        self._robot = robot
         self._points: Float[np.ndarray, "n 2"] = np.zeros((0, 2))
         self._ahead = np.array([1.0, 0.0])
         self.is_new = False
@@ -42,12 +43,14 @@ class Touches:
 
         That is its front, whatever the scans show, and the nearest return on that side.
         """
-        gap = np.hypot(near_robot[:, 0], near_robot[:, 1])
-        met = [self._radius_m * self._ahead]
-        on_side = (near_robot @ self._ahead > -BESIDE_SHARE * gap) & (gap < self._radius_m + REACH_M)
+        gap, reach = np.hypot(near_robot[:, 0], near_robot[:, 1]), reaches_m(near_robot, self._robot)
+        met = [ahead_m(self._robot, float(self._ahead[0])) * self._ahead]
+        on_side = (near_robot @ self._ahead > -BESIDE_SHARE * gap) & (reach < self._robot.radius_m + REACH_M)
         if on_side.any():
-            nearest = near_robot[on_side][int(np.argmin(gap[on_side]))]
-            met.append(self._radius_m * nearest / max(float(np.hypot(*nearest)), 1e-9))
+            row = int(np.argmin(reach[on_side]))
+            nearest, away_m = near_robot[on_side][row], reach[on_side][row] - self._robot.radius_m
+            rim_m = self._robot.radius_m if self._robot.outline_m is None else gap[on_side][row] - away_m
+            met.append(rim_m * nearest / max(float(np.hypot(*nearest)), 1e-9))
         self._points = np.vstack([self._points, *met])
         self.is_new = False
         return np.array(met)

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from slam.geometry.poses import arc, to_robot
 from slam.robot import MotionCommand, Scan
+from slam.robot.body import rim_of
 
 from ..floor.accumulated_returns import returns, steadied
 from ..floor.free_space import FreeSpace
@@ -157,9 +158,10 @@ def careful(
     command: MotionCommand, pose_world: Float[np.ndarray, "3"], free_space: FreeSpace, config: DrivingConfig
 ) -> MotionCommand:
     """Shorten a step whose end would cover floor that was not seen yet."""
-    x, y, _ = arc(command.forward_m, command.turn_rad)
+    x, y, turn = arc(command.forward_m, command.turn_rad)
     c, s = np.cos(pose_world[2]), np.sin(pose_world[2])
     end = pose_world[:2] + np.array([c * x - s * y, s * x + c * y])
-    if np.any(free_space.unknown_at(end + config.radius_m * _RIM)):
+    rim = config.radius_m * _RIM if config.robot.outline_m is None else rim_of(config.robot, pose_world[2] + turn)
+    if np.any(free_space.unknown_at(end + rim)):
         return MotionCommand(min(command.forward_m, config.slow_m), command.turn_rad)
     return command

@@ -50,18 +50,18 @@ class DrivingConfig:
 
     @property
     def radius_m(self) -> float:
-        """The robot's disc."""
+        """The robot's disc; of an outline, the one around it: distances are told as from its middle (`reaches_m`)."""
         return self.robot.radius_m
 
     @property
     def narrow_m(self) -> float:
         """A gap between returns of less than this is narrow."""
-        return self.robot.beyond(self.robot.radius_m + self.narrow_beyond_m)
+        return self.robot.beside(self.robot.half_width_m + self.narrow_beyond_m)
 
     @property
     def fits_m(self) -> float:
         """The body does not fit through a gap of less."""
-        return self.robot.beyond(self.robot.radius_m + self.fits_beyond_m)
+        return self.robot.beside(self.robot.half_width_m + self.fits_beyond_m)
 
     @property
     def obstructed_m(self) -> float:

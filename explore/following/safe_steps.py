@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from slam.geometry.poses import J, arc
-from slam.robot import MotionCommand
+from slam.robot import MotionCommand, RobotSpec
+from slam.robot.body import reaches_m
 
 from .driving_config import DrivingConfig
 
@@ -35,7 +36,8 @@ def step_towards(
     error, distance = float(np.arctan2(aim_robot[1], aim_robot[0])), float(np.hypot(aim_robot[0], aim_robot[1]))
     turn = turn_towards(aim_robot, config)
     if abs(error) > (config.narrow_spin_rad if narrow else config.spin_rad):
-        return MotionCommand(0.0, turn)
+        spin = MotionCommand(0.0, turn)
+        return spin if config.robot.outline_m is None or is_safe(spin, points_robot, config, narrow) else None
     forward = min(config.robot.step_m * (1.0 - 0.8 * abs(error) / config.spin_rad), distance)
     if narrow:
         forward = min(forward, config.slow_m)
@@ -48,15 +50,14 @@ def step_towards(
 
 def step_away(points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> MotionCommand | None:
     """Return a short step, forwards or backwards, that leads out of the margin of a return; None outside of it."""
-    gaps = np.hypot(points_robot[:, 0], points_robot[:, 1])
+    gaps = reaches_m(points_robot, config.robot)
     if not len(gaps) or gaps.min() > config.radius_m + 2.0 * config.margin_m:
         return None
     ways = (config.slow_m, -config.slow_m) if config.robot.can_reverse else (config.slow_m,)
     turn_rad = min(AWAY_RAD, config.robot.turn_rad)
     commands = [MotionCommand(way, turn) for way in ways for turn in (-turn_rad, 0.0, turn_rad)]
-    ends = np.stack([arc(command.forward_m, command.turn_rad)[:2] for command in commands])
-    gap = points_robot - ends[:, None]
-    least = np.hypot(gap[..., 0], gap[..., 1]).min(axis=1)
+    ends = np.stack([arc(command.forward_m, command.turn_rad) for command in commands])
+    least = _reaches_at(ends, points_robot, config.robot).min(axis=1)
     best = int(np.argmax(least))
     leads_out = least[best] > gaps.min() + GAIN_SHARE * config.slow_m and is_safe(
         commands[best], points_robot, config, narrow=False
@@ -89,23 +90,34 @@ def centred(
 
 
 def keeps_clear(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig) -> bool:
-    """Return whether the disc comes to cover nothing that it does not cover now: enough on a way that it came."""
+    """Return whether the body comes to cover nothing that it does not cover now: enough on a way that it came."""
     least_m = config.radius_m + config.least_margin_m
-    beside = points_robot[np.hypot(points_robot[:, 0], points_robot[:, 1]) > least_m]
-    return _least_gap(command, beside) >= least_m
+    beside = points_robot[reaches_m(points_robot, config.robot) > least_m]
+    return least_gap(command, beside, config.robot) >= least_m
 
 
-def _least_gap(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"]) -> float:
-    """Return the least distance m from the middle of the body to any point on the way."""
-    places = np.stack([arc(share * command.forward_m, share * command.turn_rad)[:2] for share in (0.25, 0.5, 0.75, 1)])
-    gap = points_robot - places[:, None]
-    return float(np.hypot(gap[..., 0], gap[..., 1]).min(initial=np.inf))
+def least_gap(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], robot: RobotSpec) -> float:
+    """Return the least distance m from the middle of the body to any point on the way, as of a disc."""
+    places = np.stack([arc(share * command.forward_m, share * command.turn_rad) for share in (0.25, 0.5, 0.75, 1)])
+    return float(_reaches_at(places, points_robot, robot).min(initial=np.inf))
+
+
+def _reaches_at(
+    places: Float[np.ndarray, "n 3"], points_robot: Float[np.ndarray, "m 2"], robot: RobotSpec
+) -> Float[np.ndarray, "n m"]:
+    """Return how far the body is from points at each of some places on its way; a disc needs not turn for that."""
+    gap = points_robot - places[:, None, :2]
+    if robot.outline_m is None:
+        return reaches_m(gap, robot)
+    c, s = np.cos(places[:, 2, None]), np.sin(places[:, 2, None])
+    ahead = np.stack([c * gap[..., 0] + s * gap[..., 1], c * gap[..., 1] - s * gap[..., 0]], axis=-1)
+    return reaches_m(ahead, robot)
 
 
 def is_safe(
     command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], config: DrivingConfig, narrow: bool
 ) -> bool:
-    """Return whether the disc keeps its margin on the way, or at least comes no nearer to any return."""
+    """Return whether the body keeps its margin on the way, or at least comes no nearer to any return."""
     if not len(points_robot):
         return True
     near = points_robot[
@@ -113,8 +125,8 @@ def is_safe(
     ]
     if not len(near):
         return True
-    least = _least_gap(command, near)
-    now = float(np.hypot(near[:, 0], near[:, 1]).min())
+    least = least_gap(command, near, config.robot)
+    now = float(reaches_m(near, config.robot).min())
     margin = config.margin_m
     if narrow:  # deep in a gap hardly wider than the body, a step along it may take some of what little is left
         left = now - config.radius_m - config.give_m

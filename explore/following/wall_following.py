@@ -27,6 +27,7 @@ from ..survey.viewpoints import ViewpointsConfig
 from .behaviour import Behaviour
 from .driving import Pilot
 from .driving_config import DrivingConfig
+from .pose_pilot import pilot_of
 
 Following = Literal["viewpoints", "paper"]
 
@@ -189,7 +190,7 @@ class Errand(ABC):
         margin = paths.margin_m + self._config.wider_m * self._failures
         squeeze = paths.squeeze_beyond_m if self._failures < self._config.squeezes else margin
         wider = replace(paths, margin_m=margin, squeeze_beyond_m=squeeze)
-        return Planner(around.free_space, around.pose_world[:2], wider, window_m)
+        return Planner(around.free_space, around.pose_world[:2], wider, window_m, float(around.pose_world[2]))
 
     def _way(self, around: Surroundings, planner: Planner, places: Float[np.ndarray, "n 2"]) -> Way | None:
         """Return the way that the navigator takes to one of some places, or None."""
@@ -205,7 +206,7 @@ class Errand(ABC):
         if way is None:
             return False
         self.walls_to_follow, self._no_way = way.walls, ""
-        self._pilot = Pilot(way.path, way.planner, self._config.driving)
+        self._pilot = pilot_of(way.path, way.planner, self._config.driving)
         return True
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from slam.geometry.circles import RoundConfig
 from slam.geometry.quantities import Count, Distance, Number, Share, Size, Wait
 from slam.robot import RobotSpec, of_robot
 
 from ..following.wall_following import FollowingConfig
-from ..survey.round_things import RoundConfig
 from .sweep import SweepConfig
 
 

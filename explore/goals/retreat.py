@@ -53,7 +53,7 @@ class Retreat:
     def __init__(self, inner: Decider, floor: FloorMemory, config: RetreatConfig, following: FollowingConfig) -> None:
         self._inner, self._floor, self._config, self._following = inner, floor, config, following
         self._driven: list[MotionCommand] = []
-        self._touches = Touches(config.robot.radius_m)
+        self._touches = Touches(config.robot)
         self._back_m, self._why = 0.0, ""
         self._step, self._rounds, self._since_m = -1, 0, np.inf
         self._was_back = False
@@ -132,7 +132,7 @@ class Retreat:
         if not floor.evidence[tuple(cell)] < 0:
             return False
         far = self._floor.last_way_world(around.pose_world, self._config.last_m)[-1]
-        planner = Planner(floor, here, self._following.paths, self._following.window_m)
+        planner = Planner(floor, here, self._following.paths, self._following.window_m, float(around.pose_world[2]))
         return planner.to(floor.points(cells_within(floor, far, self._config.near_m))) is not None
 
 

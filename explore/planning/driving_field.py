@@ -39,7 +39,7 @@ class DrivingField:
     def __init__(self, free_space: FreeSpace, start_world: Float[np.ndarray, "2"], config: PathConfig) -> None:
         """Search from `start_world`."""
         self._free_space, self._config = free_space, config
-        self._block = block_cells(config.robot.radius_m, free_space.config.cell_m)
+        self._block = block_cells(config.robot.half_width_m, free_space.config.cell_m)
         self._side_m = self._block * free_space.config.cell_m
         blocks = -(-np.array(free_space.shape) // self._block)
         self._start = np.clip(free_space.cells(start_world[None])[0] // self._block, 0, blocks - 1)

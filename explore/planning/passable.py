@@ -1,4 +1,7 @@
-"""Where on the floor that was seen free the robot's disc fits, and what a metre of way costs there."""
+"""Where on the floor that was seen free the robot fits, and what a metre of way costs there.
+
+A body with an outline fits here where it would driving straight on; whether it can turn there, `headings` says.
+"""
 
 from dataclasses import dataclass
 
@@ -50,12 +53,12 @@ class PathConfig:
     @property
     def squeeze_m(self) -> float:
         """Least clearance between cell centres."""
-        return self.robot.beyond(self.squeeze_beyond_m)
+        return self.robot.beside(self.squeeze_beyond_m)
 
     @property
     def tight_m(self) -> float:
         """Where the body did not fit, so far around it is not tried again."""
-        return self.robot.beyond(self.tight_beyond_m)
+        return self.robot.beside(self.tight_beyond_m)
 
     @property
     def standoff_m(self) -> float:
@@ -83,7 +86,7 @@ def passable(
 
 def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig) -> Bool[np.ndarray, "p q"]:
     """Return which blocks of a part of the grid lie farther than `coast_m` from all that was hit, there or beside."""
-    block = block_cells(config.robot.radius_m, free_space.config.cell_m)
+    block = block_cells(config.robot.half_width_m, free_space.config.cell_m)
     side_m = block * free_space.config.cell_m
     coast_m = config.coast_of(free_space.range_m)
     beside = int(np.ceil(coast_m / side_m))
@@ -103,13 +106,13 @@ def roomy(
     is_free: Bool[np.ndarray, "*n"], clearance: Float[np.ndarray, "*n"], config: PathConfig
 ) -> Bool[np.ndarray, "*n"]:
     """Return in which cells the body has room enough, by whether they were seen free and their clearance, m."""
-    return is_free & (clearance >= config.robot.radius_m + config.margin_m)
+    return is_free & (clearance >= config.robot.half_width_m + config.margin_m)
 
 
 def metre_costs(
     clearance: Float[np.ndarray, "h w"], is_roomy: Bool[np.ndarray, "h w"], config: PathConfig
 ) -> Float[np.ndarray, "h w"]:
     """Return what a metre costs in each cell, if the body fits there."""
-    least = config.robot.radius_m + config.margin_m
+    least = config.robot.half_width_m + config.margin_m
     tight = np.maximum((config.standoff_m - clearance) / (config.standoff_m - least), 0.0)
     return 1.0 + config.narrow_cost * tight**2 + np.where(is_roomy, 0.0, config.squeeze_cost)

@@ -11,6 +11,7 @@ from skimage.graph import MCP_Geometric
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any, cells_of
+from .headings import Ground, Room, cheapest
 from .passable import PathConfig, blind_blocks, metre_costs, passable
 
 BESIDE_M = 1.0
@@ -29,6 +30,8 @@ class Path:
     """Length in metres, with what narrow places cost on top."""
     reached: int
     """Which of the places asked for was the cheapest."""
+    headings_rad: Float[np.ndarray, " n"] | None = None
+    """Of a body with an outline, its heading at each of the points; None for a disc, which has none to keep."""
 
 
 class Planner:
@@ -40,10 +43,15 @@ class Planner:
         start_world: Float[np.ndarray, "2"],
         config: PathConfig,
         window_m: float | None = None,
+        heading_rad: float | None = None,
     ) -> None:
-        """Look at the floor within `window_m` of the start in x and y, or at all of it."""
+        """Look at the floor within `window_m` of the start in x and y, or at all of it.
+
+        A body with an outline begins with a heading; without one, with any.
+        """
+        self._heading_rad = heading_rad
         self._free_space, self._config = free_space, config
-        self._block = block_cells(config.robot.radius_m, free_space.config.cell_m)
+        self._block = block_cells(config.robot.half_width_m, free_space.config.cell_m)
         start = free_space.cells(start_world[None])[0]
         reach = max(free_space.shape) if window_m is None else int(np.ceil(window_m / free_space.config.cell_m))
         self._corner = np.maximum(start - reach, 0)
@@ -76,11 +84,12 @@ class Planner:
             found = self._cheapest(cells[usable], np.ones_like(corridor))
         if found is None:
             return None
-        way, cost, reached = found
+        way, headings, cost, reached = found
         return Path(
             self._free_space.points(way + self._corner),
             cost * self._free_space.config.cell_m,
             int(usable[reached]),
+            headings,
         )
 
     def _corridor(self, goals: Int[np.ndarray, "g 2"]) -> Bool[np.ndarray, "p q"] | None:
@@ -104,10 +113,10 @@ class Planner:
 
     def _cheapest(
         self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]
-    ) -> tuple[Int[np.ndarray, "n 2"], float, int] | None:
-        """Return the cells of the cheapest path to the cheapest of some cells, its cost in cells, and to which of them.
+    ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"] | None, float, int] | None:
+        """Return cells and headings of the cheapest path to the cheapest of some cells, its cost, and to which.
 
-        It leads over the blocks of a corridor.
+        It leads over the blocks of a corridor; the cost is in cells. A disc has no headings.
         """
         blocks = np.argwhere(corridor)
         first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
@@ -120,6 +129,9 @@ class Planner:
         inside = inside[metre[tuple(goals[inside].T)] > 0]
         if not len(inside):
             return None
+        if self._config.robot.outline_m is not None:
+            found = self._by_headings(corner, metre, start, goals[inside])
+            return None if found is None else (found[0] + corner, *found[1:3], int(inside[found[3]]))
         ends = [tuple(cell) for cell in goals[inside].tolist()]
         search = MCP_Geometric(metre)
         costs, _ = search.find_costs([tuple(start.tolist())], ends, find_all_ends=False)
@@ -127,7 +139,22 @@ class Planner:
         best = int(np.argmin(at_ends))
         if not np.isfinite(at_ends[best]):
             return None
-        return np.array(search.traceback(ends[best]), dtype=np.int64) + corner, float(at_ends[best]), int(inside[best])
+        way = np.array(search.traceback(ends[best]), dtype=np.int64) + corner
+        return way, None, float(at_ends[best]), int(inside[best])
+
+    def _by_headings(
+        self,
+        corner: Int[np.ndarray, "2"],
+        metre: Float[np.ndarray, "h w"],
+        start: Int[np.ndarray, "2"],
+        goals: Int[np.ndarray, "g 2"],
+    ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], float, int] | None:
+        """Return the way of a body with an outline over a part of the window that begins at a corner."""
+        config, first = self._config, corner + self._corner
+        part = tuple(slice(c, c + n) for c, n in zip(corner.tolist(), metre.shape, strict=True))
+        ground = Ground(self._free_space.occupied, first, metre, self._escape[part], self._free_space.config.cell_m)
+        room = Room(config.robot, config.squeeze_beyond_m, config.margin_m, config.squeeze_cost)
+        return cheapest(ground, room, start, self._heading_rad, goals)
 
     def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
         """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""

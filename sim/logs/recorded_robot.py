@@ -30,7 +30,13 @@ TRUTH = {
     "true_face_of_beam": "int s k",
 }
 """What a simulated run tells besides."""
-LATER = {"touched": "bool s", "sigma_share": "float", "scan_start_s": "float s", "fans": "float s 3"}
+LATER = {
+    "touched": "bool s",
+    "sigma_share": "float",
+    "scan_start_s": "float s",
+    "fans": "float s 3",
+    "resolution_m": "float",
+}
 """What older logs do not hold."""
 MOST_M = 1e6
 """Nothing that a robot reports is as large: metres, radians, seconds to the square root of a variance."""
@@ -67,6 +73,8 @@ class Recording:
 
     fans: Float[np.ndarray, "s 3"] | None = None
     """How many beams each scan has, the first one's bearing and the step to the next, rad; None where all are alike."""
+    resolution_m: float = 0.0
+    """Ranges are multiples of this; 0 for any."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -80,7 +88,7 @@ class Recording:
             bearings = self.fans[index, 1] + self.fans[index, 2] * np.arange(beams)
         return Scan(
             bearings, self.ranges_m[index, :beams], self.sigma_m[:beams], self.range_max_m, float(self.time_s[index]),
-            self.sigma_share, start_s,
+            self.sigma_share, start_s, self.resolution_m,
         )  # fmt: skip
 
 
@@ -156,6 +164,7 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], arrays["sigma_m"],
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
         float(arrays.get("sigma_share", 0.0)), arrays.get("scan_start_s"), arrays.get("fans"),
+        float(arrays.get("resolution_m", 0.0)),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:

@@ -18,6 +18,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from ..association.ranges.calibrated_backend import CalibratedBackend
 from ..estimation.backend import Backend, Belief
 from ..estimation.mounting import belief_of_body
 from ..geometry.poses import J, compose, inverse, rotation
@@ -67,7 +68,10 @@ def from_start(
     """
     if carries_start:
         return _Without(start, known)
-    return _Beside(backend, make(known.estimate_world, known.cov), scanner)
+    second = make(known.estimate_world, known.cov)
+    if isinstance(backend, CalibratedBackend) and isinstance(second, CalibratedBackend):
+        second.taken = backend.taken
+    return _Beside(backend, second, scanner)
 
 
 def as_it_is(belief: Belief) -> tuple[Pose, Cov]:
@@ -118,7 +122,10 @@ class _Beside:
         try:
             for verb, told in heard:
                 getattr(self.second, verb)(*told)
-            own = belief_of_body(self.second.belief, self.scanner)
+            belief = self.second.belief
+            if isinstance(self.second, CalibratedBackend):
+                belief = self.second.unsure(belief)
+            own = belief_of_body(belief, self.scanner)
         except Exception:  # whatever a failing back end raises must not end the run that it stands beside
             self._is_lost = True
             return UNKNOWN

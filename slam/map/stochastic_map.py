@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..estimation.backend import POSE, Belief, Joint
+from ..geometry.circles import cov_of_rounding
 from .kernels import wall_kernels
 
 ESTABLISHED = 10
@@ -41,7 +42,7 @@ class StochasticMap:
         """The map of a back end's own belief, with one that states how far walls may be from their lines as well."""
         if self.off_line_cov is None:
             return self
-        query = partial(_joint_off_lines, self.belief, self.off_line_cov)
+        query = partial(_joint_off_lines, self)
         return replace(self, belief=replace(self.belief, query=query))
 
     @property
@@ -53,6 +54,11 @@ class StochasticMap:
     def ids(self) -> Int[np.ndarray, " n"]:
         """Ids of the walls, ascending."""
         return self.belief.ids
+
+    @cached_property
+    def round_cov(self) -> Float[np.ndarray, "n 2 2"]:
+        """How far walls that stand for something round are from it, as a covariance of (alpha rad, d m). Read-only."""
+        return cov_of_rounding(self.belief.lines_world, self.ends_world)
 
     @cached_property
     def ends_world(self) -> Float[np.ndarray, "n 2 2"]:
@@ -67,10 +73,11 @@ class StochasticMap:
         return wall_kernels.distances(self.belief.pose_world[:2], self.ends_world)
 
 
-def _joint_off_lines(belief: Belief, off_line_cov: Float[np.ndarray, "n 2 2"], ids: Int[np.ndarray, " m"]) -> Joint:
-    """Return the joint Gaussian of a belief, with how far its n walls may be from their lines added."""
-    joint, rows = belief.query(ids), np.arange(len(ids))
+def _joint_off_lines(walls: StochasticMap, ids: Int[np.ndarray, " m"]) -> Joint:
+    """Return the joint Gaussian of a belief, with how far its walls may be from their lines added."""
+    joint, rows, of = walls.belief.query(ids), np.arange(len(ids)), walls.belief.rows(ids)
+    assert walls.off_line_cov is not None
     cov = joint.cov.copy()
     lines = cov[POSE:, POSE:].reshape(len(ids), 2, len(ids), 2)
-    lines[rows, :, rows] += off_line_cov[belief.rows(ids)]
+    lines[rows, :, rows] += walls.off_line_cov[of] + walls.round_cov[of]
     return replace(joint, cov=cov)

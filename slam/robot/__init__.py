@@ -2,12 +2,13 @@
 
 from .errors import RobotError
 from .messages import MotionCommand, Odometry, Robot, Scan
-from .spec import NANO, STATED, RobotSpec, ScannerSpec, fitted, of_outline, of_robot
+from .spec import NANO, STATED, LidarSpec, RobotSpec, ScannerSpec, fitted, of_outline, of_robot
 from .wheels import WheelSpec
 
 __all__ = [
     "NANO",
     "STATED",
+    "LidarSpec",
     "MotionCommand",
     "Odometry",
     "Robot",

@@ -37,6 +37,8 @@ class Scan:
     """Standard deviation as a share of the range, beside `sigma_m`; both add by squares."""
     start_s: float = np.nan
     """When its first beam was taken; NaN where nobody tells."""
+    resolution_m: float = 0.0
+    """Ranges are rounded to multiples of this; 0 where they are not, or by far less than their noise."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for bearings out of order and for returns that are none."""
@@ -70,6 +72,7 @@ class Scan:
         sigma_share: float = 0.0,
         start_s: float = np.nan,
         range_min_m: float = 0.0,
+        resolution_m: float = 0.0,
     ) -> "Scan":
         """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first.
 
@@ -83,7 +86,7 @@ class Scan:
         if len(beams) > 2 and abs(bearings[-1] - bearings[0]) > 2 * np.pi - 0.5 * abs(bearings[1] - bearings[0]):
             beams = beams[:-1]
         sigma = sigma_m if isinstance(sigma_m, float) else sigma_m[beams]
-        return cls(bearings[beams], ranges_m[beams], sigma, range_max_m, time_s, sigma_share, start_s)
+        return cls(bearings[beams], ranges_m[beams], sigma, range_max_m, time_s, sigma_share, start_s, resolution_m)
 
     @cached_property
     def passed_m(self) -> Float[np.ndarray, " k"]:
@@ -118,9 +121,20 @@ class Scan:
     def sigmas_m(self) -> Float[np.ndarray, " k"]:
         """The standard deviation of each beam's radial error, m; at its measured range, where noise grows with it."""
         sigmas = np.broadcast_to(np.asarray(self.sigma_m, dtype=np.float64), self.ranges_m.shape)
-        if self.sigma_share <= 0.0:
-            return sigmas
-        return np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
+        if self.sigma_share > 0.0:
+            sigmas = np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
+        return sigmas if self.resolution_m <= 0.0 else np.hypot(sigmas, self._rounding_m)
+
+    @cached_property
+    def _rounding_m(self) -> Float[np.ndarray, " k"]:
+        """Return what rounding adds to the standard deviation of each beam, m.
+
+        One error of up to half a step is even over the step. Neighbours that were rounded to one range have one error
+        between them, so that each counts for its share of it.
+        """
+        starts = np.concatenate([[True], self.ranges_m[1:] != self.ranges_m[:-1]])
+        run = np.cumsum(starts) - 1
+        return self.resolution_m * np.sqrt(np.bincount(run)[run] / 12.0)
 
     def within(self, reach_m: float) -> "Scan":
         """Return the scan of a scanner that reaches so far: what lies beyond is free up to there.

@@ -44,11 +44,22 @@ class ScannerSpec:
 
 
 @dataclass(frozen=True)
+class LidarSpec:
+    """What is asked of the ranges that its scanner measures."""
+
+    calibrate: bool = field(default=False, kw_only=True)
+    """Whether a bias and a scale of the ranges are estimated and taken out; else they are only told."""
+
+
+@dataclass(frozen=True)
 class RobotSpec:
     """What a robot states of itself: planners, mapper, certificate and scores take it from here and nowhere else."""
 
     radius_m: Body = 0.2
-    """Radius of the body, a disc about the middle of the axle; of an outline, its farthest point (`of_outline`)."""
+    """Radius of the body, a disc about the middle of the axle; with an outline it is that of its farthest corner,
+    whatever is said here."""
+    outline_m: tuple[tuple[Offset, Offset], ...] | None = field(default=None, kw_only=True)
+    """Corners of a convex body around the middle of the axle, m, counter-clockwise; None for a disc."""
     step_m: Body = 0.15
     """Longest step; longer commands are shortened along the same arc."""
     turn_rad: Turn = float(np.deg2rad(10.0))
@@ -57,19 +68,65 @@ class RobotSpec:
     """Whether it can drive backwards."""
     scanner: ScannerSpec = field(default_factory=ScannerSpec)
     wheels: WheelSpec = field(default_factory=WheelSpec)
+    lidar: LidarSpec = field(default_factory=LidarSpec)
 
     def __post_init__(self) -> None:
         """Raise RobotError for a body, a step, a scanner or wheels that cannot be."""
+        if self.outline_m is not None:
+            object.__setattr__(self, "outline_m", _convex(self.outline_m))
+            object.__setattr__(self, "radius_m", of_outline(np.array(self.outline_m)))
         if wrong := fault(self):
             raise RobotError(f"expected what a robot states of itself, found {wrong}: correct it")
+
+    @property
+    def half_width_m(self) -> float:
+        """Half of the room that the body takes where it drives straight on: the radius of a disc."""
+        return self.radius_m if self.outline_m is None else float(np.abs(np.array(self.outline_m)[:, 1]).max())
 
     def beyond(self, metres: float) -> float:
         """Return the distance from the middle of the body to so far beyond its rim, m."""
         return round(self.radius_m + metres, NANO)
 
+    def beside(self, metres: float) -> float:
+        """Return the distance from the middle of a body that drives straight on to so far beside it, m."""
+        return round(self.half_width_m + metres, NANO)
+
+    @property
+    def inner_m(self) -> float:
+        """Radius of the largest disc about the middle of the axle within the body."""
+        if self.outline_m is None:
+            return self.radius_m
+        corners = np.array(self.outline_m)
+        after = np.roll(corners, -1, axis=0)
+        doubled = corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]
+        return float((doubled / np.hypot(*(after - corners).T)).min())
+
     def steps_of(self, way_m: float) -> int:
         """Return how many steps a way takes at most, if it turns no more than ways among walls do."""
         return round(max(way_m / self.step_m, way_m * TURN_OF_WAY / self.turn_rad))
+
+
+def _convex(corners: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Return the corners of an outline counter-clockwise; raises RobotError where it is none that is convex.
+
+    Bodies that are not are stated by their hull: nothing can be driven around in their notches.
+    """
+    points = np.array(corners, dtype=np.float64).reshape(-1, 2)
+    turns = np.roll(points, -1, axis=0) - points, np.roll(points, -2, axis=0) - np.roll(points, -1, axis=0)
+    left = turns[0][:, 0] * turns[1][:, 1] - turns[0][:, 1] * turns[1][:, 0]
+    turned = float(np.abs(np.arctan2(left, np.vecdot(*turns)).sum()))
+    is_convex = (np.all(left > 0.0) or np.all(left < 0.0)) and turned < 3.0 * np.pi
+    if len(points) < 3 or not np.all(np.isfinite(points)) or not is_convex:
+        raise RobotError(
+            f"expected a convex outline of three corners or more, found {corners}: state its hull, in order"
+        )
+    points = points if left[0] > 0.0 else points[::-1]
+    across = points[:, 0] * np.roll(points, -1, axis=0)[:, 1] - points[:, 1] * np.roll(points, -1, axis=0)[:, 0]
+    if not np.all(across > 0.0):
+        raise RobotError(
+            f"expected an outline around the middle of the axle at (0, 0), found {corners}: measure it from there"
+        )
+    return tuple((float(x), float(y)) for x, y in points)
 
 
 def of_outline(points_m: Float[np.ndarray, "n 2"]) -> float:

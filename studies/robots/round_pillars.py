@@ -21,7 +21,10 @@ from shapely.geometry.polygon import orient
 import chainslam
 from experiments.scenario import TrialConfig
 from experiments.terminal.console import plain_console
+from experiments.terminal.progress import number
 from experiments.trial import run_trial
+from sim.lidar import LidarConfig
+from sim.robot import RobotConfig
 from sim.worlds import World
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -40,18 +43,37 @@ class RoundPillarsStudy:
     """The seed of the first; the others follow it."""
     backend: str = "invariant-ekf"
     """The estimator."""
+    beams: int = 180
+    """Of the scanner, where it is our own simulator's."""
+    irsim: bool = True
+    """Whether IR-SIM's rooms are explored, too."""
 
     def run(self) -> None:
         """Run the study and print its table."""
         shown = Table(title=f"{self.backend}, with and without three round pillars", title_justify="left")
-        for column in ("simulator", "seed", "status", "steps without", "steps with", "share", "coverage", "collisions"):
+        for column in (
+            "simulator",
+            "seed",
+            "status",
+            "steps without",
+            "steps with",
+            "share",
+            "coverage",
+            "map ANEES",
+            "collisions",
+        ):
             shown.add_column(column, justify="right")
         shares = []
         for simulator, seed, without, found in self._pairs():
             shares.append(found["steps"] / without["steps"])
             cells = (simulator, str(seed), found["status"], str(without["steps"]), str(found["steps"]))
             coverage, collisions = found.get("coverage"), found["collisions"]
-            shown.add_row(*cells, f"{shares[-1]:.2f}", "-" if coverage is None else f"{coverage:.3f}", str(collisions))
+            shown.add_row(
+                *cells,
+                f"{shares[-1]:.2f}",
+                *(number(each) for each in (coverage, found.get("map_anees"))),
+                str(collisions),
+            )
         console = plain_console()
         console.print(shown)
         console.print(f"geometric mean of the shares {np.exp(np.mean(np.log(shares))):.2f}, largest {max(shares):.2f}")
@@ -63,14 +85,16 @@ class RoundPillarsStudy:
             rooms = (ROOM, shapely.Polygon(ROOM.exterior.coords, holes))
             without, found = (self._here(orient(room), seed) for room in rooms)
             yield "own", seed, without, found
-        for seed in range(self.first_seed, self.first_seed + self.seeds):
+        for seed in range(self.first_seed, self.first_seed + self.seeds * self.irsim):
             discs = pillars(seed, IRSIM_ROOM, IRSIM_START, 0.55)
             without, found = (self._in_irsim(each, seed) for each in (np.empty((0, 3)), discs))
             yield "IR-SIM", seed, without, found
 
     def _here(self, room: shapely.Polygon, seed: int) -> dict[str, Any]:
         world = World("round-pillars", room, np.array(START), {})
-        return run_trial(TrialConfig(world.name, self.backend, seed=seed, max_steps=2000), world=world).summary
+        robot = RobotConfig(lidar=LidarConfig(beams=self.beams))
+        trial = TrialConfig(world.name, self.backend, seed=seed, max_steps=2000, robot=robot)
+        return run_trial(trial, world=world).summary
 
     def _in_irsim(self, discs: Float[np.ndarray, "n 3"], seed: int) -> dict[str, Any]:
         spec = importlib.util.spec_from_file_location("irsim_robot", EXAMPLES / "irsim_robot.py")

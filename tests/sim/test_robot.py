@@ -1,11 +1,11 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from sim.robot import RobotConfig, SimulatedRobot
 from slam.geometry.lines import distance_to_segments
-from slam.robot import MotionCommand, Robot, ScannerSpec
+from slam.robot import MotionCommand, Robot, ScannerSpec, WheelSpec
 
 
 @dataclass(frozen=True)
@@ -165,3 +165,17 @@ def test_a_scanner_off_the_axle_sees_from_where_it_sits():
     scan = SimulatedRobot(room(), seed=1, errorless=True, config=config).sense()
     ahead, behind = np.argmin(np.abs(scan.bearings_rad)), np.argmax(np.abs(scan.bearings_rad))
     assert scan.ranges_m[[ahead, behind]] == pytest.approx([1.9, 2.1], abs=1e-9)
+
+
+def test_a_long_body_stops_where_its_corner_meets_a_wall():
+    """It stands 0.25 m beside a wall, 0.2 m wide to that side: it may drive along, and turn by 7 degrees only."""
+    outline = ((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2))
+    config = RobotConfig(outline_m=outline, turn_rad=0.6, wheels=WheelSpec(slip=0.0, lateral_slip=0.0))
+    world = room()
+    corners = world.faces.reshape(-1, 2)
+    beside = replace(world, start=np.array([corners[:, 0].mean(), corners[:, 1].min() + 0.25, 0.0]))
+    robot = SimulatedRobot(beside, 1, config=config)
+    assert not robot.drive(MotionCommand(0.1, 0.0)).touched
+    assert robot.drive(MotionCommand(0.0, 0.6)).touched
+    assert robot.record.collisions == 1
+    assert 0.2 * np.cos(robot.true_pose[2]) + 0.4 * np.sin(robot.true_pose[2]) < 0.25

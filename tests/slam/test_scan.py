@@ -135,3 +135,13 @@ def test_a_scanner_that_reaches_less_far_sees_the_way_there_free_and_what_never_
     np.testing.assert_array_equal(near.ranges_m, [2.0, np.inf, np.nan, np.nan, 14.9])
     assert near.range_max_m == 15.0
     assert near.within(40.0).range_max_m == 15.0
+
+
+def test_rounding_counts_once_for_neighbours_that_were_rounded_to_one_range():
+    """Four beams of one rounded range together weigh as much as one; those of other ranges have errors of their own."""
+    ranges = np.array([1.0, 1.0, 1.0, 1.0, 1.025, 1.05, np.inf, np.nan])
+    scan = Scan(0.1 * np.arange(8), ranges, 0.003, 4.0, 0.0, resolution_m=0.025)
+    rounding = np.sqrt(scan.sigmas_m**2 - 0.003**2)
+    np.testing.assert_allclose(rounding[:4], 2.0 * 0.025 / np.sqrt(12.0))
+    np.testing.assert_allclose(rounding[4:6], 0.025 / np.sqrt(12.0))
+    assert Scan(0.1 * np.arange(8), ranges, 0.003, 4.0, 0.0).sigmas_m.tolist() == [0.003] * 8

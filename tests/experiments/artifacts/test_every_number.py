@@ -14,7 +14,7 @@ from experiments.campaign.work import Job, perform, unpack
 
 HERE = Path(__file__).parents[1]
 BY_HAND = (
-    *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations")),
+    *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations", "range_scores")),
     "artifacts/test_products",
     *(f"campaign/scores/test_{name}" for name in ("score", "path_scores")),
     *(

@@ -25,7 +25,7 @@ from sim.worlds import World
 from slam.backends import BACKENDS
 from slam.geometry.poses import compose
 from slam.mapper import Mapper
-from slam.robot import MotionCommand, Odometry, Scan
+from slam.robot import MotionCommand, Odometry, RobotSpec, Scan
 
 FACES = np.array(
     [[[0.0, 0.0], [9.0, 0.0]], [[9.0, 0.0], [9.0, 3.0]], [[9.0, 3.0], [0.0, 3.0]], [[0.0, 3.0], [0.0, 0.0]]]
@@ -152,7 +152,7 @@ def test_a_robot_far_off_all_bounds_is_told_in_one_line():
 
 
 def test_the_body_met_something_in_front_and_perhaps_what_is_nearest_on_the_side_to_which_it_moved():
-    touches, near = Touches(0.2), np.array([[0.15, 0.14], [-0.19, 0.0], [0.5, 0.0]])
+    touches, near = Touches(RobotSpec()), np.array([[0.15, 0.14], [-0.19, 0.0], [0.5, 0.0]])
     touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
     assert touches.is_new
     aside = 0.2 * near[0] / np.hypot(*near[0])
@@ -163,6 +163,15 @@ def test_the_body_met_something_in_front_and_perhaps_what_is_nearest_on_the_side
     np.testing.assert_allclose(touches.meet(np.array([[-0.2 - 1.1 * REACH_M, 0.0]])), [[-0.2, 0.0]])
     np.testing.assert_allclose(touches.points_robot[:2], [[0.3, 0.0], aside + np.array([0.1, 0.0])])
     assert len(touches.points_robot) == 4
+
+
+def test_a_long_body_meets_what_stands_before_its_own_front_and_back():
+    touches = Touches(RobotSpec(outline_m=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2))))
+    touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
+    beside = np.array([[0.3, 0.22]])
+    np.testing.assert_allclose(touches.meet(beside)[0], [0.5, 0.0])
+    touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(-0.1, 0.0))
+    np.testing.assert_allclose(touches.meet(beside), [[-0.3, 0.0]])
 
 
 class Glass(SimulatedRobot):

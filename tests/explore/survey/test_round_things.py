@@ -7,8 +7,9 @@ from shapely.geometry.polygon import orient
 
 from experiments.scenario import TrialConfig
 from experiments.trial import run_trial
-from explore.survey.round_things import RoundConfig, is_round
+from explore.survey.round_things import is_round
 from sim.worlds import World
+from slam.geometry.circles import RoundConfig
 from slam.map.chains import HEAD, OpenEnd
 
 CONFIG = RoundConfig()

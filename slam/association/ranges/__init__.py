@@ -1,0 +1,1 @@
+"""What is wrong with a scanner's ranges, told from walls and wheels."""
