@@ -134,6 +134,9 @@ def _robot_keys(said: Mapping[str, Any], group: Any) -> Record:
         if name in record:
             raise UsageError(f"expected {name} once, found {key} beside it: leave one of them out")
         record[name] = value
+    is_disc = "radius_m" in record and isinstance(group, RobotSpec)
+    if is_disc and record.setdefault("outline_m", None) is not None:
+        raise UsageError("expected radius_m or outline_m, found both: leave one of them out")
     return record
 
 

@@ -9,10 +9,10 @@ from jaxtyping import Int
 
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
-from .joint_assignment import assign
 from .joint_compatibility import relocate
+from .matchers.joint_assignment import assign
+from .matchers.paper_matching import match_alone, relocate_robot
 from .matching import KnownWalls, Matches, MatchingConfig, MatchingMethod, match
-from .paper_matching import match_alone, relocate_robot
 
 
 @runtime_checkable

@@ -29,8 +29,9 @@ NO_ODDS: Mapping[int, float] = {}
 class WallsConfig:
     """When a wall is tentative, cut back and forgotten.
 
-    It is cut back once two scans in turn have shown beams passing through it: beams that go on beyond it by a wall's
-    thickness, and as far from its ends. A wall cut back to less than ends are known to is forgotten.
+    It is cut back once two scans in turn have shown a beam passing through it: one that goes on beyond it by a wall's
+    thickness, and as far from its ends, or in its middle half. A wall cut back to less than ends are known to is
+    forgotten: so is what stood there for a while.
     """
 
     shared: SharedConfig = of_shared()

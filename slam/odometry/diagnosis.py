@@ -28,7 +28,7 @@ AT_REST = Odometry(np.zeros(3), np.zeros((3, 3)))
 STILL = 0.01
 """After a smaller motion, m or rad, two scans may be alike."""
 TOGETHER = 4
-"""Faults are tried on so many motions as one, too: where the scanner sits shows little in each."""
+"""Where the scanner sits is tried on so many motions as one, too: it shows little in each."""
 SLIPS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """So many times as far as stated the wheels may slip: not to be taken for a fault."""
 
@@ -119,7 +119,7 @@ class Diagnosis:
     def _fault(self) -> Fault | None:
         """Return the fault that is proved by the last scans, and best by them."""
         return self._proved(self._last, 1, tried_first()) or self._proved(
-            self._farther, TOGETHER, [each for each in tried_first() if not each.late]
+            self._farther, TOGETHER, [each for each in tried_first() if each.ahead_m or each.left_m]
         )
 
     def _proved(self, last: Sequence[_Moved], steps: int, tried: list[Fault]) -> Fault | None:

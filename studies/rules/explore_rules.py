@@ -19,7 +19,7 @@ DRIVING = (
     Switch("driving.centred", "explore.following.safe_steps", "if «gap >= config.narrow_m» or",
            "True", "in a narrow place the robot aims for the middle, slowly"),
     Switch("driving.careful", "explore.following.driving",
-           "if «np.any(free_space.unknown_at(end + config.radius_m * _RIM))»:",
+           "if «np.any(free_space.unknown_at(end + rim))»:",
            "False", "steps onto floor not seen yet are short"),
     Switch("driving.away", "explore.following.driving", "return «step_away(points, self._config)» or (",
            "None", "the robot backs out of a return's margin"),

@@ -54,6 +54,7 @@ def log_of(estimated=None, **changes):
         "time_s": np.arange(3.0),
         "bearings_rad": np.linspace(-np.pi, np.pi, BEAMS, endpoint=False),
         "ranges_m": np.full((3, BEAMS), 0.5), "sigma_m": np.full(BEAMS, 0.01), "sigma_share": 0.0, "range_max_m": 4.0,
+        "resolution_m": 0.0,
         "odometry": np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "odometry_cov": np.zeros((3, 3, 3)),
         "touched": np.zeros(3, bool),
         "estimated_world": estimated, "estimated_cov": COVS,

@@ -16,7 +16,7 @@ from ...scenario import Scenario
 from ..association import Votes
 from ..innovations import innovation_scores
 from ..records import Log
-from ..summary import Ending, run_keys, spread_ms
+from ..summary import Ending, range_scores, run_keys, spread_ms
 from ..truth import Truth
 
 WITNESSED = (
@@ -90,6 +90,7 @@ def summarise_unwitnessed(scenario: Scenario, log: Log, votes: Votes, step: Step
         "distances": {},
         **dict.fromkeys(WITNESSED.split()),
         **innovation_scores(log),
+        **range_scores(step, log),
         "step_ms": spread_ms(log.seconds),
         "planning_ms": spread_ms(log.planning_seconds),
     }

@@ -148,10 +148,11 @@ def cut_back(
     for k in range(len(near)):
         row = near[k]
         inside = np.zeros(along.shape[1], np.bool_)
+        # All of a wall as short as a leg or a door's end lies near its ends: there its middle half counts.
+        apart_m = min(margin_m, 0.25 * (extents[row, 1] - extents[row, 0]))
         for beam in range(len(inside)):
-            inside[beam] = extents[row, 0] + margin_m < along[k, beam] < extents[row, 1] - margin_m
-        passed = np.count_nonzero(passes[k] & inside) >= twice
-        against[row] = against[row] + 1 if passed else 0
+            inside[beam] = extents[row, 0] + apart_m < along[k, beam] < extents[row, 1] - apart_m
+        against[row] = against[row] + 1 if np.any(passes[k] & inside) else 0
         if against[row] >= twice:
             kept = kept_piece(extents[row], along[k][passes[k] & inside], along[k][hits[k] & inside], trim_m)
             for side in range(2):

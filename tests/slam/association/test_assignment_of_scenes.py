@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.association.joint_assignment import assign
+from slam.association.matchers.joint_assignment import assign
 from slam.association.matching import KnownWalls, MatchingConfig
 from slam.estimation.backend import Joint
 from tests.slam.association.test_matching import PIECES, straight_pieces, three_walls

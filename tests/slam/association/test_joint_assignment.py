@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from slam.association.joint_assignment import NEW, acting, hypotheses
 from slam.association.kernels.candidate_kernels import Candidates
+from slam.association.matchers.joint_assignment import NEW, acting, hypotheses
 from slam.association.matching import MatchingConfig, limits_of
 
 CONFIG = MatchingConfig(method="assignment")

@@ -6,9 +6,9 @@ import shapely
 from scipy.stats import chi2
 
 from slam.association.joint_compatibility import relocate
+from slam.association.matchers.paper_matching import match_alone, relocate_robot
 from slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
 from slam.association.methods import METHODS, Method
-from slam.association.paper_matching import match_alone, relocate_robot
 from slam.association.view import View
 from slam.backends import BACKENDS
 from slam.config import MapperConfig

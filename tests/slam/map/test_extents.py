@@ -152,17 +152,25 @@ def test_a_wall_is_cut_back_to_its_last_hit_once_two_scans_in_turn_show_beams_be
     assert 0.25 < high <= 0.3
 
 
-@pytest.mark.parametrize(
-    "shown", [with_a_hole(0.02, 0.05), [[[1.0, -1.0], [1.0, 0.86]]]], ids=["one beam through it", "its end is nearer"]
-)
-def test_a_lone_beam_or_some_beside_its_end_cut_no_wall(shown):
+def test_beams_beside_its_end_cut_no_wall():
     """Two beams pass within 0.1 m of the end: ends and corners are known no better."""
     walls, pose = Landmarks(*SETTINGS), [0.0, 0.8, 0.0]
     see(walls, [FRONT], [FRONT], [0], pose)
     whole = extent_of(walls, [FRONT], pose)
     for _ in range(4):
-        see(walls, [FRONT], shown, [0], pose)
+        see(walls, [FRONT], [[[1.0, -1.0], [1.0, 0.86]]], [0], pose)
     assert extent_of(walls, [FRONT], pose) == whole
+
+
+@pytest.mark.parametrize("length_m", [0.12, 0.16, 0.19])
+def test_what_is_as_short_as_a_leg_goes_once_beams_pass_where_it_stood(length_m):
+    """Each point of it lies within 0.1 m of an end; something that stands in its place keeps it."""
+    pose, leg = [0.0, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
+    behind = [[3.0, -2.0], [3.0, 2.0]]
+    for shown, owner in ((behind, -1), (leg, 0)):
+        walls = Landmarks(*SETTINGS)
+        gone = [see(walls, [leg], [each], [of], pose) for each, of in [(leg, 0), *[(shown, owner)] * 6]]
+        assert any(gone) == (owner < 0)
 
 
 def test_a_corner_seen_more_sharply_moves_the_end_back():

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..estimation.backend import Joint
-from ..extraction.segments import Segments
-from .kernels.candidate_kernels import Candidates, Known, Limits, Seen, candidates
-from .kernels.joint_kernels import taken_together
-from .kernels.matching_kernels import near_a_wall, refused, still_overlapping
-from .kernels.rest_kernels import apart
-from .matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig, along, limits_of, why
+from ...estimation.backend import Joint
+from ...extraction.segments import Segments
+from ..kernels.candidate_kernels import Candidates, Known, Limits, Seen, candidates
+from ..kernels.joint_kernels import taken_together
+from ..kernels.matching_kernels import near_a_wall, refused, still_overlapping
+from ..kernels.rest_kernels import apart
+from ..matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig, along, limits_of, why
 
 NEW = -1
 """In the place of a candidate: the segment is of no known wall."""
