@@ -68,6 +68,8 @@ def log_of(estimated=None, **changes):
     }  # fmt: skip
     kept |= changes
     kept = {"from_start_world": kept["estimated_world"], "from_start_cov": kept["estimated_cov"]} | kept
+    none = np.zeros(len(kept["ranges_m"]), int)
+    kept = {"curved_beams": none, "own_beams": none} | kept
     heard = {"heard": kept["odometry"], "heard_cov": kept["odometry_cov"]}
     return Log(scan_start_s=kept["time_s"] - 0.1, **heard, **kept)
 

@@ -24,7 +24,7 @@ def made(world, make_map, make_chains):
         for name in ("ranges_m", "odometry", "odometry_cov", "heard", "heard_cov", "face_of_beam", "open_ends",
                      "tentative", "closed_chains",
                      "set_aside", "seconds", "planning_seconds", "touched", "nis", "nis_dof",
-                     "unstated_motion", "is_lost", "wheel_noise_factor", "route_walls")
+                     "unstated_motion", "is_lost", "wheel_noise_factor", "route_walls", "curved_beams", "own_beams")
     }  # fmt: skip
     log = replace(
         run.log, **columns, time_s=np.arange(float(N)), scan_start_s=np.arange(float(N)) - 0.1,
