@@ -11,6 +11,8 @@ from ..terminal.console import say
 
 STEPS = 3.6, 1.27
 """Steps of a run, c n^p for n walls: over 86 stored runs (studies/results/rows; 6 bundled worlds, 70 apartments)."""
+STEPS_A_METRE, STEPS_A_M2 = 3.4, 2.2
+"""But no fewer for each metre of wall and each m2 of floor: corridors and halls have few walls, and a long way."""
 STEPS_SPREAD = 0.6, 2.5
 """Of these runs the shortest and the longest, less 2 %, over what STEPS says."""
 DRIVING_S = 0.25, 0.42
@@ -47,7 +49,9 @@ def world_lines(world: World) -> tuple[str, ...]:
 
 def expected_steps(world: World, most: int) -> tuple[float, float]:
     """Return the least and the most steps that a run in a world will probably take, up to its limit."""
-    middle = STEPS[0] * max(len(world.faces), 1) ** STEPS[1]
+    by_walls = STEPS[0] * max(len(world.faces), 1) ** STEPS[1]
+    length_m = float(np.linalg.norm(world.faces[:, 1] - world.faces[:, 0], axis=1).sum())
+    middle = max(by_walls, STEPS_A_METRE * length_m, STEPS_A_M2 * world.free.area)
     low, high = (min(spread * middle, float(most)) for spread in STEPS_SPREAD)
     return low, high
 

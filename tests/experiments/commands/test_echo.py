@@ -6,13 +6,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
 from experiments.artifacts.files import json_bytes
 from experiments.commands.cli import main
 from experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
-from experiments.scenario import TrialConfig
+from experiments.scenario import TrialConfig, load_world
 from experiments.terminal.console import say
+from experiments.trial import run_trial
 from sim.worlds import DrawingOptions, load
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
@@ -108,6 +110,28 @@ def test_what_a_run_is_expected_to_take_holds_for_stored_runs(world, steps):
     low, high = expected_steps(load(world), 100_000)
     assert low <= steps <= high
     assert high < 5 * low
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [(0, 0), (12, 0), (12, 1.2), (0, 1.2)],
+        [(0, 0), (25, 0), (25, 3), (0, 3)],
+        [(0, 0), (10, 0), (10, 10), (8.5, 10), (8.5, 1.5), (0, 1.5)],
+        [(0, 0), (10, 0), (10, 10), (0, 10)],
+        pytest.param([(0, 0), (60, 0), (60, 1.5), (0, 1.5)], marks=pytest.mark.long),
+    ],
+)
+def test_what_corridors_and_halls_take_is_expected_within_a_factor_of_three(corners, tmp_path):
+    solid = shapely.Polygon(corners)
+    solid = solid.buffer(0.3, join_style="mitre").difference(solid)
+    wall = {"type": "Feature", "properties": {"kind": "wall"}, "geometry": shapely.geometry.mapping(solid)}
+    path = tmp_path / "corridor.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [wall]}))
+    low, high = expected_steps(load_world(str(path)), 100_000)
+    steps = run_trial(TrialConfig(str(path), "invariant-ekf")).summary["steps"]
+    assert low <= steps <= high
+    assert steps / 3.0 < np.sqrt(low * high) < 3.0 * steps
 
 
 def test_a_run_is_told_with_both_clocks_and_no_further_than_its_limit():
