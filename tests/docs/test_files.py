@@ -58,8 +58,8 @@ def columns(path):
         return set(next(csv.reader(file)))
 
 
-SOMETIMES = {"fans"}
-"""Arrays of `log.npz` that only some logs have: of scans that differ in their beams."""
+SOMETIMES = {"fans", "resolution_m"}
+"""Arrays of `log.npz` that only some logs have: of scans that differ in their beams, or in steps of a resolution."""
 
 
 @pytest.mark.parametrize("name", ["log.npz", "map.npz"])

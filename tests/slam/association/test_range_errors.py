@@ -6,7 +6,8 @@ import shapely
 from scipy.optimize import approx_fprime
 
 from sim.lidar import LidarConfig, RangeFinder
-from slam.association.ranges.bias import RangeBias, bows
+from slam.association.kernels.bow_kernels import bows
+from slam.association.ranges.bias import RangeBias
 from slam.association.ranges.calibrated_backend import CalibratedBackend
 from slam.association.ranges.errors import RangeErrors, RangesConfig
 from slam.association.ranges.heard import Ranges
