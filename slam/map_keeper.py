@@ -140,16 +140,20 @@ class MapKeeper:
         believed = few[rows]
         fresh = np.sort(np.concatenate([fresh, believed]))
         if len(fresh):
-            centres = seen_centres(segments, fresh)
             begun = segments.take(fresh)
             straightness = self.config.walls.reliability.straightness
             cov = begun.cov + cov_of_bows(begun, straightness) + cov_of_misfits(begun, straightness)
-            owners[fresh] = self.backend.grow(begun.lines, cov, centres)
+            # A line that may point anywhere would be one wall with whatever is near.
+            told = cov[:, 0, 0] < self.config.matching.angle_rad**2
+            fresh = fresh[told]
+        if len(fresh):
+            owners[fresh] = self.backend.grow(begun.lines[told], cov[told], seen_centres(segments, fresh))
         known = {owner for owner in owners[sides].tolist() if owner >= 0}
         if len(known) == 2:
             self.landmarks.change_points.keep_apart(*known)
         surest = dict.fromkeys(known, self.config.walls.existence.most)
-        return owners, dict(zip(owners[believed].tolist(), odds.tolist(), strict=True)) | surest
+        likely = dict(zip(owners[believed].tolist(), odds.tolist(), strict=True))
+        return owners, {owner: likely[owner] for owner in likely if owner >= 0} | surest
 
     def _observed(
         self,

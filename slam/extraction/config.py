@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..estimation.shared import SharedConfig, of_shared
-from ..geometry.quantities import Beams, Count, Number, Sigmas, Turn, Weight
+from ..geometry.quantities import Beams, Count, Number, Part, Sigmas, Turn, Weight
 
 
 @dataclass(frozen=True)
@@ -43,3 +43,6 @@ class ExtractionConfig:
     1.4 times with 4."""
     doubt_sigmas: Sigmas = 2.5
     """The last beam before a joint is left out where the other line predicts it within this: it may be either's."""
+    end_share: Part = 0.1
+    """What the last beam counts at an end that is no corner, where too few remain to leave it out. It may be of another
+    surface: off by five to seven sigmas, it hides among three or four beams."""

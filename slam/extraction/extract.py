@@ -64,4 +64,5 @@ def rules_of(config: ExtractionConfig) -> Rules:
         sure_beams=config.sure_beams,
         outlier_sigmas=float(config.shared.outlier_sigmas),
         doubt_sigmas=float(config.doubt_sigmas),
+        end_share=float(config.end_share),
     )

@@ -39,7 +39,8 @@ class Segments:
     end_kinds: Int[np.ndarray, "n 2"]
     """An `EndKind` for each end."""
     chi2: Float[np.ndarray, " n"]
-    """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom."""
+    """Squared residuals of the beams over the squared noise, summed: `beam_counts` - 2 degrees of freedom. With few
+    beams up to twice as much: the last ones, which count less in the fit (`end_share`), lie farther off it."""
     is_tentative: Bool[np.ndarray, " n"]
     """Which have so few beams that their first-order covariance is not to be trusted."""
 

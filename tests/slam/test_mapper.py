@@ -235,6 +235,21 @@ def test_an_end_of_few_beams_becomes_a_wall_once_places_enough_showed_it():
     assert not became.map.tentative[is_end(became)].any(), "more than one sure segment speaks for it"
 
 
+@pytest.mark.parametrize(("turn_rad", "count"), [(0.0, 1), (1.1, 0)])
+def test_a_line_of_few_beams_that_may_point_anywhere_begins_no_wall(turn_rad, count):
+    """The end of a wall of 0.1 m again: pointing anywhere it would be one with any wall near by."""
+    room = faces_of(shapely.box(0, 0, 3.4, 3.4).difference(shapely.box(0, 1.65, 1.4, 1.75)))
+
+    def vague(scan, config, **bends):
+        segments = extract(scan, config, **bends)
+        segments.cov[segments.is_tentative, 0, 0] += turn_rad**2
+        return segments
+
+    *_, last = walk(room, [[2.8, 1.6 + 0.1 * (k % 2), 0.0] for k in range(6)], extractor=vague)
+    middles = last.map.ends_world.mean(axis=1)
+    assert np.count_nonzero(np.hypot(*(middles - [1.4, 1.7]).T) < 0.05) == count
+
+
 def test_a_bend_that_the_map_knows_is_cut_where_the_scan_shows_one_line():
     """A wall that turns by a degree, first from 0.4 m, then from 2.6 m, where one line moved the robot by 4 mm."""
     slope = np.tan(np.deg2rad(1.0))

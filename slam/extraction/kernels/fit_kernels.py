@@ -71,6 +71,8 @@ def _fitted_piece(k: int, joints: Joints, returns: Returns, rules: Rules) -> tup
         spread = max(sigma2[i] - variance_met(line, cos[i], sin[i]), 1e-6 * sigma2[i])
         if not off * off <= gate * gate * spread:
             keep[i] = 0.0
+        elif is_free and not is_long:
+            keep[i] *= rules.end_share
     line = refit(line, cos, sin, ranges, keep)
     first, last, count, chi2 = stop, start, 0, 0.0
     for i in range(size):

@@ -22,6 +22,7 @@ class Rules(NamedTuple):
     sure_beams: int
     outlier_sigmas: float
     doubt_sigmas: float
+    end_share: float
 
 
 class Returns(NamedTuple):

@@ -22,6 +22,7 @@ FAR_OFF = {
     "least_beams": 9,
     "sure_beams": 20,
     "doubt_sigmas": 0.0,
+    "end_share": 0.01,
 }
 
 
