@@ -27,6 +27,7 @@ class Pilot:
         self._points = path.points_world
         self._planner, self._config = planner, config
         self._at = 0
+        self._rows_ahead = 10
         self._lookahead_m, self._full_again_at = config.lookahead_m, 0
 
     @property
@@ -43,7 +44,7 @@ class Pilot:
     @property
     def squeeze_world(self) -> Float[np.ndarray, "2"] | None:
         """Where, within the next half metre of the path, there is hardly room for the body; None if nowhere."""
-        ahead = self._points[self._at : self._at + 10]
+        ahead = self._points[self._at : self._at + self._rows_ahead]
         tight = np.flatnonzero(~self._planner.has_room(ahead))
         return ahead[tight[len(tight) // 2]] if len(tight) else None
 
@@ -53,7 +54,7 @@ class Pilot:
 
     def is_obstructed(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> bool:
         """Return whether a return of this scan lies on the next metre of the path."""
-        ahead = self._points[self._at : self._at + 20]
+        ahead = self._points[self._at : self._at + 2 * self._rows_ahead]
         # What is beside the robot already is no matter of the path: `command` gets away from it.
         ahead = ahead[np.hypot(*(ahead - pose_world[:2]).T) > self._config.robot.step_m]
         gap = to_robot(ahead, pose_world)[:, None] - returns(scan, self._config.robot.scanner)

@@ -44,13 +44,6 @@ class PosePilot(Pilot):
         self._rows_ahead = int(AHEAD_M / EVERY_M)
 
     @property
-    def squeeze_world(self) -> Float[np.ndarray, "2"] | None:
-        """Where, on what is looked at of the path, there is hardly room for the body; None if nowhere."""
-        ahead = self._points[self._at : self._at + self._rows_ahead]
-        tight = np.flatnonzero(~self._planner.has_room(ahead))
-        return ahead[tight[len(tight) // 2]] if len(tight) else None
-
-    @property
     def remaining_m(self) -> float:
         """Length of the path from the nearest point on it to its end, turns counted."""
         return float(self._metres[-1] - self._metres[self._at])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.scoring.records import Columns
+from sim.logs.columns import Columns
 
 
 def rows(count):
