@@ -162,10 +162,14 @@ def test_beams_beside_its_end_cut_no_wall():
     assert extent_of(walls, [FRONT], pose) == whole
 
 
+@pytest.mark.parametrize("beside_m", [0.0, 0.0175])
 @pytest.mark.parametrize("length_m", [0.12, 0.16, 0.19])
-def test_what_is_as_short_as_a_leg_goes_once_beams_pass_where_it_stood(length_m):
-    """Each point of it lies within 0.1 m of an end; something that stands in its place keeps it."""
-    pose, leg = [0.0, 0.0, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
+def test_what_is_as_short_as_a_leg_goes_once_beams_pass_where_it_stood(length_m, beside_m):
+    """Each point of it lies within 0.1 m of an end, and no beam need pass its very middle.
+
+    Something that stands in its place keeps it.
+    """
+    pose, leg = [0.0, beside_m, 0.0], [[1.0, -0.5 * length_m], [1.0, 0.5 * length_m]]
     behind = [[3.0, -2.0], [3.0, 2.0]]
     for shown, owner in ((behind, -1), (leg, 0)):
         walls = Landmarks(*SETTINGS)
