@@ -67,8 +67,8 @@ class Diagnosis:
     def __init__(self, config: DiagnosisConfig = DiagnosisConfig()) -> None:
         self._config = config
         self._last: deque[_Moved] = deque(maxlen=config.window)
-        self._farther: deque[_Moved] = deque(maxlen=config.window // 2)
-        self._since = 0
+        self._farther: deque[_Moved] = deque(maxlen=config.window)
+        self._together: list[_Moved] = []
         self._rescued: deque[bool] = deque(maxlen=config.within)
         self._wheels: Odometry | None = AT_REST
         self._scan: Scan | None = None
@@ -76,7 +76,7 @@ class Diagnosis:
     def moved(self, odometry: Odometry) -> None:
         """Take note of what the wheels report; where scans have told a motion, there is nothing to judge."""
         before = self._wheels
-        self._wheels = None if before is None or odometry.wheels is not None else _after(before, odometry)
+        self._wheels = None if before is None or odometry.wheels is not None else composed(before, odometry)
 
     def repeats(self, scan: Scan) -> bool:
         """Return whether a scan is the last one again, beam by beam, though the wheels led where it does not fit."""
@@ -95,15 +95,13 @@ class Diagnosis:
         whether it fits badly in any other way. Faults are tried after such scans alone.
         """
         if self._wheels is None:
-            self._last.clear()
-            self._farther.clear()
-            self._since = 0
+            self._together.clear()
         elif self._scan is not None:
             self._last.append(_Moved(self._wheels, self._scan, scan))
-            self._since += 1
-            if self._since == TOGETHER:
-                self._farther.append(_in_one(list(self._last)[-TOGETHER:]))
-                self._since = 0
+            self._together.append(self._last[-1])
+            if len(self._together) == TOGETHER:
+                self._farther.append(_in_one(self._together))
+                self._together.clear()
         self._wheels, self._scan = AT_REST, scan
         self._rescued.append(was_rescued)
         if fault := self._fault() if was_rescued or is_in_doubt else None:
@@ -158,10 +156,10 @@ class Diagnosis:
 
 def _in_one(moved: Sequence[_Moved]) -> _Moved:
     """Return motions one after the other as one."""
-    return _Moved(functools.reduce(_after, (each.wheels for each in moved)), moved[0].before, moved[-1].after)
+    return _Moved(functools.reduce(composed, (each.wheels for each in moved)), moved[0].before, moved[-1].after)
 
 
-def _after(first: Odometry, then: Odometry) -> Odometry:
+def composed(first: Odometry, then: Odometry) -> Odometry:
     """Return two motions one after the other as one, in the frame before the first."""
     G, R = np.eye(3), np.eye(3)
     R[:2, :2] = rotation(first.motion[2])

@@ -3,13 +3,13 @@
 from collections import deque
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from ..geometry.poses import compose, inverse, rotation, to_world
 from ..robot import Odometry, Scan
 from .config import ScanMatchingConfig
 from .field_kernels import LikelihoodField, field_of
-from .point_kernels import BESIDE, joined, surface_normals, thinned
+from .point_kernels import joined, surface_normals, thinned
 from .point_to_line import Prior, Surfaces, settle
 from .search_kernels import Window, correlate, refine
 from .surface_kernels import NEAREST, NOTHING_SIGMAS, sorted_into_buckets
@@ -48,8 +48,8 @@ def told_by_scans(
     pose, score = refine(field, points, coarse, c.step_rad, c.finest_m)
     if score < c.slip_score:
         return nothing
-    normals, known = surface_normals(returns, c.surface_m)
-    known = _one_surface(returns, normals, known)
+    # Across a corridor, the last returns of both walls are neighbours: no surface runs from one to the other.
+    normals, known = surface_normals(returns, c.gap_m)
     earlier = sorted_into_buckets(surface, guess, farthest + half_m + NEAREST * NOTHING_SIGMAS * c.kernel_m)
     surfaces = Surfaces(returns[known], normals[known])
     weak = Prior(pose, np.diag([1e-2, 1e-2, 1e-2]))
@@ -57,20 +57,6 @@ def told_by_scans(
     floor = np.diag([c.floor_m**2, c.floor_m**2, c.floor_rad**2])
     told = np.linalg.inv(np.linalg.inv(c.independent * information + weak.information) + floor)
     return pose, told
-
-
-def _one_surface(
-    returns: Float[np.ndarray, "n 2"], normals: Float[np.ndarray, "n 2"], known: Bool[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"]:
-    """Return about which returns all neighbours lie near each other, or on the line that they tell.
-
-    Across a corridor, the last returns of both walls are neighbours: they would tell how far along it these lie.
-    """
-    beside = np.clip(np.arange(len(returns))[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(returns) - 1)
-    off = returns[beside] - returns[:, None]
-    is_line = np.abs(np.einsum("nki,ni->nk", off, normals)).max(axis=1) < 2.0 * DEFAULTS.kernel_m
-    is_near = np.linalg.norm(np.diff(returns[beside], axis=1), axis=2).max(axis=1) < DEFAULTS.gap_m
-    return known & (is_near | is_line)
 
 
 class ScanMatcher:

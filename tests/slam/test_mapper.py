@@ -235,7 +235,7 @@ def test_an_end_of_few_beams_becomes_a_wall_once_places_enough_showed_it():
     assert not became.map.tentative[is_end(became)].any(), "more than one sure segment speaks for it"
 
 
-@pytest.mark.parametrize(("turn_rad", "count"), [(0.0, 1), (1.1, 0)])
+@pytest.mark.parametrize(("turn_rad", "count"), [(0.0, 1), (0.9, 1), (1.1, 0)])
 def test_a_line_of_few_beams_that_may_point_anywhere_begins_no_wall(turn_rad, count):
     """The end of a wall of 0.1 m again: pointing anywhere it would be one with any wall near by."""
     room = faces_of(shapely.box(0, 0, 3.4, 3.4).difference(shapely.box(0, 1.65, 1.4, 1.75)))

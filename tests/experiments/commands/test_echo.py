@@ -120,6 +120,7 @@ def test_what_a_run_is_expected_to_take_holds_for_stored_runs(world, steps):
         [(0, 0), (10, 0), (10, 10), (8.5, 10), (8.5, 1.5), (0, 1.5)],
         [(0, 0), (10, 0), (10, 10), (0, 10)],
         pytest.param([(0, 0), (60, 0), (60, 1.5), (0, 1.5)], marks=pytest.mark.long),
+        pytest.param([(0, 0), (20, 0), (20, 20), (0, 20)], marks=pytest.mark.long),
     ],
 )
 def test_what_corridors_and_halls_take_is_expected_within_a_factor_of_three(corners, tmp_path):

@@ -137,7 +137,7 @@ def test_beams_without_return_show_free_floor_up_to_the_range_and_nothing_occupi
 
 @pytest.mark.parametrize("seed", range(4))
 def test_clearances_equal_a_full_distance_transform_after_many_updates(seed):
-    """Cells are hit, freed again, and hit elsewhere."""
+    """Cells are hit, freed again, hit elsewhere, and touched."""
     rng = np.random.default_rng(seed)
     grid, bearings = FreeSpace(), -np.pi + np.arange(90) * np.deg2rad(4.0)
     for _ in range(60):
@@ -145,6 +145,9 @@ def test_clearances_equal_a_full_distance_transform_after_many_updates(seed):
         ranges = np.where(rng.random(90) < 0.2, np.inf, rng.uniform(0.25, 1.5, 90))
         grid.integrate(pose, Scan(bearings, ranges, 0.01, 1.6, 0.0))
         if rng.random() < 0.4:
+            np.testing.assert_allclose(grid.clearance(), full_clearance(grid), atol=1e-6)
+        if rng.random() < 0.1:
+            grid.note_touched(rng.uniform(-1.0, 1.0, 2))
             np.testing.assert_allclose(grid.clearance(), full_clearance(grid), atol=1e-6)
     np.testing.assert_allclose(grid.clearance(), full_clearance(grid), atol=1e-6)
 

@@ -110,6 +110,17 @@ def test_a_scanner_that_sits_aside_shows_over_some_turns_what_it_does_not_in_one
         assert words in max(said)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_motions_that_the_wheels_did_not_tell_are_in_no_sum_of_motions(seed):
+    """A triangle of whose sides the wheels tell nothing: with them, each turn would show a scanner that sits aside."""
+    robot, diagnosis = SimulatedRobot(ROOMS, seed), Diagnosis(NO_BUDGET)
+    for k in range(60):
+        assert not diagnosis.see(robot.sense(), was_rescued=True, is_in_doubt=False)
+        turns = k % 5 != 2
+        odometry = robot.drive(MotionCommand(0.0, np.pi / 6.0) if turns else MotionCommand(0.15, 0.0))
+        diagnosis.moved(odometry if turns else replace(odometry, wheels=odometry))
+
+
 SOUND = {
     "sound": FaultsConfig(),
     "pushed": FaultsConfig(bump=0.15),
