@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import jaxtyping
 import pytest
 
-import experiments  # noqa: F401  # before scipy is loaded: a second thread waits for its turn on a busy machine
+import chainslam.experiments  # noqa: F401  # before scipy is loaded: a second thread waits for its turn on a busy machine
 
 
 @pytest.fixture(autouse=True)

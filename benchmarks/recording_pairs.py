@@ -16,7 +16,7 @@ def cpu_seconds(arguments: list[str]) -> float:
     """Run a command of chainslam and return the CPU time of its processes; raises CalledProcessError."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(
-        [sys.executable, "-m", "experiments.commands.cli", *arguments], check=True, stdout=subprocess.DEVNULL,
+        [sys.executable, "-m", "chainslam.experiments.commands.cli", *arguments], check=True, stdout=subprocess.DEVNULL,
         env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -8,10 +8,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.linalg.blas import dsyrk
 
-from slam.backends import BACKENDS
-from slam.estimation.backend import Observations
-from slam.geometry.lines import directions, normals
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.robot import Odometry
 
 SEEN = 10
 EKFS = [name for name in BACKENDS if name.endswith("-ekf")]

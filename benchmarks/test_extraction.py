@@ -8,10 +8,10 @@ import pytest
 import shapely
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from sim.worlds import load
-from slam.extraction.extract import extract
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.sim.worlds import load
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.robot import Scan
 
 PLANS = Path(__file__).parents[1] / "tests" / "data" / "plans"
 

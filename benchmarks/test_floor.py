@@ -3,10 +3,10 @@
 import numpy as np
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from explore.floor.free_space import FreeSpace
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.robot import MotionCommand, Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.robot import MotionCommand, Scan
 
 STEPS = 300
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from slam.backends.full_ekf import FullEkf
-from slam.estimation.backend import Observations
-from slam.geometry.lines import normals
-from slam.robot import Odometry
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.robot import Odometry
 
 SEEN = 10
 

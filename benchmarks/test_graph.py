@@ -12,11 +12,11 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from slam.estimation.backend import Backend, Observations
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import compose, to_robot, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Backend, Observations
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import compose, to_robot, wrap
+from chainslam.slam.robot import Odometry
 
 SIGMAS = np.array([0.01, 0.005])
 ODOMETRY_COV = np.diag([0.008, 0.003, 0.01]) ** 2

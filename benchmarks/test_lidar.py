@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from sim.lidar import LidarConfig, RangeFinder, bearings
+from chainslam.sim.lidar import LidarConfig, RangeFinder, bearings
 
 
 def rooms(faces: int) -> np.ndarray:

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from explore.mission import explore_mission
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.association.matching import match
-from slam.association.view import View
-from slam.backends import BACKENDS
-from slam.backends.frame.frame import Frame
-from slam.mapper import Mapper
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.association.matching import match
+from chainslam.slam.association.view import View
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.frame.frame import Frame
+from chainslam.slam.mapper import Mapper
 
 
 @pytest.fixture(scope="module")

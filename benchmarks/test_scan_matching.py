@@ -8,10 +8,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from benchmarks.test_lidar import rooms, walk
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import compose, inverse
-from slam.odometry.scan_matching import ScanMatcher
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.odometry.scan_matching import ScanMatcher
+from chainslam.slam.robot import Odometry, Scan
 
 
 @pytest.mark.parametrize("beams", [180, 1081])

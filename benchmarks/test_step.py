@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from explore.mission import explore_mission
-from explore.step import Step
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.backends import BACKENDS
-from slam.mapper import Mapper
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.step import Step
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 PLAN = Path(os.environ.get("PLAN", Path(__file__).parents[1] / "tests" / "data" / "plans" / "school.json"))
 """A school of 333 m2 with 77 faces, or the file that the environment names."""

@@ -8,38 +8,40 @@
 Every name here is one of the rooms' own; what it loads (GTSAM, Rerun, matplotlib) it loads when it is used.
 """
 
+import sys
 from importlib import import_module
 from importlib.metadata import version
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from experiments.library.comparing import Comparison, compare, load
-    from experiments.library.running import explore, replay
-    from experiments.library.runs import Map, Run
-    from experiments.usage import UsageError
-    from explore.step import Step
-    from explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
-    from sim.worlds import DrawingOptions, World
-    from sim.worlds.registry import READERS, WORLDS
-    from slam.backends import BACKENDS, BackendEntry
-    from slam.estimation.backend import Backend, Belief, Joint, Observations, StaleBeliefError
-    from slam.evaluation.axioms.check import Failure, check_backend
-    from slam.robot import MotionCommand, Odometry, Robot, RobotError, RobotSpec, Scan, ScannerSpec, WheelSpec
-    from slam.robot.streaming import SteppedRobot, StreamingRobot, TimedScan, Twist
+    from chainslam.experiments.library.comparing import Comparison, compare, load
+    from chainslam.experiments.library.running import explore, replay
+    from chainslam.experiments.library.runs import Map, Run
+    from chainslam.experiments.usage import UsageError
+    from chainslam.explore.step import Step
+    from chainslam.explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
+    from chainslam.sim.worlds import DrawingOptions, World
+    from chainslam.sim.worlds.registry import READERS, WORLDS
+    from chainslam.slam.backends import BACKENDS, BackendEntry
+    from chainslam.slam.estimation.backend import Backend, Belief, Joint, Observations, StaleBeliefError
+    from chainslam.slam.evaluation.axioms.check import Failure, check_backend
+    from chainslam.slam.robot import MotionCommand, Odometry, Robot, RobotError, RobotSpec, Scan, ScannerSpec, WheelSpec
+    from chainslam.slam.robot.streaming import SteppedRobot, StreamingRobot, TimedScan, Twist
 
 _PLACES = {
-    "experiments.library.running": ("explore", "replay"),
-    "experiments.library.comparing": ("Comparison", "compare", "load"),
-    "experiments.library.runs": ("Map", "Run"),
-    "experiments.usage": ("UsageError",),
-    "explore.step": ("Step",),
-    "explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
-    "sim.worlds": ("DrawingOptions", "World"),
-    "sim.worlds.registry": ("READERS", "WORLDS"),
-    "slam.backends": ("BACKENDS", "BackendEntry"),
-    "slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations", "StaleBeliefError"),
-    "slam.evaluation.axioms.check": ("Failure", "check_backend"),
-    "slam.robot": (
+    "chainslam.experiments.library.running": ("explore", "replay"),
+    "chainslam.experiments.library.comparing": ("Comparison", "compare", "load"),
+    "chainslam.experiments.library.runs": ("Map", "Run"),
+    "chainslam.experiments.usage": ("UsageError",),
+    "chainslam.explore.step": ("Step",),
+    "chainslam.explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
+    "chainslam.sim.worlds": ("DrawingOptions", "World"),
+    "chainslam.sim.worlds.registry": ("READERS", "WORLDS"),
+    "chainslam.slam.backends": ("BACKENDS", "BackendEntry"),
+    "chainslam.slam.estimation.backend": ("Backend", "Belief", "Joint", "Observations", "StaleBeliefError"),
+    "chainslam.slam.evaluation.axioms.check": ("Failure", "check_backend"),
+    "chainslam.slam.robot": (
         "MotionCommand",
         "Odometry",
         "Robot",
@@ -49,7 +51,7 @@ _PLACES = {
         "ScannerSpec",
         "WheelSpec",
     ),
-    "slam.robot.streaming": ("SteppedRobot", "StreamingRobot", "TimedScan", "Twist"),
+    "chainslam.slam.robot.streaming": ("SteppedRobot", "StreamingRobot", "TimedScan", "Twist"),
 }
 """Where each name comes from."""
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -75,3 +77,15 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+class _Interface(ModuleType):
+    """A package whose `explore` is a function, though a room has that name, too."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Bind a name, but for a room of the name of a function: importing it would hide that."""
+        if not (name in _PLACE_OF and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Interface

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 import chainslam
-from sim.worlds.drawing import Drawing, WorldError
+from chainslam.sim.worlds.drawing import Drawing, WorldError
 
 ROOM = """0 0 6 0
 6 0 6 4

@@ -9,23 +9,23 @@ import shapely
 from jaxtyping import Float
 from msgspec import Meta
 
-from explore.limits import Limits
-from explore.mission import MissionConfig
-from explore.strategies import STRATEGIES, Strategy, make_strategy
-from sim.chance import SEED_MAX, Chance, Channel
-from sim.robot import RobotConfig, SimulatedRobot, TrueRecord, chance_in
-from sim.worlds import AS_DRAWN, DrawingOptions, World, WorldError, listing, load
-from slam.association.ranges.calibrated_backend import CalibratedBackend
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.backends import BACKENDS, BackendOptions
-from slam.config import MapperConfig
-from slam.estimation.backend import Backend
-from slam.estimation.mounting import start_of_scanner
-from slam.geometry.quantities import Count, Period, Place, Size, fault
-from slam.odometry.config import ScanMatchingConfig
-from slam.odometry.matched_robot import MatchedRobot
-from slam.odometry.scan_matching import ScanMatcher
-from slam.robot import Robot, fitted
+from chainslam.explore.limits import Limits
+from chainslam.explore.mission import MissionConfig
+from chainslam.explore.strategies import STRATEGIES, Strategy, make_strategy
+from chainslam.sim.chance import SEED_MAX, Chance, Channel
+from chainslam.sim.robot import RobotConfig, SimulatedRobot, TrueRecord, chance_in
+from chainslam.sim.worlds import AS_DRAWN, DrawingOptions, World, WorldError, listing, load
+from chainslam.slam.association.ranges.calibrated_backend import CalibratedBackend
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import Backend
+from chainslam.slam.estimation.mounting import start_of_scanner
+from chainslam.slam.geometry.quantities import Count, Period, Place, Size, fault
+from chainslam.slam.odometry.config import ScanMatchingConfig
+from chainslam.slam.odometry.matched_robot import MatchedRobot
+from chainslam.slam.odometry.scan_matching import ScanMatcher
+from chainslam.slam.robot import Robot, fitted
 
 from .usage import UsageError, choose, did_you_mean
 

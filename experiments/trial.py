@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from explore.certificate import Certificate, certify
-from explore.limits import limited
-from explore.mission import explore_mission
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.logs.keyframes import RecordedLog
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.estimation.backend import Joint
-from slam.evaluation.from_start import FromStart, Start, as_it_is, from_start
-from slam.geometry.compiled import link_kernels
-from slam.mapper import Mapper
+from chainslam.explore.certificate import Certificate, certify
+from chainslam.explore.limits import limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.logs.keyframes import RecordedLog
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.evaluation.from_start import FromStart, Start, as_it_is, from_start
+from chainslam.slam.geometry.compiled import link_kernels
+from chainslam.slam.mapper import Mapper
 
 from .scenario import KNOWN, Scenario, TrialConfig, build, heard_by, make_backend, sigmas_of
 from .scoring.association import Votes

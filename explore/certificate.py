@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float
 from PIL import Image, ImageDraw
 from shapely.geometry.polygon import orient
 
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .floor.free_space import FreeSpace
 from .goal import GivenUp

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from slam.geometry.compiled import compiling_s
-from slam.mapper import Mapper
-from slam.robot import Odometry, Robot, RobotSpec, of_robot
+from chainslam.slam.geometry.compiled import compiling_s
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Robot, RobotSpec, of_robot
 
 from .floor.accumulated_returns import AccumulatedReturns
 from .floor.floor_memory import FloorMemory, FloorMemoryConfig

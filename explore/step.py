@@ -8,13 +8,13 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.association.matching import Matches
-from slam.association.ranges.errors import RangeErrors
-from slam.association.recovery import Localisation
-from slam.extraction.segments import Segments
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import Odometry, RobotSpec, Scan
+from chainslam.slam.association.matching import Matches
+from chainslam.slam.association.ranges.errors import RangeErrors
+from chainslam.slam.association.recovery import Localisation
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import Odometry, RobotSpec, Scan
 
 from .floor.free_space import FreeSpace
 from .goal import SetAside

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.robot import MotionCommand, Odometry, RobotSpec, WheelSpec
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, WheelSpec
 
 
 @dataclass(frozen=True)

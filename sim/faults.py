@@ -8,8 +8,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from slam.geometry.poses import inverse, to_world
-from slam.geometry.quantities import Angle, Body, Count, Distance, Factor, Heading, Number, Offset, Share, Times
+from chainslam.slam.geometry.poses import inverse, to_world
+from chainslam.slam.geometry.quantities import (
+    Angle,
+    Body,
+    Count,
+    Distance,
+    Factor,
+    Heading,
+    Number,
+    Offset,
+    Share,
+    Times,
+)
 
 from .chance import Chance, Channel
 from .drive import Slip

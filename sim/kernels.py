@@ -6,7 +6,7 @@ A face is a column of `rows`: x and y of its start, of its end, the normal of it
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 
 _ON_THE_VERTEX = 1e-9
 """Share of a beam step by which a face reaches past its ends, so that no beam slips between two faces that touch."""

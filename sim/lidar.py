@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.geometry.lines import distance_to_segments, normals, through
-from slam.geometry.quantities import Beams, Count, Deviation, Distance, Share, Sight, Size, View
-from slam.robot import LidarSpec
+from chainslam.slam.geometry.lines import distance_to_segments, normals, through
+from chainslam.slam.geometry.quantities import Beams, Count, Deviation, Distance, Share, Sight, Size, View
+from chainslam.slam.robot import LidarSpec
 
 from .kernels import nearest, seen_from
 

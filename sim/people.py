@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
-from slam.geometry.lines import distance_to_segments
-from slam.geometry.quantities import Body, Distance, Pace, Place, Wait
-from slam.robot import RobotError
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.geometry.quantities import Body, Distance, Pace, Place, Wait
+from chainslam.slam.robot import RobotError
 
 from .chance import Chance, Channel
 

@@ -7,10 +7,10 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
 
-from slam.geometry.lines import distance_to_segments
-from slam.geometry.poses import compose, to_world
-from slam.geometry.quantities import Period, Pitch, Speed
-from slam.robot import LidarSpec, MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.geometry.poses import compose, to_world
+from chainslam.slam.geometry.quantities import Period, Pitch, Speed
+from chainslam.slam.robot import LidarSpec, MotionCommand, Odometry, RobotSpec, Scan, ScannerSpec
 
 from .chance import Chance, Channel, world_key
 from .drive import clamp, draw_slip, odometry, seconds, true_motion

@@ -15,8 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from viz import palette
-from viz.figures.maps import saved
+from chainslam.viz import palette
+from chainslam.viz.figures.maps import saved
+
+from .counts import room_of
 
 PLACES = {
     "experiments": (0.0, 7.9, 10.0),
@@ -61,7 +63,7 @@ def rooms(root: Path) -> list[Room]:
     Raises KeyError for a room without a contract.
     """
     contracts = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-    layers = {each["containers"][0]: each["layers"] for each in contracts if "containers" in each}
+    layers = {room_of(each["containers"][0]): each["layers"] for each in contracts if "containers" in each}
     return [
         Room(
             name,
@@ -74,12 +76,12 @@ def rooms(root: Path) -> list[Room]:
 
 def imports(names: list[str]) -> Counter[tuple[str, str]]:
     """Return for each pair of rooms how many files of the first import something of the second."""
-    graph = grimp.build_graph(*names, cache_dir=None)
+    graph = grimp.build_graph("chainslam", cache_dir=None)
     return Counter(
-        (module.partition(".")[0], room)
+        (room_of(module), room)
         for module in graph.modules
-        for room in {found.partition(".")[0] for found in graph.find_modules_directly_imported_by(module)}
-        if room != module.partition(".")[0]
+        for room in {room_of(found) for found in graph.find_modules_directly_imported_by(module)}
+        if room != room_of(module) and {room, room_of(module)} <= set(names)
     )
 
 

@@ -17,7 +17,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from experiments.views.settings_schema import settings
+from chainslam.experiments.views.settings_schema import settings
 
 ROOMS = ("slam", "explore", "sim", "viz", "experiments", "studies")
 TUNED = ("slam", "explore")
@@ -175,13 +175,17 @@ def entries(root: Path, rooms: tuple[str, ...] = ROOMS) -> dict[str, int]:
 
 def arrows(rooms: tuple[str, ...] = ROOMS) -> dict[str, tuple[int, int]]:
     """Return for each room how many files it has and how many imports lead from them to files of any room."""
-    graph = grimp.build_graph(*rooms, cache_dir=None)
-    modules = [module for module in graph.modules if module.partition(".")[0] in rooms]
+    graph = grimp.build_graph("chainslam", "studies", cache_dir=None)
     return {
         room: (len(inside), sum(len(graph.find_modules_directly_imported_by(module)) for module in inside))
         for room in rooms
-        if (inside := [module for module in modules if module.partition(".")[0] == room])
+        if (inside := [module for module in graph.modules if room_of(module) == room])
     }
+
+
+def room_of(module: str) -> str:
+    """Return the top-level folder that a module stands in."""
+    return module.removeprefix("chainslam.").partition(".")[0]
 
 
 def page(numbers: Iterable[Number]) -> str:
@@ -189,7 +193,7 @@ def page(numbers: Iterable[Number]) -> str:
     numbers = list(numbers)
     lines = [PREFACE]
     for group, own in groupby(settings(), lambda each: each.group):
-        place = f"{group.kind.__module__.replace('.', '/')}.py"
+        place = f"{group.kind.__module__.removeprefix('chainslam.').replace('.', '/')}.py"
         lines += [f"## `{group.key or 'trial'}`: `{group.kind.__name__}`, `{place}`", ""]
         lines += ["| key | default | what it may be | what it is |", "|---|---|---|---|"]
         lines += [f"| `{each.key}` | `{_cell(each.default)}` | {each.allows} | {_cell(each.says)} |" for each in own]

@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import RUNNING
-from experiments.campaign.comparison.tables import TIMINGS
-from experiments.scoring.summary import TIMED
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import RUNNING
+from chainslam.experiments.campaign.comparison.tables import TIMINGS
+from chainslam.experiments.scoring.summary import TIMED
 
 SIGNALS = (*[signal.SIGKILL] * 3, signal.SIGTERM, signal.SIGHUP)
 STOPPED, PATIENCE_S = 130, 600.0
@@ -59,7 +59,7 @@ def subjects(steps: int, jobs: int) -> dict[str, Subject]:
 def begin(words: tuple[str, ...]) -> subprocess.Popen[bytes]:
     """Start the command in a group of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "experiments.commands.cli", *words],
+        [sys.executable, "-m", "chainslam.experiments.commands.cli", *words],
         start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
 

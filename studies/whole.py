@@ -12,12 +12,12 @@ from pathlib import Path
 
 import tyro
 
-from experiments.artifacts.files import write
-from experiments.artifacts.run_folder import prepare
-from experiments.campaign.pages.page import page_of
-from experiments.reproductions import REPRODUCTIONS
-from experiments.usage import UsageError
-from viz.reports.report import Page, PagePicture, Section, html
+from chainslam.experiments.artifacts.files import write
+from chainslam.experiments.artifacts.run_folder import prepare
+from chainslam.experiments.campaign.pages.page import page_of
+from chainslam.experiments.reproductions import REPRODUCTIONS
+from chainslam.experiments.usage import UsageError
+from chainslam.viz.reports.report import Page, PagePicture, Section, html
 
 from .paper.page import tables_of
 from .runner.rows import read
@@ -59,7 +59,7 @@ class WholeStudy:
         """Return the studies in their order."""
         at, trials, jobs = str(self.out), str(self.trials), ("--jobs", str(self.jobs))
         first = ("--first-seed", str(self.first_seed))
-        cli = "experiments.commands.cli"
+        cli = "chainslam.experiments.commands.cli"
         bias = (
             "studies.consistency.bias",
             "--strategies",

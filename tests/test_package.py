@@ -74,7 +74,7 @@ def test_what_is_installed_runs_outside_the_checkout(wheel, tmp_path):
     (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     python, code = (
         tmp_path / "venv" / "bin" / "python",
-        "import sys; from experiments.commands.cli import main; sys.exit(main())",
+        "import sys; from chainslam.experiments.commands.cli import main; sys.exit(main())",
     )
     env = {"OMP_NUM_THREADS": "1", "PYTHONPATH": ""}
     where = run(python, "-c", "import experiments, sim; print(experiments.__file__, sim.__file__)", cwd=tmp_path, **env)

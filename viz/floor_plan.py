@@ -12,9 +12,9 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
-from explore.certificate import Certificate
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.certificate import Certificate
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from . import palette
 

@@ -1,6 +1,6 @@
 """Colours, one meaning each, the same in Rerun and in matplotlib."""
 
-from slam.backends import BACKENDS
+from chainslam.slam.backends import BACKENDS
 
 BACKEND_COLOURS = (
     "#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#3A3A3A", "#6B2C91",

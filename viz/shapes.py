@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.geometry.lines import directions
+from chainslam.slam.geometry.lines import directions
 
 VERTICES = 17
 """An ellipse is a closed strip of so many points, the first again at its end."""

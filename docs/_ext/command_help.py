@@ -15,7 +15,7 @@ COLUMNS = "84"
 
 def help_of(words: list[str]) -> str:
     """Return the help of `chainslam` or of one of its commands, without colours and boxes."""
-    from experiments.commands.cli import main
+    from chainslam.experiments.commands.cli import main
 
     said = io.StringIO()
     terminal = {"COLUMNS": COLUMNS, "NO_COLOR": "1", "TERM": "dumb"}
@@ -37,7 +37,7 @@ class CommandHelp(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the sections."""
-        from experiments.commands.cli import COMMANDS
+        from chainslam.experiments.commands.cli import COMMANDS
 
         found: list[nodes.Node] = []
         for name in COMMANDS:

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.errors import GEOSException
 
-from sim.logs.archive import regular
+from chainslam.sim.logs.archive import regular
 
 from ..usage import UsageError
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.logs.recorded_robot import FORMAT
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 CONFIG = "config.json"
 """Of a run, of a campaign and of merged campaigns."""

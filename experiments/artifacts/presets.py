@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sim.logs.archive import regular
-from sim.robot import RobotConfig
-from sim.robots import ROBOTS
-from sim.worlds.drawing import WorldError
-from sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
-from slam.robot import LidarSpec, RobotSpec
+from chainslam.sim.logs.archive import regular
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.robots import ROBOTS
+from chainslam.sim.worlds.drawing import WorldError
+from chainslam.sim.worlds.readers.plain_yaml import FILE_MAX, plain_mapping
+from chainslam.slam.robot import LidarSpec, RobotSpec
 
 from ..usage import UsageError, did_you_mean
 from .schema import UnfitError

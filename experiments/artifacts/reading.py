@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.logs.archive import ArchiveError, read_archive, regular
-from sim.worlds import WorldError
-from slam.robot import RobotError
+from chainslam.sim.logs.archive import ArchiveError, read_archive, regular
+from chainslam.sim.worlds import WorldError
+from chainslam.slam.robot import RobotError
 
 from ..usage import UsageError
 from .files import format_fault

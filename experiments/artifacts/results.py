@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from slam.evaluation.consistency import pose_errors
-from viz.floor_plan import Dimension, floor_plan
+from chainslam.slam.evaluation.consistency import pose_errors
+from chainslam.viz.floor_plan import Dimension, floor_plan
 
 from ..scenario import TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis

@@ -15,8 +15,8 @@ import numpy as np
 import pyarrow as pa
 from jaxtyping import Float
 
-from explore.step import Step
-from sim.logs.recorded_robot import FORMAT
+from chainslam.explore.step import Step
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 from ..usage import UsageError
 from .files import json_bytes, write

@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Struct, defstruct
 
-from explore.limits import Limits
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.logs.recorded_robot import RecordingError, read_log, recording_of
+from chainslam.explore.limits import Limits
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..usage import UsageError

@@ -15,8 +15,8 @@ from typing import Any, get_args, get_type_hints
 from msgspec import ValidationError, convert
 from msgspec.json import schema
 
-from slam.geometry.quantities import allowed
-from slam.robot import STATED
+from chainslam.slam.geometry.quantities import allowed
+from chainslam.slam.robot import STATED
 
 STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
 """Of the place that msgspec tells: the key of an object, the number of an entry, or some key of many."""

@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from sim.worlds import DrawingOptions, WorldError
-from slam.robot import STATED, RobotError
+from chainslam.sim.worlds import DrawingOptions, WorldError
+from chainslam.slam.robot import STATED, RobotError
 
 from ..scenario import TrialConfig
 from ..usage import UsageError

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from sim.logs.keyframes import RecordedLog
-from slam.geometry.poses import wrap
+from chainslam.sim.logs.keyframes import RecordedLog
+from chainslam.slam.geometry.poses import wrap
 
 from ..scoring.records import Log
 from ..scoring.summary import odometry_poses

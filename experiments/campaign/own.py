@@ -6,13 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from explore import strategies
-from explore.strategies import STRATEGIES, StrategyEntry
-from sim.worlds import DrawingOptions, registry
-from sim.worlds.drawing import Drawing
-from sim.worlds.registry import READERS
-from slam import backends
-from slam.backends import BACKENDS, BackendEntry
+from chainslam.explore import strategies
+from chainslam.explore.strategies import STRATEGIES, StrategyEntry
+from chainslam.sim.worlds import DrawingOptions, registry
+from chainslam.sim.worlds.drawing import Drawing
+from chainslam.sim.worlds.registry import READERS
+from chainslam.slam import backends
+from chainslam.slam.backends import BACKENDS, BackendEntry
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

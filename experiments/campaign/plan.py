@@ -6,9 +6,9 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from explore.strategies import STRATEGIES
-from sim.worlds import WORLDS, DrawingOptions
-from slam.backends import BACKENDS
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.worlds import WORLDS, DrawingOptions
+from chainslam.slam.backends import BACKENDS
 
 from ..artifacts.presets import METHODS, backend_of, mapping_of
 from ..artifacts.settings import NAVIGATION, nested, trial_of

@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec import defstruct
 
-from sim.logs.archive import regular
+from chainslam.sim.logs.archive import regular
 
 from ..artifacts.files import CONFIG, json_bytes, stamp, write
 from ..artifacts.reading import read_json, told

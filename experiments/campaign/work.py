@@ -11,14 +11,14 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import defstruct
 
-from sim.logs.archive import read_archive
-from sim.logs.recorded_robot import read_log
-from sim.worlds import DrawingOptions, World
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import NO_VERTICES, extract
-from slam.extraction.segments import Segments
-from slam.mapper import Extractor
-from slam.robot import Scan
+from chainslam.sim.logs.archive import read_archive
+from chainslam.sim.logs.recorded_robot import read_log
+from chainslam.sim.worlds import DrawingOptions, World
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import NO_VERTICES, extract
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.mapper import Extractor
+from chainslam.slam.robot import Scan
 
 from ..artifacts.files import json_bytes, npz_bytes, stamp
 from ..artifacts.presets import backend_of

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 import tyro
 
-from explore.following.wall_following import Following
-from explore.planning.navigators import Navigation
-from sim.worlds import AS_DRAWN, DrawingOptions
+from chainslam.explore.following.wall_following import Following
+from chainslam.explore.planning.navigators import Navigation
+from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
 from ..artifacts.presets import against_methods, robot_of
 from ..artifacts.settings import FOLLOWING, NAVIGATION, asked, differing, drawing_settings, nested, over, trial_of

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sim.worlds import World
+from chainslam.sim.worlds import World
 
 from ..scenario import TrialConfig
 from ..terminal.console import say

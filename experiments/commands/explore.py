@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import tyro
 
-from explore.following.wall_following import Following
-from explore.planning.navigators import Navigation
-from explore.step import Step
-from sim.worlds import AS_DRAWN, DrawingOptions, World
+from chainslam.explore.following.wall_following import Following
+from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import AS_DRAWN, DrawingOptions, World
 
 from ..artifacts.fences import fence_of
 from ..artifacts.presets import PresetName, preset_of, robot_of

@@ -21,7 +21,7 @@ class Worlds:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
-        from sim.worlds import listing
+        from chainslam.sim.worlds import listing
 
         return _print(listing())
 
@@ -32,7 +32,7 @@ class Backends:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
-        from slam.backends import BACKENDS
+        from chainslam.slam.backends import BACKENDS
 
         return _print({name: entry.description for name, entry in BACKENDS.items()})
 
@@ -43,7 +43,7 @@ class Strategies:
 
     def run(self) -> int:
         """Print the listing and return the exit status."""
-        from explore.strategies import STRATEGIES
+        from chainslam.explore.strategies import STRATEGIES
 
         return _print({name: entry.description for name, entry in STRATEGIES.items()})
 
@@ -104,8 +104,8 @@ def _spec(script: str) -> dict[str, Any]:
 
 def _completed(script: str) -> str:
     """Return tyro's script with the names that our options take, and without what is no option for a user."""
-    from explore.strategies import STRATEGIES
-    from slam.backends import BACKENDS
+    from chainslam.explore.strategies import STRATEGIES
+    from chainslam.slam.backends import BACKENDS
 
     spec = _spec(script)
     names: dict[str, Iterable[str]] = dict.fromkeys(("--backend", "--backends", "--driver"), BACKENDS)

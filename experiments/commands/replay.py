@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import tyro
 
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.logs.recorded_log import is_own_log
-from sim.logs.recorded_robot import knows_truth
-from slam.backends import BACKENDS
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.logs.recorded_log import is_own_log
+from chainslam.sim.logs.recorded_robot import knows_truth
+from chainslam.slam.backends import BACKENDS
 
 from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import write_results

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from viz.reports.report import Page, html, latex
+from chainslam.viz.reports.report import Page, html, latex
 
 from ..artifacts.files import replacing, write
 from ..campaign.contrast import CONTRAST

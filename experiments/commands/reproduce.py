@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import tyro
 from rich.table import Table
 
-from viz.figures import own_look
-from viz.figures.maps import saved
+from chainslam.viz.figures import own_look
+from chainslam.viz.figures.maps import saved
 
 from ..artifacts.files import json_bytes, replacing, write
 from ..artifacts.run_folder import prepare

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from viz.viewer import Viewer, ViewerError, WebViewer, available
+from chainslam.viz.viewer import Viewer, ViewerError, WebViewer, available
 
 from ..artifacts.results import LOG, RECORDING
 from ..artifacts.run_folder import prepare

@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from explore.following.wall_following import Following
-from explore.planning.navigators import Navigation
+from chainslam.explore.following.wall_following import Following
+from chainslam.explore.planning.navigators import Navigation
 
 from ..artifacts.reading import read_json
 from ..artifacts.settings import drawing_said, options_of

@@ -1,6 +1,7 @@
 """Compile the loops that steps run ahead of the first run: `make setup` does so.
 
-`python -m experiments.library.compile_kernels` drives two runs and replays one with scan matching, and keeps none.
+`python -m chainslam.experiments.library.compile_kernels` drives two runs and replays one with scan
+matching, and keeps none.
 """
 
 import sys
@@ -11,8 +12,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from explore.floor.carrying_kernels import carried
-from slam.association.place_search import Window, place_on
+from chainslam.explore.floor.carrying_kernels import carried
+from chainslam.slam.association.place_search import Window, place_on
 
 from ..commands.cli import main
 

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, overload
 
-from explore.following.wall_following import Following
-from explore.planning.navigators import Navigation
-from explore.step import Step
-from slam.backends import BACKENDS
-from slam.robot import Robot, RobotSpec
+from chainslam.explore.following.wall_following import Following
+from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.step import Step
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.robot import Robot, RobotSpec
 
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle

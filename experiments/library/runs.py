@@ -14,8 +14,8 @@ from weakref import finalize
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sim.logs.archive import regular
-from slam.geometry.lines import directions, normals
+from chainslam.sim.logs.archive import regular
+from chainslam.slam.geometry.lines import directions, normals
 
 from ..artifacts.maps.map_files import read_map
 from ..artifacts.reading import read_json, told

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from sim.chance import Chance, Channel, world_key
-from slam.geometry.lines import directions, normals, through
-from slam.geometry.poses import compose, inverse, to_world
+from chainslam.sim.chance import Chance, Channel, world_key
+from chainslam.slam.geometry.lines import directions, normals, through
+from chainslam.slam.geometry.poses import compose, inverse, to_world
 
 from .observations import DriveObservations, ScanObservations
 from .oracles import as_stated

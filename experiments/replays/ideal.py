@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.backends.kalman.dense_map import DenseMap
-from slam.backends.kalman.ekf import Ekf
-from slam.estimation.backend import Observations
-from slam.estimation.models import Initialisation, Innovations, Motion, initialise, innovations, move
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import J, rotation
-from slam.robot import Odometry
+from chainslam.slam.backends.kalman.dense_map import DenseMap
+from chainslam.slam.backends.kalman.ekf import Ekf
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import Initialisation, Innovations, Motion, initialise, innovations, move
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import J, rotation
+from chainslam.slam.robot import Odometry
 
 from .observations import DriveObservations
 

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from explore.certificate import certify
-from explore.step import Step
-from slam.association.second_looks.closures import Drive
-from slam.association.second_looks.refuted import Rays
-from slam.association.second_looks.second_looks import Survey, second_looks
-from slam.evaluation.doubles import doubles
-from slam.extraction.extract import extract
-from slam.extraction.visible_extent import sure_pieces
-from slam.geometry.poses import to_world
-from slam.map.chains import connect
-from slam.odometry.scan_matching import returns_within
-from slam.robot import Scan
+from chainslam.explore.certificate import certify
+from chainslam.explore.step import Step
+from chainslam.slam.association.second_looks.closures import Drive
+from chainslam.slam.association.second_looks.refuted import Rays
+from chainslam.slam.association.second_looks.second_looks import Survey, second_looks
+from chainslam.slam.evaluation.doubles import doubles
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.visible_extent import sure_pieces
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.chains import connect
+from chainslam.slam.odometry.scan_matching import returns_within
+from chainslam.slam.robot import Scan
 
 from ..scenario import TrialConfig
 from ..scoring.records import Log

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from slam.estimation.backend import PathKeeper
-from slam.evaluation.relations import SAME_TIME_S, interpolated, paired_poses
+from chainslam.slam.estimation.backend import PathKeeper
+from chainslam.slam.evaluation.relations import SAME_TIME_S, interpolated, paired_poses
 
 from ..artifacts.trajectories import path_of, smoothed_path
 from ..scoring.records import Log

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.logs.raw_scan import LogError, RawScan
-from slam.geometry.poses import compose, inverse
-from slam.odometry.config import ScanMatchingConfig
-from slam.odometry.scan_matching import ScanMatcher
-from slam.robot import Odometry, Scan
+from chainslam.sim.logs.raw_scan import LogError, RawScan
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.odometry.config import ScanMatchingConfig
+from chainslam.slam.odometry.scan_matching import ScanMatcher
+from chainslam.slam.robot import Odometry, Scan
 
 KEPT_M, KEPT_RAD = 0.1, float(np.deg2rad(5.0))
 """The robot goes so far before its scan is one of those that others are laid onto."""

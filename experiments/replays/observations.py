@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.chance import Chance
-from sim.robot import chance_in
-from slam.estimation.backend import POSE, Backend, Joint, Observations
-from slam.estimation.mounting import odometry_of_scanner, scanner_poses
-from slam.evaluation.consistency import nees, pose_covariances, pose_errors
-from slam.evaluation.from_start import FromStart, as_it_is
-from slam.evaluation.own_gauge import own_gauge
-from slam.extraction.extract import extract
-from slam.extraction.segments import Segments
-from slam.extraction.visible_extent import sure_pieces
-from slam.map.reliability import as_told
-from slam.map_keeper import seen_centres
-from slam.robot import Odometry
+from chainslam.sim.chance import Chance
+from chainslam.sim.robot import chance_in
+from chainslam.slam.estimation.backend import POSE, Backend, Joint, Observations
+from chainslam.slam.estimation.mounting import odometry_of_scanner, scanner_poses
+from chainslam.slam.evaluation.consistency import nees, pose_covariances, pose_errors
+from chainslam.slam.evaluation.from_start import FromStart, as_it_is
+from chainslam.slam.evaluation.own_gauge import own_gauge
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.extraction.visible_extent import sure_pieces
+from chainslam.slam.map.reliability import as_told
+from chainslam.slam.map_keeper import seen_centres
+from chainslam.slam.robot import Odometry
 
 from ..scenario import load_world
 from ..scoring.truth import truth_of

@@ -7,16 +7,16 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sim.chance import Chance, Channel
-from slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
-from slam.config import MapperConfig
-from slam.estimation.backend import Joint
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import NO_VERTICES, extract
-from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig
-from slam.geometry.poses import compose, inverse, wrap
-from slam.robot import Scan
+from chainslam.sim.chance import Chance, Channel
+from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, Matches, MatchingConfig
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import NO_VERTICES, extract
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.extraction.straightness import StraightnessConfig
+from chainslam.slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.robot import Scan
 
 from ..scoring.beam_votes import UNLABELLED, vote
 from ..scoring.truth import Truth

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from explore.mission import ride_mission
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.logs.bag_topics import TopicsWanted
-from sim.logs.keyframes import KeyframesConfig, RecordedLog
-from sim.logs.recorded_log import read_recorded_log
-from sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, recording_of
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.mapper import Mapper
+from chainslam.explore.mission import ride_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.logs.bag_topics import TopicsWanted
+from chainslam.sim.logs.keyframes import KeyframesConfig, RecordedLog
+from chainslam.sim.logs.recorded_log import read_recorded_log
+from chainslam.sim.logs.recorded_robot import RecordedRobot, RecordingError, read_log, recording_of
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.mapper import Mapper
 
 from ..artifacts.saved import cut_short, read_trial
 from ..artifacts.settings import asked, record_of, trial_of

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sim.logs.recorded_robot import Recording
+from chainslam.sim.logs.recorded_robot import Recording
 
 from ..artifacts.files import json_bytes, npz_bytes, write
 from ..artifacts.results import config_record, log_arrays

@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from explore.mission import ride_mission
-from explore.step import Step
-from sim.logs.recorded_robot import (
+from chainslam.explore.mission import ride_mission
+from chainslam.explore.step import Step
+from chainslam.sim.logs.recorded_robot import (
     MOST_M,
     TRUTH,
     RecordedRobot,
@@ -21,14 +21,14 @@ from sim.logs.recorded_robot import (
     recording_of,
     within,
 )
-from sim.robot import TrueRecord, chance_in
-from sim.worlds import World
-from slam.association.methods import METHODS, Matcher
-from slam.config import MapperConfig
-from slam.estimation.mounting import scanner_poses
-from slam.extraction.extract import extract
-from slam.mapper import Extractor, Mapper
-from slam.robot import MotionCommand, Odometry, Scan
+from chainslam.sim.robot import TrueRecord, chance_in
+from chainslam.sim.worlds import World
+from chainslam.slam.association.methods import METHODS, Matcher
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.mounting import scanner_poses
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.mapper import Extractor, Mapper
+from chainslam.slam.robot import MotionCommand, Odometry, Scan
 
 from ..artifacts.reading import told
 from ..artifacts.saved import cut_short, read_config, read_trial

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from explore.step import Step
-from sim.worlds import World
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import World
 
 from ..artifacts.results import REPLAY, config_record
 from ..scoring.summary import odometry_poses

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from explore.certificate import certify
-from explore.step import Step
-from sim.logs.keyframes import RecordedLog
-from sim.logs.recorded_robot import Recording
-from slam.robot import MotionCommand, Odometry, Robot, Scan
+from chainslam.explore.certificate import certify
+from chainslam.explore.step import Step
+from chainslam.sim.logs.keyframes import RecordedLog
+from chainslam.sim.logs.recorded_robot import Recording
+from chainslam.slam.robot import MotionCommand, Odometry, Robot, Scan
 
 from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, make_backend, strategy_of
 from ..scoring.records import Log, Recorder

@@ -7,15 +7,15 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from slam.backends.blocks.block_ekf import BlockEkf
-from slam.backends.fej_ekf import FejEkf
-from slam.backends.full_ekf import FullEkf
-from slam.backends.invariant_ekf import InvariantEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.estimation.backend import Belief
-from slam.estimation.models import innovations
-from viz import palette
-from viz.figures.panels import panels
+from chainslam.slam.backends.blocks.block_ekf import BlockEkf
+from chainslam.slam.backends.fej_ekf import FejEkf
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.invariant_ekf import InvariantEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.estimation.models import innovations
+from chainslam.viz import palette
+from chainslam.viz.figures.panels import panels
 
 from ..scenario import P0_SIGMAS
 from .reproduction import Numbers, Reproduction, Said, Value

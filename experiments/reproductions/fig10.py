@@ -4,11 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from slam.evaluation.consistency import bound_margins
-from viz import palette
-from viz.figures.curves import paint_map
-from viz.figures.panels import MARGIN_M, paint_curves, paint_ellipses, panels
-from viz.shapes import ellipses
+from chainslam.slam.evaluation.consistency import bound_margins
+from chainslam.viz import palette
+from chainslam.viz.figures.curves import paint_map
+from chainslam.viz.figures.panels import MARGIN_M, paint_curves, paint_ellipses, panels
+from chainslam.viz.shapes import ellipses
 
 from ..scenario import TrialConfig
 from .reproduction import Numbers, Reproduction, Said, Value

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from slam.geometry.poses import rotation, to_world
-from viz.figures.panels import paint_uncertain_path, panels
+from chainslam.slam.geometry.poses import rotation, to_world
+from chainslam.viz.figures.panels import paint_uncertain_path, panels
 
 from ..trial import TrialResult
 from ..views.timelines import true_rings

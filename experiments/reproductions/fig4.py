@@ -7,10 +7,10 @@ from itertools import groupby
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
-from viz import palette
-from viz.figures.panels import panels
-from viz.figures.visibility import GraphPicture, extent_of, paint_graph
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT
+from chainslam.viz import palette
+from chainslam.viz.figures.panels import panels
+from chainslam.viz.figures.visibility import GraphPicture, extent_of, paint_graph
 
 from ..artifacts.maps.picture import map_picture
 from ..artifacts.presets import preset_of

@@ -1,6 +1,6 @@
 """Figure 8: the cyclic environment of 7 m x 7 m, explored and mapped on its own."""
 
-from viz.figures.panels import map_panels
+from chainslam.viz.figures.panels import map_panels
 
 from .reproduction import Numbers, Reproduction, Said
 from .runs.drives import PAPER, drive_by_walls, last_map

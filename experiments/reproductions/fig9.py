@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from explore.step import Step
-from viz.figures.curves import SmallMap
-from viz.figures.panels import map_panels
+from chainslam.explore.step import Step
+from chainslam.viz.figures.curves import SmallMap
+from chainslam.viz.figures.panels import map_panels
 
 from ..scenario import TrialConfig
 from .reproduction import Numbers, Reproduction, Said

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from slam.backends import BACKENDS
-from viz import palette
-from viz.figures.panels import paint_curves, panels
+from chainslam.slam.backends import BACKENDS
+from chainslam.viz import palette
+from chainslam.viz.figures.panels import paint_curves, panels
 
 from .reproduction import Numbers, Reproduction, Said, Value
 from .runs.standing import slope, stand

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from viz.figures.panels import paint_intervals, panels
+from chainslam.viz.figures.panels import paint_intervals, panels
 
 from ..scoring.measurements import Z_95
 from .reproduction import Numbers, Reproduction, Said, Value

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.extraction.segments import Segments
-from slam.geometry.lines import directions
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import directions
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .beam_votes import UNLABELLED, vote
 from .truth import Truth

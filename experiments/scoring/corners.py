@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from slam.estimation.backend import Joint
-from slam.geometry.poses import to_world
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .measurements import corner_jacobian
 

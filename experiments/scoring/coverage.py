@@ -7,12 +7,12 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
 
-from slam.evaluation.trajectories import alignment_of_paths
-from slam.geometry.lines import normals, through
-from slam.geometry.poses import compose, inverse, to_world
-from slam.geometry.segment_kernels import lie_beside
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.evaluation.trajectories import alignment_of_paths
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.geometry.poses import compose, inverse, to_world
+from chainslam.slam.geometry.segment_kernels import lie_beside
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .association import Votes
 from .records import Sketch

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from slam.estimation.gates import gate_level
-from slam.evaluation.consistency import chi2_band
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.evaluation.consistency import chi2_band
 
 from .records import Log
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.lines import directions, normals
 
 PARALLEL = 0.05
 """Two walls whose directions differ by less than this (rad) have no corner that is known along them."""

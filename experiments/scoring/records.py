@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from explore.step import Step
-from sim.logs.columns import Columns
-from sim.logs.recorded_robot import differing, fan_of
-from slam.estimation.backend import Joint
-from slam.evaluation.from_start import FromStart, as_it_is
-from slam.extraction.curved_share import curved_beams
+from chainslam.explore.step import Step
+from chainslam.sim.logs.columns import Columns
+from chainslam.sim.logs.recorded_robot import differing, fan_of
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.evaluation.from_start import FromStart, as_it_is
+from chainslam.slam.extraction.curved_share import curved_beams
 
 from ..scenario import WitnessedRobot
 from .association import Votes

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from explore.outcome import Outcome
-from explore.step import Step
-from slam.estimation.backend import POSE, Joint
-from slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
-from slam.evaluation.own_gauge import OwnGauge, own_gauge
-from slam.extraction.curved_share import SCANS
-from slam.geometry.poses import compose, to_world, wrap
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.slam.estimation.backend import POSE, Joint
+from chainslam.slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
+from chainslam.slam.evaluation.own_gauge import OwnGauge, own_gauge
+from chainslam.slam.extraction.curved_share import SCANS
+from chainslam.slam.geometry.poses import compose, to_world, wrap
 
 from ..scenario import Scenario
 from .association import Votes, duplicate_lines

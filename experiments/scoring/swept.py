@@ -7,12 +7,12 @@ import shapely
 from jaxtyping import Bool, Float, Int
 from shapely.geometry.base import BaseGeometry
 
-from sim.lidar import LidarConfig, RangeFinder
-from sim.robot import RobotConfig
-from sim.worlds import World
-from slam.estimation.mounting import scanner_poses
-from slam.geometry.poses import wrap_positive
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
+from chainslam.slam.estimation.mounting import scanner_poses
+from chainslam.slam.geometry.poses import wrap_positive
+from chainslam.slam.robot import Scan
 
 CELL_M = 0.05
 LOOKOUT_M = 0.25

@@ -9,9 +9,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from sim.robot import RobotConfig
-from sim.worlds import Contour, World
-from slam.geometry.lines import normals, through
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import Contour, World
+from chainslam.slam.geometry.lines import normals, through
 
 SAME_LINE_M = 0.005
 """Faces whose ends lie this near to each other's line, on the same side, are one wall: half a beam's sigma."""

@@ -16,10 +16,10 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
-from explore.step import Step
-from slam.association.ranges.errors import RangeErrors
-from slam.evaluation.consistency import verdict_on_noise
-from slam.extraction.curved_share import MOSTLY, SCANS, curved_beams, few_straight, returns_of_scan
+from chainslam.explore.step import Step
+from chainslam.slam.association.ranges.errors import RangeErrors
+from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.extraction.curved_share import MOSTLY, SCANS, curved_beams, few_straight, returns_of_scan
 
 from .answers import found, is_quiet
 from .console import plain_console

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from explore.floor.accumulated_returns import returns
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.step import Step
-from slam.geometry.poses import inverse, to_world
-from viz.figures.animation import Frame, animated, shown_steps
+from chainslam.explore.floor.accumulated_returns import returns
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.step import Step
+from chainslam.slam.geometry.poses import inverse, to_world
+from chainslam.viz.figures.animation import Frame, animated, shown_steps
 
 from ..artifacts.results import LOG
 from ..replays.replay import read_options, read_run, replay

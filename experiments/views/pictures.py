@@ -1,6 +1,6 @@
-"""Pictures for papers from the folders that runs left: `python -m experiments.views.pictures DIR ... --out PICTURES`.
+"""Pictures for papers from the folders that runs left.
 
-Paths and NEES of several folders (replays of one log) come together; the map, the visibility graph, the model space and
+`python -m chainslam.experiments.views.pictures DIR ... --out PICTURES`: paths and NEES of several folders (replays of one log) come together; the map, the visibility graph, the model space and
 the traversals are of the first.
 """
 
@@ -17,13 +17,13 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from PIL import Image
 
-from sim.logs.archive import regular
-from sim.logs.recorded_robot import MOST_M, read_log, within
-from viz import palette
-from viz.figures.maps import Picture, draw_map, saved
-from viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
-from viz.figures.visibility import draw_graph
-from viz.shapes import hessian_cov
+from chainslam.sim.logs.archive import regular
+from chainslam.sim.logs.recorded_robot import MOST_M, read_log, within
+from chainslam.viz import palette
+from chainslam.viz.figures.maps import Picture, draw_map, saved
+from chainslam.viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
+from chainslam.viz.figures.visibility import draw_graph
+from chainslam.viz.shapes import hessian_cov
 
 from ..artifacts.files import write
 from ..artifacts.maps.map_files import read_map

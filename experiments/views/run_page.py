@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from explore.following.wall_following import FollowingConfig
-from sim.logs.archive import regular
-from slam.evaluation.consistency import verdict_on_noise
-from viz import palette
-from viz.figures.maps import png
-from viz.figures.plots import draw_coverage
-from viz.reports.drawing import PageDrawing, drawing
-from viz.reports.report import Page, PagePicture, PageTable, Section, filled
+from chainslam.explore.following.wall_following import FollowingConfig
+from chainslam.sim.logs.archive import regular
+from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.viz import palette
+from chainslam.viz.figures.maps import png
+from chainslam.viz.figures.plots import draw_coverage
+from chainslam.viz.reports.drawing import PageDrawing, drawing
+from chainslam.viz.reports.report import Page, PagePicture, PageTable, Section, filled
 
 from ..artifacts.maps.map_files import read_map
 from ..artifacts.maps.mapped import read_corners

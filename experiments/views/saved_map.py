@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Struct
 
-from explore.goal import SetAside
-from slam.estimation.backend import Belief, Joint, StaleBeliefError
-from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from viz.figures.maps import Picture
+from chainslam.explore.goal import SetAside
+from chainslam.slam.estimation.backend import Belief, Joint, StaleBeliefError
+from chainslam.slam.map.chains import HEAD, TAIL, Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz.figures.maps import Picture
 
 from ..artifacts.maps.map_files import read_features
 from ..artifacts.maps.picture import over_truth

@@ -9,8 +9,8 @@ from typing import Any
 from docstring_parser import parse_from_object
 from msgspec.json import schema
 
-from sim.logs.recorded_robot import FORMAT
-from slam.geometry.quantities import allowed
+from chainslam.sim.logs.recorded_robot import FORMAT
+from chainslam.slam.geometry.quantities import allowed
 
 from ..artifacts.saved import SavedConfig
 from ..artifacts.schema import group_of, settings_in

@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
-from explore.step import Step
-from sim.worlds import World
-from viz.viewer import Viewer, ViewerError
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import World
+from chainslam.viz.viewer import Viewer, ViewerError
 
 from ..artifacts.files import probe, write_anywhere
 from ..replays.replay import RecordedRun, ReplayOptions, replay
@@ -20,7 +20,7 @@ from ..scenario import load_world
 from ..scoring.summary import nees_of_poses
 
 if TYPE_CHECKING:
-    from viz.timeline import Timeline
+    from chainslam.viz.timeline import Timeline
 
 PoseOf = Callable[[Step], Float[np.ndarray, "3"]]
 Watch = Callable[[Step], None]
@@ -87,7 +87,7 @@ class TimelineOutput:
         viewer_url = Viewer().url if view else None
         # Rerun's own words on a viewer that went would come between ours; what matters it raises, too.
         os.environ.setdefault("RUST_LOG", "off")
-        from viz.timeline import Timeline  # imports rerun: only where a recording is asked for
+        from chainslam.viz.timeline import Timeline  # imports rerun: only where a recording is asked for
 
         # Its modules stay till the end: looked through at every collection, they would cost as much as the drawing.
         gc.freeze()

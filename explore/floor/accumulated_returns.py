@@ -5,8 +5,8 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import to_robot, to_world, wrap
-from slam.robot import Odometry, RobotSpec, Scan, ScannerSpec
+from chainslam.slam.geometry.poses import to_robot, to_world, wrap
+from chainslam.slam.robot import Odometry, RobotSpec, Scan, ScannerSpec
 
 SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""

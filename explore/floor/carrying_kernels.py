@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 
 
 @compiled

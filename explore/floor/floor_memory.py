@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import distance_to_segments
-from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
-from slam.geometry.quantities import Count, Distance, Number, Size
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import Odometry, RobotSpec, Scan, of_robot
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
+from chainslam.slam.geometry.quantities import Count, Distance, Number, Size
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import Odometry, RobotSpec, Scan, of_robot
 
 from .free_space import FreeSpace
 from .kept_scans import NO_PLACES, KeptScan, beside, told

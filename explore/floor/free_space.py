@@ -9,9 +9,9 @@ import shapely
 from jaxtyping import Bool, Float, Int
 from msgspec import Meta
 
-from slam.geometry.poses import compose
-from slam.geometry.quantities import Count, Distance, Place, Size
-from slam.robot import RobotSpec, Scan, of_robot
+from chainslam.slam.geometry.poses import compose
+from chainslam.slam.geometry.quantities import Count, Distance, Place, Size
+from chainslam.slam.robot import RobotSpec, Scan, of_robot
 
 from .kernels import Box, squared_distances, take_in
 

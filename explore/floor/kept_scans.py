@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.geometry.lines import distance_to_segments, normals
-from slam.geometry.poses import wrap
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import Scan
+from chainslam.slam.geometry.lines import distance_to_segments, normals
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import Scan
 
 from .carrying_kernels import carried, nearest
 

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 
 Box: TypeAlias = tuple[int, int, int, int]
 """First and end row, first and end column."""

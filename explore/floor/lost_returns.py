@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.estimation.mounting import odometry_of_scanner
-from slam.geometry.poses import to_robot, to_world
-from slam.robot import Odometry, Scan, ScannerSpec
+from chainslam.slam.estimation.mounting import odometry_of_scanner
+from chainslam.slam.geometry.poses import to_robot, to_world
+from chainslam.slam.robot import Odometry, Scan, ScannerSpec
 
 RUN = 3
 """Shorter runs without a return are never taken for free floor (`Scan.passed_m`)."""

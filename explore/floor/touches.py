@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import to_robot
-from slam.robot import MotionCommand, Odometry, RobotSpec
-from slam.robot.body import ahead_m, reaches_m
+from chainslam.slam.geometry.poses import to_robot
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec
+from chainslam.slam.robot.body import ahead_m, reaches_m
 
 REACH_M = 0.04
 """A return this near to the body, on the side to which it moved, may be what it met."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import arc, to_robot
-from slam.robot import MotionCommand, Scan
-from slam.robot.body import rim_of
+from chainslam.slam.geometry.poses import arc, to_robot
+from chainslam.slam.robot import MotionCommand, Scan
+from chainslam.slam.robot.body import rim_of
 
 from ..floor.accumulated_returns import returns, steadied
 from ..floor.free_space import FreeSpace

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slam.geometry.quantities import Angle, Distance, Number, Size
-from slam.robot import RobotSpec, of_robot
+from chainslam.slam.geometry.quantities import Angle, Distance, Number, Size
+from chainslam.slam.robot import RobotSpec, of_robot
 
 
 @dataclass(frozen=True)

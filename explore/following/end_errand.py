@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import OpenEnd
+from chainslam.slam.map.chains import OpenEnd
 
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_beyond, places_near, places_that_see

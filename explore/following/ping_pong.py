@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import HEAD, TAIL, OpenEnd
+from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
 
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_near

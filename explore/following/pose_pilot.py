@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import arc, inverse, to_robot, wrap
-from slam.robot import MotionCommand, Scan
-from slam.robot.body import depths_m, reaches_m
+from chainslam.slam.geometry.poses import arc, inverse, to_robot, wrap
+from chainslam.slam.robot import MotionCommand, Scan
+from chainslam.slam.robot.body import depths_m, reaches_m
 
 from ..floor.accumulated_returns import returns, steadied
 from ..floor.free_space import FreeSpace

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import J, arc
-from slam.robot import MotionCommand, RobotSpec
-from slam.robot.body import reaches_m
+from chainslam.slam.geometry.poses import J, arc
+from chainslam.slam.robot import MotionCommand, RobotSpec
+from chainslam.slam.robot.body import reaches_m
 
 from .driving_config import DrivingConfig
 

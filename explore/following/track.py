@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import normals
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import to_robot, wrap
-from slam.map.chains import HEAD, TAIL
-from slam.robot import MotionCommand
+from chainslam.slam.geometry.poses import to_robot, wrap
+from chainslam.slam.map.chains import HEAD, TAIL
+from chainslam.slam.robot import MotionCommand
 
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner

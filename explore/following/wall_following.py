@@ -14,10 +14,10 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.association.joint_compatibility import NO_NIS, Nis
-from slam.geometry.quantities import Count, Distance, Number, Size
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
+from chainslam.slam.association.joint_compatibility import NO_NIS, Nis
+from chainslam.slam.geometry.quantities import Count, Distance, Number, Size
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
 
 from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way

@@ -7,8 +7,8 @@ from typing import Protocol, runtime_checkable
 
 import networkx as nx
 
-from slam.map.chains import Chain
-from slam.robot import MotionCommand, Odometry
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import MotionCommand, Odometry
 
 from ..following.behaviour import Behaviour
 from ..following.wall_following import Surroundings

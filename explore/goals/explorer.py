@@ -8,8 +8,8 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
-from slam.robot import MotionCommand
+from chainslam.slam.map.chains import HEAD, TAIL, Chain, OpenEnd
+from chainslam.slam.robot import MotionCommand
 
 from ..following.end_errand import EndErrand
 from ..following.ping_pong import WallErrand

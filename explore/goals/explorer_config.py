@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from slam.geometry.circles import RoundConfig
-from slam.geometry.quantities import Count, Distance, Number, Share, Size, Wait
-from slam.robot import RobotSpec, of_robot
+from chainslam.slam.geometry.circles import RoundConfig
+from chainslam.slam.geometry.quantities import Count, Distance, Number, Share, Size, Wait
+from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..following.wall_following import FollowingConfig
 from .sweep import SweepConfig

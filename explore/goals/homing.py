@@ -8,9 +8,9 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.quantities import Number
-from slam.map.chains import Chain
-from slam.robot import RobotSpec, of_robot
+from chainslam.slam.geometry.quantities import Number
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour
 from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import OpenEnd
+from chainslam.slam.map.chains import OpenEnd
 
 from ..goal import GivenUp, LeftPlace, SetAside
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
-from slam.geometry.quantities import Factor
-from slam.map.chains import Chain
-from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
+from chainslam.slam.geometry.quantities import Factor
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
 from ..following.behaviour import Behaviour

@@ -10,8 +10,8 @@ from collections.abc import Container
 
 import numpy as np
 
-from slam.map.chains import HEAD, TAIL, OpenEnd
-from slam.robot import MotionCommand
+from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
+from chainslam.slam.robot import MotionCommand
 
 from ..following.behaviour import Behaviour
 from ..following.wall_follower import WallFollower

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import networkx as nx
 
-from slam.map.chains import Chain
-from slam.robot import MotionCommand, Odometry
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import MotionCommand, Odometry
 
 from ..following.wall_following import Surroundings
 from ..outcome import Outcome

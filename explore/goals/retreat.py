@@ -8,9 +8,9 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.quantities import Distance, Number, Share, Size
-from slam.map.chains import Chain
-from slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
+from chainslam.slam.geometry.quantities import Distance, Number, Share, Size
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import OpenEnd
+from chainslam.slam.map.chains import OpenEnd
 
 from ..following.wall_following import Surroundings
 from ..survey.frontiers import known_floor

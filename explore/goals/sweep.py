@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from slam.geometry.quantities import Number, Part
+from chainslam.slam.geometry.quantities import Number, Part
 
 from ..planning.driving_field import NEAR_M
 from ..strategies import Choice, Place, Situation

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from skimage.graph import MCP_Geometric
 
-from slam.geometry.lines import normals
-from slam.robot import RobotSpec
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.robot import RobotSpec
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any

@@ -5,10 +5,10 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Int
 
-from slam.geometry.compiled import compiled
-from slam.geometry.poses import rotation
-from slam.robot import RobotSpec
-from slam.robot.body import reaches_m
+from chainslam.slam.geometry.compiled import compiled
+from chainslam.slam.geometry.poses import rotation
+from chainslam.slam.robot import RobotSpec
+from chainslam.slam.robot.body import reaches_m
 
 AHEAD = np.array(
     [[1, 0], [2, 1], [1, 1], [1, 2], [0, 1], [-1, 2], [-1, 1], [-2, 1],

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from slam.robot import RobotSpec
+from chainslam.slam.robot import RobotSpec
 
 from .footprints import AHEAD, HEADINGS_RAD, heading_of, rooms_of
 

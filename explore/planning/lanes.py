@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.ndimage import label
 
-from slam.geometry.lines import normals
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .paths import Planner
 

@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .paths import Path, Planner
 from .wall_sequence import WallSearch

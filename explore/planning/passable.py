@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
-from slam.geometry.quantities import Distance, Size, Weight
-from slam.robot import RobotSpec, of_robot
+from chainslam.slam.geometry.quantities import Distance, Size, Weight
+from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any

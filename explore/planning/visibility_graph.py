@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable, Sequence
 import networkx as nx
 import numpy as np
 
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 NEIGHBOUR, SIGHT = "neighbour", "sight"
 

@@ -12,7 +12,7 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Bool, Float
 
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .lanes import Lane, lanes_of
 from .paths import Planner

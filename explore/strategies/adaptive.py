@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.estimation.gates import gate_level
+from chainslam.slam.estimation.gates import gate_level
 
 from ..following.wall_following import Surroundings
 from ..survey.viewpoints import ideal_places, lane

@@ -10,10 +10,10 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import J
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import WheelSpec
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import J
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import WheelSpec
 
 POSE = 3
 """Rows of the pose in the joint state."""

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.association.matching import MatchingConfig
-from slam.estimation.backend import POSE, Belief, Joint
-from slam.estimation.gates import gate_level
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import J
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.association.matching import MatchingConfig
+from chainslam.slam.estimation.backend import POSE, Belief, Joint
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import J
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ..following.wall_following import Surroundings
 from .expectation import OBSERVATION_SIGMAS

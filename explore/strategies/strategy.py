@@ -11,8 +11,8 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from slam.map.chains import Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..planning.driving_field import DrivingField

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import directions
-from slam.map.chains import HEAD, OpenEnd
+from chainslam.slam.geometry.lines import directions
+from chainslam.slam.map.chains import HEAD, OpenEnd
 
 from ..survey.viewpoints import ideal_places
 from .expectation import OBSERVATION_SIGMAS, SIGHT_SHARE, Expectation, expect, walls_seen_from

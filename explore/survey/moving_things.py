@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter
 
-from slam.geometry.poses import to_world
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import Scan, ScannerSpec
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import Scan, ScannerSpec
 
 from ..floor.accumulated_returns import returns
 from ..floor.free_space import FreeSpace

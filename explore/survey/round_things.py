@@ -1,8 +1,8 @@
 """Which open ends lie on something round, whose chain of short walls no look can close."""
 
-from slam.geometry.circles import DEFAULT, RoundConfig, radius_of
-from slam.map.chains import OpenEnd
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.geometry.circles import DEFAULT, RoundConfig, radius_of
+from chainslam.slam.map.chains import OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 
 def is_round(end: OpenEnd, walls: StochasticMap, config: RoundConfig = DEFAULT) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float
 
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 
 class TrustedWalls:

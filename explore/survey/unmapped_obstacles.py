@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ..floor.free_space import FreeSpace
 from ..planning.driving_field import DrivingField

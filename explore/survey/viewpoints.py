@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import directions, normals
-from slam.geometry.quantities import Distance
-from slam.map.chains import HEAD, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import RobotSpec, of_robot
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.quantities import Distance
+from chainslam.slam.map.chains import HEAD, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..floor.free_space import FreeSpace
 from ..planning.paths import Planner

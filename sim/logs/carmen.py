@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import compose, inverse
+from chainslam.slam.geometry.poses import compose, inverse
 
 from .raw_scan import LogError, RawScan, as_returns
 from .text_lines import text_lines

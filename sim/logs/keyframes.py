@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.geometry.poses import compose, inverse, wrap
-from slam.geometry.quantities import Count, Deviation, Size, Spread, Turn, Weight
+from chainslam.slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.geometry.quantities import Count, Deviation, Size, Spread, Turn, Weight
 
 from .archive import LIMIT_BYTES
 from .raw_scan import ClockError, LeftOut, LogError, RawScan, scanner_on_robot

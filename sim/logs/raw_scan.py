@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.geometry.poses import compose, inverse, wrap
 
 SAME_M, SAME_RAD = 0.01, 0.01
 """A scanner that is fixed to the body is at one place of it, to within rounding."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from slam.robot import MotionCommand, Odometry, Scan
+from chainslam.slam.robot import MotionCommand, Odometry, Scan
 
 from .archive import ArchiveError, read_archive
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import compose, inverse
-from slam.robot import Odometry, RobotError
-from slam.robot.deskew import de_skewed
-from slam.robot.ros.laser_scan import beam_s, is_covered, timed_scan
-from slam.robot.ros.odometry_buffer import OdometryBuffer
-from slam.robot.ros.transforms import Frames, planar, seconds
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.robot import Odometry, RobotError
+from chainslam.slam.robot.deskew import de_skewed
+from chainslam.slam.robot.ros.laser_scan import beam_s, is_covered, timed_scan
+from chainslam.slam.robot.ros.odometry_buffer import OdometryBuffer
+from chainslam.slam.robot.ros.transforms import Frames, planar, seconds
 
 from .bag_topics import ODOMETRY, SCAN, BagTopics, TopicsWanted, topics_of
 from .raw_scan import ClockError, LogError, RawScan

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.poses import wrap
+from chainslam.slam.geometry.poses import wrap
 
 from .raw_scan import LogError, RawScan
 

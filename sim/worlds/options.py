@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from fnmatch import fnmatchcase
 
-from slam.geometry.quantities import Factor, Part, fault
+from chainslam.slam.geometry.quantities import Factor, Part, fault
 
 from .drawing import WorldError, shorten
 

@@ -8,7 +8,7 @@ import shapely
 from jaxtyping import Float, Int
 from shapely.geometry.base import BaseGeometry
 
-from slam.robot import RobotSpec
+from chainslam.slam.robot import RobotSpec
 
 from .contour import Contour, visible_contour
 

@@ -15,19 +15,19 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.campaign.scores.score import offsets, wall_errors
-from experiments.replays.observations import DriveObservations, observations_of, ride
-from experiments.replays.recordings import record
-from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
-from experiments.scenario import TrialConfig, strategy_of
-from experiments.scoring.coverage import alignment
-from experiments.terminal.console import plain_console
-from experiments.usage import choose
-from slam.backends import BACKENDS
-from slam.evaluation.consistency import anees
-from slam.evaluation.trajectories import ate
-from slam.geometry.lines import normals
-from slam.geometry.poses import to_world
+from chainslam.experiments.campaign.scores.score import offsets, wall_errors
+from chainslam.experiments.replays.observations import DriveObservations, observations_of, ride
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig, strategy_of
+from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import choose
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.consistency import anees
+from chainslam.slam.evaluation.trajectories import ate
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import to_world
 
 from ..runner.command import run_study
 from ..runner.faults import Fault, faulty

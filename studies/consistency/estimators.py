@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.replays.observations import DriveObservations, observations_of, ride
-from experiments.replays.recordings import record
-from experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
-from experiments.scenario import P0, P0_SIGMAS, TrialConfig, drawn_start, load_world
-from experiments.usage import UsageError, choose
-from sim.robot import chance_in
-from slam.backends import BACKENDS
-from slam.evaluation.consistency import anees, share_in_band
+from chainslam.experiments.replays.observations import DriveObservations, observations_of, ride
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
+from chainslam.experiments.scenario import P0, P0_SIGMAS, TrialConfig, drawn_start, load_world
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.sim.robot import chance_in
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.consistency import anees, share_in_band
 
 from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill, show

@@ -17,20 +17,20 @@ import numpy as np
 from jaxtyping import Float, Int
 from rich.table import Table
 
-from experiments.scenario import TrialConfig, build
-from experiments.scoring.beam_votes import vote
-from experiments.scoring.truth import truth_of
-from experiments.terminal.console import plain_console
-from experiments.trial import default_mission, run_scenario
-from experiments.usage import UsageError
-from explore.step import Step
-from sim.worlds import WORLDS
-from slam.association.matching import MatchingConfig
-from slam.estimation.gates import gate_level
-from slam.extraction.config import ExtractionConfig
-from slam.map.existence import JUST_BEGUN, ExistenceConfig
-from slam.map.kernels.existence_kernels import crossing
-from slam.map.kernels.few_beams_kernels import Same, distances, lines_of
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.scoring.beam_votes import vote
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import default_mission, run_scenario
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import WORLDS
+from chainslam.slam.association.matching import MatchingConfig
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.map.existence import JUST_BEGUN, ExistenceConfig
+from chainslam.slam.map.kernels.existence_kernels import crossing
+from chainslam.slam.map.kernels.few_beams_kernels import Same, distances, lines_of
 
 from ..runner.command import run_study
 from .extraction import PLANS

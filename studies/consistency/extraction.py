@@ -18,19 +18,19 @@ from rich.console import Console
 from rich.table import Table
 from scipy.sparse.csgraph import connected_components
 
-from experiments.scoring.beam_votes import vote
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from sim.worlds import WORLDS, World, WorldError, load
-from slam.evaluation.consistency import nees
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.segments import Segments
-from slam.geometry.lines import directions, normals, through
-from slam.geometry.poses import to_robot, wrap
-from slam.map.reliability import ReliabilityConfig
-from slam.robot import Scan
+from chainslam.experiments.scoring.beam_votes import vote
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.sim.worlds import WORLDS, World, WorldError, load
+from chainslam.slam.evaluation.consistency import nees
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import directions, normals, through
+from chainslam.slam.geometry.poses import to_robot, wrap
+from chainslam.slam.map.reliability import ReliabilityConfig
+from chainslam.slam.robot import Scan
 
 from ..runner.command import run_study
 

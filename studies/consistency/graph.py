@@ -2,7 +2,7 @@
 
 The truth here shares only numbers with the graph: what was sensed, with its covariances, and the line of each
 observation. Errors are written out anew and differentiated numerically; nothing comes from GTSAM or
-`slam.estimation.models`.
+`chainslam.slam.estimation.models`.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,13 +13,13 @@ from jaxtyping import Float, Int
 from rich.table import Table
 from scipy.linalg import cho_factor, cho_solve
 
-from experiments.replays.recordings import record
-from experiments.replays.replay import Association, ReplayOptions, replay
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from slam.backends.graph.graph import Graph
-from slam.geometry.lines import lines_to_world, normals
-from slam.geometry.poses import wrap
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.replays.replay import Association, ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.geometry.lines import lines_to_world, normals
+from chainslam.slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-from experiments.replays.recordings import record
-from experiments.replays.replay import ReplayOptions, replay
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from slam.backends.graph.config import GraphConfig
-from slam.backends.graph.graph import Graph
-from slam.estimation.backend import Observations
-from slam.geometry.lines import directions, normals
-from slam.robot import Odometry
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.replays.replay import ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.slam.backends.graph.config import GraphConfig
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.robot import Odometry
 
 from ..runner.command import run_study
 from .graph import differences

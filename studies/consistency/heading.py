@@ -14,13 +14,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from experiments.artifacts.files import write
-from experiments.scenario import P0, TrialConfig, check
-from experiments.usage import UsageError, choose
-from sim.robot import RobotConfig
-from slam.backends import BACKENDS
-from viz.figures.anees_map import Field, anees_map
-from viz.figures.maps import saved
+from chainslam.experiments.artifacts.files import write
+from chainslam.experiments.scenario import P0, TrialConfig, check
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.sim.robot import RobotConfig
+from chainslam.slam.backends import BACKENDS
+from chainslam.viz.figures.anees_map import Field, anees_map
+from chainslam.viz.figures.maps import saved
 
 from ..exploration.ring_worlds import LEAST_M, ring_world
 from ..runner.command import run_study

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.artifacts.results import log_arrays
-from experiments.replays.replay import ReplayOptions, replay, run_of
-from experiments.scenario import TrialConfig, check
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
+from chainslam.experiments.artifacts.results import log_arrays
+from chainslam.experiments.replays.replay import ReplayOptions, replay, run_of
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from rich.table import Table
 
-from experiments.scenario import TrialConfig
-from experiments.scoring.corners import Corner, corners
-from experiments.scoring.measurements import Z_95, corner_points, distances
-from experiments.scoring.truth import Truth
-from experiments.terminal.console import plain_console
-from experiments.trial import TrialResult, run_trial
-from slam.geometry.lines import normals
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.corners import Corner, corners
+from chainslam.experiments.scoring.measurements import Z_95, corner_points, distances
+from chainslam.experiments.scoring.truth import Truth
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import TrialResult, run_trial
+from chainslam.slam.geometry.lines import normals
 
 from ..runner.command import run_study
 from ..runner.rows import Row

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.replays.corridor import Loop, drive
-from experiments.replays.observations import DriveObservations, ride
-from experiments.scenario import P0, P0_SIGMAS, drawn_start
-from experiments.usage import UsageError, choose
-from slam.backends import BACKENDS
-from slam.geometry.poses import wrap
+from chainslam.experiments.replays.corridor import Loop, drive
+from chainslam.experiments.replays.observations import DriveObservations, ride
+from chainslam.experiments.scenario import P0, P0_SIGMAS, drawn_start
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill, show

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from experiments.artifacts.presets import METHODS as PRESETS
-from experiments.artifacts.settings import nested, over, trial_of
-from experiments.scenario import TrialConfig, check
-from experiments.terminal.console import plain_console
+from chainslam.experiments.artifacts.presets import METHODS as PRESETS
+from chainslam.experiments.artifacts.settings import nested, over, trial_of
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.terminal.console import plain_console
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

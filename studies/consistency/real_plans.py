@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.artifacts.results import log_arrays
-from experiments.campaign.scores.innovation import InnovationEar
-from experiments.replays.replay import ReplayOptions, replay, run_of
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
-from experiments.usage import UsageError, choose
-from slam.backends import BACKENDS
+from chainslam.experiments.artifacts.results import log_arrays
+from chainslam.experiments.campaign.scores.innovation import InnovationEar
+from chainslam.experiments.replays.replay import ReplayOptions, replay, run_of
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.slam.backends import BACKENDS
 
 from ..results.figures import innovations
 from ..runner.command import run_study

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.scenario import P0, TrialConfig
-from experiments.scoring.statistics import Clustered, estimate, paired
-from experiments.terminal.console import plain_console
+from chainslam.experiments.scenario import P0, TrialConfig
+from chainslam.experiments.scoring.statistics import Clustered, estimate, paired
+from chainslam.experiments.terminal.console import plain_console
 
 from ..runner.command import run_study
 from ..runner.explored import explored

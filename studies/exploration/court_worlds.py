@@ -22,7 +22,7 @@ OFF_MIDDLE_M = 0.5
 
 
 def court(seed: int) -> dict[str, Any]:
-    """Return the plan (`sim.worlds.readers.plan_json`) of a building.
+    """Return the plan (`chainslam.sim.worlds.readers.plan_json`) of a building.
 
     Every room has a door to the court, some have one to the next room. It is turned by any angle; it starts at the
     origin.

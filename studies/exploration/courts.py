@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
 
 from ..runner.command import run_study
 from ..runner.trials import rows_of

@@ -15,14 +15,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from rich.table import Table
 
-from experiments.scenario import TrialConfig
-from experiments.scoring.association import Votes
-from experiments.scoring.summary import map_error
-from experiments.terminal.console import plain_console
-from experiments.trial import TrialResult, run_trial
-from experiments.usage import UsageError
-from slam.geometry.lines import normals
-from slam.geometry.poses import wrap
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.summary import map_error
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import TrialResult, run_trial
+from chainslam.experiments.usage import UsageError
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.artifacts.settings import NAVIGATION, nested, record_of, trial_of
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from explore.planning.navigators import NAVIGATORS
-from explore.strategies import STRATEGIES
-from sim.worlds import WORLDS
+from chainslam.experiments.artifacts.settings import NAVIGATION, nested, record_of, trial_of
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.planning.navigators import NAVIGATORS
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.worlds import WORLDS
 
 from ..runner.command import run_study
 from ..runner.rows import Row, key_of

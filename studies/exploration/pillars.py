@@ -10,9 +10,9 @@ import shapely
 from jaxtyping import Float
 from shapely.geometry.polygon import orient
 
-from experiments.scenario import TrialConfig, check
-from experiments.trial import run_trial
-from sim.worlds import World
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.worlds import World
 
 from ..runner.command import run_study
 

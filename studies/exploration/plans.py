@@ -11,7 +11,7 @@ from pathlib import Path
 
 import shapely
 
-from sim.worlds import load
+from chainslam.sim.worlds import load
 
 RASTERS = {
     "nav2_depot.yaml": ((100, 600), (410, 450)),

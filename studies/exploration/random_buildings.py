@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
 
 from ..runner.command import run_study
 from ..runner.trials import rows_of

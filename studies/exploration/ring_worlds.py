@@ -4,8 +4,8 @@ import numpy as np
 import shapely
 from shapely.affinity import rotate
 
-from experiments.replays.corridor import HALF_WIDTH_M, NICHE_M, PIECE_M
-from sim.worlds import World
+from chainslam.experiments.replays.corridor import HALF_WIDTH_M, NICHE_M, PIECE_M
+from chainslam.sim.worlds import World
 
 LEAST_M = 24.0
 """Circumference of the smallest ring that has a block in it."""

@@ -14,10 +14,10 @@ import numpy as np
 from rich.table import Table
 from scipy.stats import binomtest
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from slam.backends import BACKENDS
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.slam.backends import BACKENDS
 
 from ..results.plans import LOST
 from ..runner.command import run_study

@@ -13,18 +13,18 @@ from jaxtyping import Float
 from rich.console import Console
 from rich.table import Table
 
-from experiments.scenario import Scenario, TrialConfig, build
-from experiments.scoring.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
-from experiments.scoring.records import Log
-from experiments.scoring.statistics import estimate, paired
-from experiments.scoring.swept import Floor, visible_floor
-from experiments.scoring.truth import truth_of
-from experiments.terminal.console import plain_console
-from experiments.trial import default_mission, run_scenario
-from explore.step import Step
-from explore.strategies import STRATEGIES
-from sim.worlds import WORLDS
-from slam.geometry.poses import to_world
+from chainslam.experiments.scenario import Scenario, TrialConfig, build
+from chainslam.experiments.scoring.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
+from chainslam.experiments.scoring.records import Log
+from chainslam.experiments.scoring.statistics import estimate, paired
+from chainslam.experiments.scoring.swept import Floor, visible_floor
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import default_mission, run_scenario
+from chainslam.explore.step import Step
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.worlds import WORLDS
+from chainslam.slam.geometry.poses import to_world
 
 from ..runner.command import run_study
 from ..runner.rows import Row, read

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from experiments.scenario import P0, TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from sim.robot import RobotConfig
-from sim.worlds import WORLDS
+from chainslam.experiments.scenario import P0, TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import WORLDS
 
 from ..runner.command import run_study
 from ..runner.trials import rows_of

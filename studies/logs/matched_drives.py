@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.scenario import OdometrySource, TrialConfig, check
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
+from chainslam.experiments.scenario import OdometrySource, TrialConfig, check
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

@@ -6,10 +6,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from sim.logs.recorded_log import read_recorded_log
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.range_noise import range_noise
+from chainslam.sim.logs.recorded_log import read_recorded_log
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.range_noise import range_noise
 
 from ..runner.command import run_study
 

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from experiments.replays.measured import held_against
-from experiments.replays.real_log import RealOptions, read_real_run, replay_real
-from experiments.scenario import OdometrySource
-from experiments.scoring.without_truth.references import read_references
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from slam.backends import BACKENDS
+from chainslam.experiments.replays.measured import held_against
+from chainslam.experiments.replays.real_log import RealOptions, read_real_run, replay_real
+from chainslam.experiments.scenario import OdometrySource
+from chainslam.experiments.scoring.without_truth.references import read_references
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.slam.backends import BACKENDS
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

@@ -17,20 +17,20 @@ import shapely
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.artifacts.settings import record_of, trial_of
-from experiments.replays.looked_again import surveyed
-from experiments.replays.real_log import REAL_WALLS
-from experiments.replays.recordings import recorded
-from experiments.scenario import TrialConfig, check, load_world
-from experiments.scoring.without_truth.normalised import normalised_path, normalised_relations
-from experiments.scoring.without_truth.references import References
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
-from sim.worlds import World
-from slam.association.second_looks.second_looks import Survey
-from slam.association.second_looks.walls import inverse_at
-from slam.evaluation.relations import Relations, between
-from slam.geometry.poses import rotation
+from chainslam.experiments.artifacts.settings import record_of, trial_of
+from chainslam.experiments.replays.looked_again import surveyed
+from chainslam.experiments.replays.real_log import REAL_WALLS
+from chainslam.experiments.replays.recordings import recorded
+from chainslam.experiments.scenario import TrialConfig, check, load_world
+from chainslam.experiments.scoring.without_truth.normalised import normalised_path, normalised_relations
+from chainslam.experiments.scoring.without_truth.references import References
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.worlds import World
+from chainslam.slam.association.second_looks.second_looks import Survey
+from chainslam.slam.association.second_looks.walls import inverse_at
+from chainslam.slam.evaluation.relations import Relations, between
+from chainslam.slam.geometry.poses import rotation
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

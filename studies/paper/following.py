@@ -13,13 +13,13 @@ from typing import Any, get_args
 
 import numpy as np
 
-from experiments.artifacts.presets import METHODS
-from experiments.artifacts.settings import FOLLOWING, nested, over, trial_of
-from experiments.reproductions.runs.traversals import passes
-from experiments.scenario import TrialConfig, check
-from experiments.trial import TrialResult, run_trial
-from explore.following.behaviour import Behaviour
-from explore.following.wall_following import Following
+from chainslam.experiments.artifacts.presets import METHODS
+from chainslam.experiments.artifacts.settings import FOLLOWING, nested, over, trial_of
+from chainslam.experiments.reproductions.runs.traversals import passes
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.trial import TrialResult, run_trial
+from chainslam.explore.following.behaviour import Behaviour
+from chainslam.explore.following.wall_following import Following
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.reproductions import REPRODUCTIONS
-from experiments.reproductions.reproduction import Value
-from viz.reports.report import PageTable
+from chainslam.experiments.reproductions import REPRODUCTIONS
+from chainslam.experiments.reproductions.reproduction import Value
+from chainslam.viz.reports.report import PageTable
 
 from ..runner.rows import Row, fingerprint
 from .following_tables import following_section, read_following, strategies_in_words

@@ -16,23 +16,23 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.replays.corridor import Loop, drive
-from experiments.replays.ideal import NAME as IDEAL
-from experiments.replays.ideal import IdealEkf
-from experiments.replays.observations import DriveObservations, Ridden, observations_of, ride
-from experiments.replays.recordings import record
-from experiments.scenario import KNOWN, P0, P0_SIGMAS, TrialConfig, drawn_start, sigmas_of
-from experiments.scoring.innovations import share_in_own_band
-from experiments.scoring.measurements import Z_95
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError, choose
-from slam.backends import BACKENDS
-from slam.estimation.backend import POSE, Backend, Observations
-from slam.estimation.models import innovations, stack
-from slam.evaluation.consistency import anees, nis
-from slam.evaluation.from_start import FromStart, Start, from_start
-from slam.geometry.poses import wrap
-from slam.robot import ScannerSpec
+from chainslam.experiments.replays.corridor import Loop, drive
+from chainslam.experiments.replays.ideal import NAME as IDEAL
+from chainslam.experiments.replays.ideal import IdealEkf
+from chainslam.experiments.replays.observations import DriveObservations, Ridden, observations_of, ride
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.scenario import KNOWN, P0, P0_SIGMAS, TrialConfig, drawn_start, sigmas_of
+from chainslam.experiments.scoring.innovations import share_in_own_band
+from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import POSE, Backend, Observations
+from chainslam.slam.estimation.models import innovations, stack
+from chainslam.slam.evaluation.consistency import anees, nis
+from chainslam.slam.evaluation.from_start import FromStart, Start, from_start
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import ScannerSpec
 
 from ..runner.command import run_study
 from ..runner.scores import Key, Scores, fill, precision

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.reproductions import REPRODUCTIONS
-from experiments.usage import choose
+from chainslam.experiments.reproductions import REPRODUCTIONS
+from chainslam.experiments.usage import choose
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

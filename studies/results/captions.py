@@ -18,11 +18,11 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from experiments.artifacts.files import json_bytes, write
-from experiments.artifacts.saved import read_config, read_summary
-from experiments.reproductions import fig4
-from experiments.usage import UsageError, choose
-from experiments.views.pictures import read_steps
+from chainslam.experiments.artifacts.files import json_bytes, write
+from chainslam.experiments.artifacts.saved import read_config, read_summary
+from chainslam.experiments.reproductions import fig4
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.experiments.views.pictures import read_steps
 
 from ..runner.command import run_study
 

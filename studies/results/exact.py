@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from experiments.scenario import Scenario, TrialConfig, build
-from experiments.scoring.association import Votes
-from experiments.scoring.beam_votes import vote
-from experiments.scoring.truth import truth_of
-from experiments.terminal.console import plain_console
-from experiments.trial import default_mission, run_scenario
-from experiments.usage import UsageError
-from explore.step import Step
-from sim.worlds import WORLDS
-from slam.geometry.lines import normals
-from slam.geometry.poses import compose, wrap
-from slam.map.reliability import as_told
+from chainslam.experiments.scenario import Scenario, TrialConfig, build
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.beam_votes import vote
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import default_mission, run_scenario
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import WORLDS
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.map.reliability import as_told
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

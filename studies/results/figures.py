@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.evaluation.consistency import verdict_on_noise
 
 from ..runner.rows import Row
 

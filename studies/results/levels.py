@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.scoring.statistics import LEVEL, Clustered, Estimate, estimate, holm
-from experiments.terminal.console import plain_console
-from slam.evaluation.consistency import pooled_band
+from chainslam.experiments.scoring.statistics import LEVEL, Clustered, Estimate, estimate, holm
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.slam.evaluation.consistency import pooled_band
 
 from ..runner.command import run_study
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from experiments.replays.ideal import NAME as IDEAL
-from experiments.scoring.statistics import mean_interval
-from slam.backends import BACKENDS
+from chainslam.experiments.replays.ideal import NAME as IDEAL
+from chainslam.experiments.scoring.statistics import mean_interval
+from chainslam.slam.backends import BACKENDS
 
 from ..runner.rows import Row
 from .figures import Found, Table, grouped, mean_of, numbers

@@ -20,19 +20,19 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.campaign.workers import on_workers
-from experiments.replays.corridor import look
-from experiments.replays.observations import DriveObservations, ride
-from experiments.scenario import KNOWN, P0, P0_SIGMAS, drawn_start, sigmas_of
-from experiments.scoring.statistics import mean_interval
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError, choose
-from sim.chance import Chance, Channel, world_key
-from slam.backends import BACKENDS
-from slam.evaluation.from_start import Start, from_start
-from slam.geometry.lines import through
-from slam.geometry.poses import compose, inverse
-from slam.robot import ScannerSpec
+from chainslam.experiments.campaign.workers import on_workers
+from chainslam.experiments.replays.corridor import look
+from chainslam.experiments.replays.observations import DriveObservations, ride
+from chainslam.experiments.scenario import KNOWN, P0, P0_SIGMAS, drawn_start, sigmas_of
+from chainslam.experiments.scoring.statistics import mean_interval
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError, choose
+from chainslam.sim.chance import Chance, Channel, world_key
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.from_start import Start, from_start
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.robot import ScannerSpec
 
 from ..runner.command import run_study
 

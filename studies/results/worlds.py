@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.scoring.statistics import FEW_RUNS
+from chainslam.experiments.scoring.statistics import FEW_RUNS
 
 from ..runner.rows import Row
 from .figures import (

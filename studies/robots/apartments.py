@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
 from ..runner.rows import Row

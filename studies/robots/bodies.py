@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from experiments.scenario import TrialConfig, check, load_world
-from experiments.terminal.console import plain_console
-from explore.following.driving_config import DrivingConfig
-from sim.robot import RobotConfig
-from sim.worlds import World
-from slam.robot import ScannerSpec
+from chainslam.experiments.scenario import TrialConfig, check, load_world
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.explore.following.driving_config import DrivingConfig
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
+from chainslam.slam.robot import ScannerSpec
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

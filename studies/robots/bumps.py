@@ -12,15 +12,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from rich.table import Table
 
-from experiments.scenario import TrialConfig, check
-from experiments.scoring.summary import pose_nees
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
-from sim.faults import FaultsConfig, bump_rad
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig, chance_in
-from slam.estimation.gates import gate_level
-from slam.geometry.poses import wrap
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.scoring.summary import pose_nees
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.faults import FaultsConfig, bump_rad
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig, chance_in
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.geometry.poses import wrap
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

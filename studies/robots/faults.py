@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scenario import TrialConfig, check
-from experiments.terminal.console import plain_console
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.people import PeopleConfig
-from sim.robot import RobotConfig
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.people import PeopleConfig
+from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of

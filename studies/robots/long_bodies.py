@@ -11,11 +11,11 @@ import tyro
 from rich.table import Table
 from shapely.geometry.polygon import orient
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.trial import run_trial
-from sim.robot import RobotConfig
-from sim.worlds import World
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
 
 LENGTH_M, HALF_WIDTH_M = 0.8, 0.2
 CASES = ((0.6, 0.4, 1), (0.5, 0.4, 1), (0.5, 0.6, 2), (0.47, 0.2, 3), (0.47, 0.4, 4))

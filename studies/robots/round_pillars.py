@@ -19,13 +19,13 @@ from rich.table import Table
 from shapely.geometry.polygon import orient
 
 import chainslam
-from experiments.scenario import TrialConfig
-from experiments.terminal.console import plain_console
-from experiments.terminal.progress import number
-from experiments.trial import run_trial
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig
-from sim.worlds import World
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.terminal.progress import number
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROOM, START = shapely.box(0.0, 0.0, 8.0, 6.0), (0.8, 0.8, 0.3)

@@ -189,7 +189,7 @@ def main() -> int:
     """Test every rule that the file lacks and return the exit status."""
     study = tyro.cli(Held, prog="studies.rules.held")
     install(switch for switch in fitting(SWITCHES) if not (study.plain and is_kernel(switch)))
-    importlib.import_module("experiments.trial")
+    importlib.import_module("chainslam.experiments.trial")
     study.out.parent.mkdir(parents=True, exist_ok=True)
     known = {json.loads(line)["rule"] for line in study.out.read_text().splitlines()} if study.out.exists() else set()
     return int(importlib.import_module("pytest").main([*PYTEST, *study.tests], plugins=[Again(study, known)]))

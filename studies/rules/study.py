@@ -101,7 +101,7 @@ def _drive(study: RulesStudy, file: Path, max_steps: int, rows: list[Row]) -> fl
     # The switches are put into the sources as these are imported, so only now.
     scenario, trials, runner = (
         importlib.import_module(name)
-        for name in ("experiments.scenario", "studies.runner.trials", "studies.runner.rows")
+        for name in ("chainslam.experiments.scenario", "studies.runner.trials", "studies.runner.rows")
     )
     there = {row["rule"]: row for row in rows if row["plan"] == file.stem}
     wanted = {rule for rule in study.rules if rule not in there and not is_clearly_worse(rows, rule)}

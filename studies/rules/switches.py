@@ -20,6 +20,7 @@ import numpy as np
 from numba import config
 
 HERE = Path(__file__).parents[2]
+PACKAGE = "chainslam."
 NO = "np.zeros_like(on())"
 YES = "np.ones_like(on())"
 MARKS = "«»"
@@ -33,6 +34,7 @@ class Switch:
     name: str
     """Module and rule, such as `matching.beside`; a rule of two places has two switches of one name."""
     module: str
+    """Where it stands, below the package."""
     at: str
     """A piece of the module's source that occurs once, with marks around the expression that is the rule."""
     off: str
@@ -142,7 +144,7 @@ class _Finder(MetaPathFinder):
     def __init__(self, switches: Iterable[Switch]) -> None:
         self._of: dict[str, list[Switch]] = defaultdict(list)
         for switch in switches:
-            self._of[switch.module].append(switch)
+            self._of[PACKAGE + switch.module].append(switch)
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -163,7 +165,7 @@ def install(switches: Iterable[Switch]) -> None:
     if any(map(is_kernel, chosen)):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         config.DISABLE_JIT = True  # type: ignore[attr-defined]
-    early = {switch.module for switch in chosen} & sys.modules.keys()
+    early = {PACKAGE + switch.module for switch in chosen} & sys.modules.keys()
     if early:
         raise RuntimeError(f"expected no module with switches to be loaded yet, found {sorted(early)}")
     builtins.rule_switch = STATE.value  # type: ignore[attr-defined]

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import tyro
 
-from experiments.usage import UsageError
+from chainslam.experiments.usage import UsageError
 
 
 class Study(Protocol):

@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.campaign.comparison.tables import doubles
-from experiments.campaign.scores.observer import Observer
-from experiments.campaign.scores.score import record_of
-from experiments.scenario import TrialConfig, build
-from experiments.scoring.truth import truth_of
-from experiments.trial import default_mission, run_scenario
-from explore.goal import Goal
-from explore.step import Step
-from sim.worlds import World
-from slam.geometry.poses import wrap
+from chainslam.experiments.campaign.comparison.tables import doubles
+from chainslam.experiments.campaign.scores.observer import Observer
+from chainslam.experiments.campaign.scores.score import record_of
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.trial import default_mission, run_scenario
+from chainslam.explore.goal import Goal
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import World
+from chainslam.slam.geometry.poses import wrap
 
 from .rows import Row
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.replays.replay import RecordedRun
-from experiments.scenario import load_world
-from sim.chance import Channel
-from sim.lidar import RangeFinder, noisy
-from sim.robot import chance_in
+from chainslam.experiments.replays.replay import RecordedRun
+from chainslam.experiments.scenario import load_world
+from chainslam.sim.chance import Channel
+from chainslam.sim.lidar import RangeFinder, noisy
+from chainslam.sim.robot import chance_in
 
 KINDS = ("none", "wheel-scale", "heading", "range", "range-noise")
 """Share by which the wheels report too much; degrees of heading that they gain in a metre; metres by which ranges are

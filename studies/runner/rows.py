@@ -11,13 +11,11 @@ from typing import Any, TypeVar
 
 from rich.progress import track
 
-import explore
-import sim
-import slam
-from experiments.campaign.workers import on_workers
-from experiments.terminal.console import plain_console
-from experiments.usage import UsageError
+from chainslam.experiments.campaign.workers import on_workers
+from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.usage import UsageError
 
+HERE = Path(__file__).parents[2]
 Row = dict[str, Any]
 Key = tuple[Any, ...]
 Task = TypeVar("Task", bound=Hashable)
@@ -90,10 +88,9 @@ def append(path: Path, rows: Iterable[Row]) -> list[Row]:
 def fingerprint() -> str:
     """Return a fingerprint of the code that decides a trial: its comments and docstrings decide nothing."""
     digest = hashlib.sha256()
-    for package in (slam, explore, sim):
-        for folder in package.__path__:
-            for path in sorted(Path(folder).rglob("*.py")):
-                digest.update(code_alone(path.read_text()).encode())
+    for room in ("slam", "explore", "sim"):
+        for path in sorted((HERE / room).rglob("*.py")):
+            digest.update(code_alone(path.read_text()).encode())
     return digest.hexdigest()[:12]
 
 

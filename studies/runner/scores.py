@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from experiments.scoring.statistics import mean_interval
-from experiments.terminal.console import plain_console
+from chainslam.experiments.scoring.statistics import mean_interval
+from chainslam.experiments.terminal.console import plain_console
 
 from .rows import Row, key_of, rows_of
 

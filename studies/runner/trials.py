@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scenario import TrialConfig, check, load_world
-from experiments.scoring.summary import TIMED
-from experiments.trial import run_trial
-from experiments.usage import UsageError
-from sim.worlds import World
+from chainslam.experiments.scenario import TrialConfig, check, load_world
+from chainslam.experiments.scoring.summary import TIMED
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.worlds import World
 
 from . import rows
 from .rows import Row

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import config_record
-from experiments.scenario import TrialConfig
-from experiments.usage import UsageError
-from sim.logs.recorded_robot import FORMAT
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import config_record
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.logs.recorded_robot import FORMAT
 from studies.results import captions
 from studies.results.captions import CAPTIONS, KEPT, PICTURES, Caption, checksum, read_captions, shown, with_caption
 

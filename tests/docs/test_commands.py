@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands.cli import _parse
+from chainslam.experiments.commands.cli import _parse
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -102,7 +102,7 @@ def test_the_commands_of_readme_and_tutorial_run_one_after_the_other(page, tmp_p
     found = [shlex.split(line)[1:] for line in commands(page) if line.startswith(PROGRAM)]
     assert len(found) >= 3
     for words in found:
-        done = _python("-m", "experiments.commands.cli", *words, cwd=tmp_path)
+        done = _python("-m", "chainslam.experiments.commands.cli", *words, cwd=tmp_path)
         assert done.returncode == 0, f"{words}: {done.stderr}"
     for report in (words[1] for words in found if words[0] == "report"):
         assert re.search("<svg|<img", (tmp_path / report / "report.html").read_text())

@@ -9,7 +9,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "files.md"
 pytestmark = [pytest.mark.long, pytest.mark.usefixtures("_unchecked")]

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from experiments.artifacts.settings import record_of
-from experiments.scenario import TrialConfig
-from experiments.views.settings_schema import settings
+from chainslam.experiments.artifacts.settings import record_of
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.views.settings_schema import settings
 
 ROOT = Path(__file__).parents[2]
 DOCS = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
@@ -57,7 +57,7 @@ def test_every_setting_that_a_text_names_is_one():
 def test_the_figures_of_the_readme_are_those_of_the_drive_in_its_picture(tmp_path):
     words = "explore paper-fig9 --seed 1 --out run", "replay run/log.npz --backend block-ekf full-ekf graph --out r"
     for line in words:
-        program = [sys.executable, "-m", "experiments.commands.cli", *line.split()]
+        program = [sys.executable, "-m", "chainslam.experiments.commands.cli", *line.split()]
         subprocess.run(program, cwd=tmp_path, capture_output=True, env=_environment(), check=True)
     scores = [
         json.loads((tmp_path / "r" / name / "summary.json").read_text())["pose_anees_from_start"]

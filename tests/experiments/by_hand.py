@@ -6,22 +6,22 @@ import networkx as nx
 import numpy as np
 from scipy.linalg import logm
 
-from experiments.scenario import Scenario, TrialConfig, build
-from experiments.scoring.association import Votes
-from experiments.scoring.coverage import alignment
-from experiments.scoring.records import Log, Sketch
-from experiments.scoring.summary import Ending, summarise
-from experiments.scoring.truth import truth_of
-from explore.floor.free_space import FreeSpace
-from explore.goals.decider import Decision
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.robot import RobotConfig
-from slam.association.matching import NO_MATCHES
-from slam.estimation.backend import Joint
-from slam.extraction.segments import Segments
-from slam.geometry.poses import inverse, to_world
-from slam.robot import Odometry, Scan
+from chainslam.experiments.scenario import Scenario, TrialConfig, build
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.records import Log, Sketch
+from chainslam.experiments.scoring.summary import Ending, summarise
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.goals.decider import Decision
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.robot import RobotConfig
+from chainslam.slam.association.matching import NO_MATCHES
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.poses import inverse, to_world
+from chainslam.slam.robot import Odometry, Scan
 
 BEAMS = 36
 TRUE = np.array([[1.0, 1.0, 0.0], [1.1, 1.5, 0.5], [1.2, 1.3, 3.1]])

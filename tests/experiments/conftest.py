@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.goals.decider import Decision
-from explore.outcome import Outcome
-from explore.step import Step
-from sim.worlds import World
-from slam.association.matching import NO_MATCHES
-from slam.estimation.backend import Belief, Joint
-from slam.extraction.segments import Segments
-from slam.geometry.lines import normals, through
-from slam.geometry.poses import to_robot
-from slam.map.chains import Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import MotionCommand, Odometry
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.goals.decider import Decision
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.step import Step
+from chainslam.sim.worlds import World
+from chainslam.slam.association.matching import NO_MATCHES
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.geometry.poses import to_robot
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import MotionCommand, Odometry
 
 
 def square(low, high):
@@ -82,7 +82,7 @@ def chains_of(faces, rings, closed=True):
 
 def scripted(scenario, commands=None, closed=True, fail_at=None, error=RuntimeError):
     """Yield steps of a mission that drives a script; its map is the truth, its pose the odometry's."""
-    from slam.geometry.poses import compose
+    from chainslam.slam.geometry.poses import compose
 
     commands = commands or [MotionCommand(0.15, 0.0)] * 18
     faces, rings = scenario.world.faces, scenario.world.face_rings

@@ -2,12 +2,12 @@
 
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.terminal.progress import range_errors_of, words_on_ranges
-from experiments.trial import run_trial
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.terminal.progress import range_errors_of, words_on_ranges
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig
 
 
 def summary(steps=250, calibrate=False, **faults):

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.strategies import Situation
-from sim.lidar import LidarConfig, RangeFinder
-from slam.estimation.backend import Belief, Joint
-from slam.geometry.lines import normals, through
-from slam.map.chains import Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.strategies import Situation
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import Scan
 
 
 @dataclass(frozen=True)

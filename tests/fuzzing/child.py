@@ -13,7 +13,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 TIME_S, MEMORY_MIB, LINES = 20.0, 1024, 3
 """What one command may compute, hold beyond what every command holds, and say on standard error."""

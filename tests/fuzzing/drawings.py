@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.worlds.readers.geojson.words import WORDS as WORDS_OF_FEATURES
+from chainslam.sim.worlds.readers.geojson.words import WORDS as WORDS_OF_FEATURES
 
 from .drawn_svg import drawn_svg
 from .worlds import TEXTS, explored, good

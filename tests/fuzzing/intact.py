@@ -8,7 +8,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 CAMPAIGN = (
     *("--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"),

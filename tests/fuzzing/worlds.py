@@ -12,7 +12,7 @@ import ezdxf
 import numpy as np
 from PIL import Image, ImageDraw
 
-import sim.worlds
+import chainslam.sim.worlds
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0], [4, 0, 4, 2.5], [4, 3.6, 4, 6]]
 WORDS = ("NaN", "-1", "1e300", "1e-300", "-0", "9" * 400, '"\\ud800"', "null", "[]", "{}", "true", '""', "[[[[]]]]")
@@ -179,8 +179,10 @@ def good() -> dict[str, bytes]:
         "rooms.geojson": json.dumps({"type": "FeatureCollection", "features": rooms}).encode(),
         "lines.geojson": json.dumps({"type": "FeatureCollection", "features": [*drawn, *rooms[2:]]}).encode(),
         "own.geojson": json.dumps({"type": "FeatureCollection", "features": chains, **own}).encode(),
-        "map.svg": (Path(sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(),
-        "map.svgz": gzip.compress((Path(sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(), mtime=0),
+        "map.svg": (Path(chainslam.sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(),
+        "map.svgz": gzip.compress(
+            (Path(chainslam.sim.worlds.__file__).parent / "bundled" / "rooms.svg").read_bytes(), mtime=0
+        ),
         "map.dxf": _dxf(),
         "map.yaml": f"{yaml}occupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n".encode(),
         "map.pgm": _encoded(image, "PPM"),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.replays.real_log import RealOptions, read_real_run
+from chainslam.experiments.replays.real_log import RealOptions, read_real_run
 from tests.sim.logs.written_bag import Bag, pose_at
 
 from .case import Case, Rng, pick

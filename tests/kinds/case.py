@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.usage import UsageError
-from sim.logs.recorded_robot import RecordingError
-from sim.worlds import WorldError
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.logs.recorded_robot import RecordingError
+from chainslam.sim.worlds import WorldError
 
 Rng = np.random.Generator
 REFUSALS = (UsageError, RecordingError, WorldError)

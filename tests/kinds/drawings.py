@@ -9,7 +9,7 @@ import ezdxf
 import numpy as np
 from ezdxf import units
 
-from sim.worlds.readers.foreign import FORMATS
+from chainslam.sim.worlds.readers.foreign import FORMATS
 from tests.fuzzing.drawn_svg import DEFS, HIDDEN, NEVER_RENDERED, STYLE, UNKNOWN
 
 from .case import Case, Rng, pick

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.replays.real_log import RealOptions, RealRun, read_real_run
-from slam.geometry.poses import compose
+from chainslam.experiments.replays.real_log import RealOptions, RealRun, read_real_run
+from chainslam.slam.geometry.poses import compose
 
 from .case import Case, Rng, pick
 

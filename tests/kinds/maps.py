@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from sim.worlds import DrawingOptions, load
+from chainslam.sim.worlds import DrawingOptions, load
 
 from .case import Case, Rng, pick
 from .plan import drawn, plan

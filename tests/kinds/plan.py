@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.worlds import DrawingOptions, World, load
+from chainslam.sim.worlds import DrawingOptions, World, load
 
 from .case import Case, Rng
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.replays.measured import check_references
-from experiments.replays.sources import RealLog
-from experiments.scoring.without_truth.references import read_references
+from chainslam.experiments.replays.measured import check_references
+from chainslam.experiments.replays.sources import RealLog
+from chainslam.experiments.scoring.without_truth.references import read_references
 
 from .case import Case, Rng, pick
 from .logs import SCANS, drive, read

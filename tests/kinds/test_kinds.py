@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.usage import UsageError
+from chainslam.experiments.usage import UsageError
 
 from .__main__ import BEGIN, END
 from .case import Case, verdict

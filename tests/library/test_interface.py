@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import chainslam
-from experiments.commands.cli import main
-from slam.backends.full_ekf import FullEkf
+from chainslam.experiments.commands.cli import main
+from chainslam.slam.backends.full_ekf import FullEkf
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 HEAVY = ("gtsam", "rerun", "matplotlib", "pandas", "numpy")
@@ -123,7 +123,7 @@ class Wrapped:
 
 
 def test_a_robot_of_ones_own_explores_and_has_no_scores_of_the_truth():
-    from experiments.scenario import TrialConfig, build
+    from chainslam.experiments.scenario import TrialConfig, build
 
     robot = Wrapped(build(TrialConfig("paper-fig4", seed=3)).robot)
     run = chainslam.explore(robot, robot=chainslam.RobotSpec(radius_m=0.2), max_steps=25)
@@ -137,8 +137,8 @@ def test_a_robot_of_ones_own_explores_and_has_no_scores_of_the_truth():
 
 
 def test_the_log_of_a_robot_of_ones_own_goes_through_the_same_back_end_to_the_same_path(tmp_path, capsys):
-    from experiments.commands.cli import main
-    from experiments.scenario import TrialConfig, build
+    from chainslam.experiments.commands.cli import main
+    from chainslam.experiments.scenario import TrialConfig, build
 
     robot = Wrapped(build(TrialConfig("paper-fig4", seed=3)).robot)
     chainslam.explore(robot, robot=chainslam.RobotSpec(radius_m=0.2), max_steps=15, out=tmp_path / "run")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import shapely
 
-from slam.geometry.poses import arc, compose, inverse
-from slam.robot import MotionCommand, RobotError
-from slam.robot.ros.robot import MessageRobot
-from slam.robot.streaming import SteppedRobot
+from chainslam.slam.geometry.poses import arc, compose, inverse
+from chainslam.slam.robot import MotionCommand, RobotError
+from chainslam.slam.robot.ros.robot import MessageRobot
+from chainslam.slam.robot.streaming import SteppedRobot
 from tests.slam.message_base import Message, MessageBase
 from tests.slam.streaming_base import ROOM, TICK_S
 

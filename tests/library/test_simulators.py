@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import chainslam
-from slam.geometry.lines import distance_to_segments
-from slam.geometry.poses import compose, inverse, to_world, wrap
-from slam.robot import MotionCommand, ScannerSpec
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.geometry.poses import compose, inverse, to_world, wrap
+from chainslam.slam.robot import MotionCommand, ScannerSpec
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 ROBOTS = {"irsim_robot": "IrSimRobot", "mujoco_robot": "MujocoRobot"}

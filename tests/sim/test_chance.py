@@ -10,13 +10,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.replays.corridor import Loop, drive
-from experiments.scenario import TrialConfig, build
-from sim.chance import SEED_MAX, Chance, Channel, world_key
-from sim.robot import chance_in
-from sim.worlds import WORLDS, World, load
-from slam.backends import BACKENDS
-from slam.robot import MotionCommand
+from chainslam.experiments.replays.corridor import Loop, drive
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.sim.chance import SEED_MAX, Chance, Channel, world_key
+from chainslam.sim.robot import chance_in
+from chainslam.sim.worlds import WORLDS, World, load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.robot import MotionCommand
 
 words = st.integers(0, SEED_MAX)
 streams = st.tuples(

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.chance import Chance
-from sim.drive import Slip, seconds
-from sim.faults import (
+from chainslam.sim.chance import Chance
+from chainslam.sim.drive import Slip, seconds
+from chainslam.sim.faults import (
     FaultsConfig,
     bump_rad,
     is_moving,
@@ -17,10 +17,10 @@ from sim.faults import (
     with_mixed_pixels,
     with_posts,
 )
-from sim.lidar import RangeFinder
-from sim.robot import RobotConfig, SimulatedRobot
-from slam.geometry.poses import arc, compose
-from slam.robot import MotionCommand
+from chainslam.sim.lidar import RangeFinder
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.slam.geometry.poses import arc, compose
+from chainslam.slam.robot import MotionCommand
 from tests.sim.test_robot import room
 
 CHANCE = Chance(3, 0)

@@ -6,8 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.lidar import LidarConfig, RangeFinder, beam_sigmas, bearings, noisy
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, beam_sigmas, bearings, noisy
+from chainslam.slam.robot import Scan
 
 FULL = LidarConfig()
 HALF = LidarConfig(beams=181, fov_rad=np.pi)

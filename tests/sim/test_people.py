@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.chance import Chance
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.people import People, PeopleConfig, hidden_by
-from sim.robot import RobotConfig, SimulatedRobot
-from slam.geometry.lines import distance_to_segments
-from slam.robot import MotionCommand, RobotError
+from chainslam.sim.chance import Chance
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.people import People, PeopleConfig, hidden_by
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.robot import MotionCommand, RobotError
 from tests.sim.test_robot import room
 
 BODY_M = 0.2

@@ -3,9 +3,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from sim.robot import RobotConfig, SimulatedRobot
-from slam.geometry.lines import distance_to_segments
-from slam.robot import MotionCommand, Robot, ScannerSpec, WheelSpec
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.robot import MotionCommand, Robot, ScannerSpec, WheelSpec
 
 
 @dataclass(frozen=True)

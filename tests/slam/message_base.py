@@ -4,7 +4,7 @@ from types import SimpleNamespace as Message
 
 import numpy as np
 
-from slam.geometry.poses import compose
+from chainslam.slam.geometry.poses import compose
 from tests.slam.streaming_base import StreamingBase, ranges_from
 
 BEAMS = 180

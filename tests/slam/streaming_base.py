@@ -7,9 +7,9 @@ from collections import deque
 
 import numpy as np
 
-from slam.geometry.poses import compose, inverse
-from slam.robot import Odometry
-from slam.robot.streaming import TimedScan, Twist
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.robot import Odometry
+from chainslam.slam.robot.streaming import TimedScan, Twist
 
 ROOM = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 3.5], [3.0, 3.5], [3.0, 2.0], [0.0, 2.0]])
 COV = np.diag([0.004, 0.004, 0.006]) ** 2

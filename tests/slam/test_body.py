@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from slam.robot import RobotError, RobotSpec
-from slam.robot.body import depths_m, reaches_m
+from chainslam.slam.robot import RobotError, RobotSpec
+from chainslam.slam.robot.body import depths_m, reaches_m
 
 LONG = ((0.4, 0.2), (-0.3, 0.25), (-0.4, 0.0), (-0.3, -0.25), (0.4, -0.2))
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.matching import NO_MATCHES, KnownWalls, match
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.extraction.extract import extract
-from slam.geometry.poses import compose, inverse
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, match
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 ODOMETRY_COV = np.diag([0.01, 0.01, 0.005]) ** 2

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from slam.association.leap import Leap
-from slam.association.place_search import PlaceSearchConfig
-from slam.association.recovery import RecoveryConfig
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.estimation.backend import ContradictionError
-from slam.geometry.poses import compose, wrap
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.slam.association.leap import Leap
+from chainslam.slam.association.place_search import PlaceSearchConfig
+from chainslam.slam.association.recovery import RecoveryConfig
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import ContradictionError
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 from tests.slam.extraction.test_extract import HALL, loop
 from tests.slam.test_mapper import ODOMETRY_COV, P0
 

@@ -5,12 +5,21 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from explore.mission import MissionConfig
-from sim.drive import clamp
-from sim.faults import FaultsConfig
-from sim.robot import RobotConfig
-from slam.robot import STATED, MotionCommand, RobotError, RobotSpec, ScannerSpec, WheelSpec, fitted, of_outline
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.explore.mission import MissionConfig
+from chainslam.sim.drive import clamp
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.robot import RobotConfig
+from chainslam.slam.robot import (
+    STATED,
+    MotionCommand,
+    RobotError,
+    RobotSpec,
+    ScannerSpec,
+    WheelSpec,
+    fitted,
+    of_outline,
+)
 
 OF_THE_PAPER = {
     "explorer.near_m": 0.3,

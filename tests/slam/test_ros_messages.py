@@ -6,16 +6,16 @@ import time
 import numpy as np
 import pytest
 
-from slam.geometry.poses import arc, compose, inverse
-from slam.robot import MotionCommand, RobotError, WheelSpec
-from slam.robot.deskew import de_skewed
-from slam.robot.messages import Odometry
-from slam.robot.ros.laser_scan import is_covered, timed_scan
-from slam.robot.ros.odometry_buffer import OdometryBuffer
-from slam.robot.ros.robot import CancelledError, MessageRobot, map_to_odom
-from slam.robot.ros.transforms import Frames, planar, seconds
-from slam.robot.ros.written import written_transform, written_twist
-from slam.robot.streaming import SteppedRobot, Twist
+from chainslam.slam.geometry.poses import arc, compose, inverse
+from chainslam.slam.robot import MotionCommand, RobotError, WheelSpec
+from chainslam.slam.robot.deskew import de_skewed
+from chainslam.slam.robot.messages import Odometry
+from chainslam.slam.robot.ros.laser_scan import is_covered, timed_scan
+from chainslam.slam.robot.ros.odometry_buffer import OdometryBuffer
+from chainslam.slam.robot.ros.robot import CancelledError, MessageRobot, map_to_odom
+from chainslam.slam.robot.ros.transforms import Frames, planar, seconds
+from chainslam.slam.robot.ros.written import written_transform, written_twist
+from chainslam.slam.robot.streaming import SteppedRobot, Twist
 from tests.slam.message_base import Message, MessageBase, laser_scan, odometry, stamp, transforms
 from tests.slam.streaming_base import ranges_from
 

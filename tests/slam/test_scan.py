@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS, BackendOptions
-from slam.mapper import Mapper
-from slam.robot import Odometry, RobotError, Scan
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, RobotError, Scan
 
 FULL = np.linspace(-np.pi, np.pi, 12, endpoint=False)
 PART = np.linspace(-1.0, 1.0, 12)

@@ -6,8 +6,8 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from slam.robot import MotionCommand, RobotError
-from slam.robot.streaming import SteppedRobot, Twist
+from chainslam.slam.robot import MotionCommand, RobotError
+from chainslam.slam.robot.streaming import SteppedRobot, Twist
 from tests.slam.streaming_base import COV, StreamingBase
 
 COMMANDS = [MotionCommand(0.15, 0.0), MotionCommand(0.0, -0.17), MotionCommand(-0.1, 0.1)]
@@ -119,7 +119,7 @@ def test_odometry_that_goes_silent_stops_the_robot_in_time():
 
 
 def test_a_robot_that_waits_for_its_first_scan_has_longer(monkeypatch):
-    monkeypatch.setattr("slam.robot.scan_stream.START_S", 0.15)
+    monkeypatch.setattr("chainslam.slam.robot.scan_stream.START_S", 0.15)
     base = StreamingBase(silent_s=0.0, silence="none")
     base.last = base.scan()
     base.silence = "blocks"
@@ -162,7 +162,7 @@ def test_a_stuck_base_is_told_its_command_once_and_found_out_at_the_third():
 
 
 def test_while_it_waits_the_twist_is_sent_again(monkeypatch):
-    monkeypatch.setattr("slam.robot.scan_stream.REPEAT_S", 0.01)
+    monkeypatch.setattr("chainslam.slam.robot.scan_stream.REPEAT_S", 0.01)
     base, sent = StreamingBase(), []
     scan, send = base.scan, base.send
 
@@ -181,7 +181,7 @@ def test_while_it_waits_the_twist_is_sent_again(monkeypatch):
 
 
 def test_what_lasted_long_enough_is_stopped_though_no_scan_comes(monkeypatch):
-    monkeypatch.setattr("slam.robot.scan_stream.REPEAT_S", 0.01)
+    monkeypatch.setattr("chainslam.slam.robot.scan_stream.REPEAT_S", 0.01)
     base, told = StreamingBase(), []
     stepped = SteppedRobot(base, wait_s=1.5, speed_m_s=0.5)
     for _ in range(2):

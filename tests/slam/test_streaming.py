@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.poses import arc, compose, inverse
-from slam.robot import MotionCommand, Odometry, RobotError, Scan
-from slam.robot.streaming import SteppedRobot, TimedScan, Twist, de_skewed
+from chainslam.slam.geometry.poses import arc, compose, inverse
+from chainslam.slam.robot import MotionCommand, Odometry, RobotError, Scan
+from chainslam.slam.robot.streaming import SteppedRobot, TimedScan, Twist, de_skewed
 from tests.slam.streaming_base import COV, ranges_from
 
 BEARINGS = np.linspace(-np.pi, np.pi, 360, endpoint=False)

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.usage import UsageError
-from explore.goal import Goal
-from slam.geometry.lines import distance_to_segments
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.goal import Goal
+from chainslam.slam.geometry.lines import distance_to_segments
 from studies.consistency import heading as heading_study
 from studies.consistency.heading import HeadingStudy, Ring
 from studies.exploration import adaptive as adaptive_study

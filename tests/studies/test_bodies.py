@@ -1,6 +1,6 @@
 """The table of bodies: a robot is held against the paper's in the same building, seed by seed."""
 
-from experiments.scenario import load_world
+from chainslam.experiments.scenario import load_world
 from studies.robots.bodies import CASES, PAPER, BodiesStudy, fits, table
 
 

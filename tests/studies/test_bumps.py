@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sim.chance import Chance
-from sim.faults import bump_rad
+from chainslam.sim.chance import Chance
+from chainslam.sim.faults import bump_rad
 from studies.robots.bumps import BumpsStudy, recoveries, table
 
 

@@ -9,22 +9,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.campaign.scores.score import offsets
-from experiments.replays.corridor import FIRM_RAD, Loop, drive, on_ring
-from experiments.replays.observations import observations_of, ride
-from experiments.replays.oracles import as_stated
-from experiments.replays.recordings import record, recorded
-from experiments.replays.replay import ReplayOptions, replay
-from experiments.reproductions.runs.origin import ShiftedOrigin
-from experiments.reproductions.runs.standing import slope, stand
-from experiments.scenario import TrialConfig, drawn_start
-from experiments.scoring.statistics import mean_interval
-from experiments.trial import run_trial
-from experiments.usage import UsageError
-from slam.backends import BACKENDS
-from slam.backends.full_ekf import FullEkf
-from slam.estimation.models import innovations
-from slam.geometry.poses import to_world
+from chainslam.experiments.campaign.scores.score import offsets
+from chainslam.experiments.replays.corridor import FIRM_RAD, Loop, drive, on_ring
+from chainslam.experiments.replays.observations import observations_of, ride
+from chainslam.experiments.replays.oracles import as_stated
+from chainslam.experiments.replays.recordings import record, recorded
+from chainslam.experiments.replays.replay import ReplayOptions, replay
+from chainslam.experiments.reproductions.runs.origin import ShiftedOrigin
+from chainslam.experiments.reproductions.runs.standing import slope, stand
+from chainslam.experiments.scenario import TrialConfig, drawn_start
+from chainslam.experiments.scoring.statistics import mean_interval
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.estimation.models import innovations
+from chainslam.slam.geometry.poses import to_world
 from studies.consistency.bias import BiasStudy
 from studies.consistency.existence import ExistenceStudy, Looks, counted, seen_lines, table
 from studies.consistency.extraction import PLANS, ExtractionStudy, worlds

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from sim.worlds import load
-from slam.geometry.lines import distance_to_segments
+from chainslam.sim.worlds import load
+from chainslam.slam.geometry.lines import distance_to_segments
 from studies.exploration.court_worlds import court
 from studies.exploration.courts import CourtsStudy, is_premature
 

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments.scenario import TrialConfig, build
-from experiments.scoring.association import Votes
-from experiments.scoring.truth import truth_of
-from experiments.trial import default_mission, run_scenario
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.trial import default_mission, run_scenario
 from studies.results.exact import JUMP_M, Movements, causes, exact, table
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.following.behaviour import Behaviour
+from chainslam.explore.following.behaviour import Behaviour
 from studies.paper import following
 from studies.paper.following import BY_BACKEND, BY_METHOD, FollowingStudy, trial
 from studies.paper.following_tables import following_section, strategies_in_words

@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments.replays.recordings import record
-from experiments.replays.replay import ReplayOptions, replay
-from experiments.scenario import TrialConfig
-from slam.backends.graph.config import GraphConfig
+from chainslam.experiments.replays.recordings import record
+from chainslam.experiments.replays.replay import ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.slam.backends.graph.config import GraphConfig
 from studies.consistency.graph import differences
 from studies.consistency.graph_settings import told_again
 

@@ -5,10 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.scoring.corners import corners
-from experiments.scoring.measurements import Z_95
-from experiments.trial import run_trial
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.corners import corners
+from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.trial import run_trial
 from studies.consistency import interval_causes, intervals
 
 

@@ -4,8 +4,8 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from experiments.scoring import statistics
-from experiments.scoring.statistics import estimate, holm
+from chainslam.experiments.scoring import statistics
+from chainslam.experiments.scoring.statistics import estimate, holm
 from studies.results.levels import DRAWS_OF, FAMILY, LevelStudy, held, of_buildings, of_runs, outside_band
 
 CASES = 400

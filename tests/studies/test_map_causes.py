@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.scoring.summary import map_error
-from experiments.trial import run_trial
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.summary import map_error
+from chainslam.experiments.trial import run_trial
 from studies.exploration.map_causes import (
     causes,
     other_faces,

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.replays.corridor import Loop, drive
-from experiments.replays.ideal import IdealEkf
-from experiments.replays.observations import ride
-from experiments.reproductions import REPRODUCTIONS, fig8, table1
-from experiments.reproductions.runs import maps
-from experiments.scenario import drawn_start
-from slam.backends import BACKENDS
-from slam.evaluation.consistency import bound_margins
-from slam.geometry.poses import wrap
+from chainslam.experiments.replays.corridor import Loop, drive
+from chainslam.experiments.replays.ideal import IdealEkf
+from chainslam.experiments.replays.observations import ride
+from chainslam.experiments.reproductions import REPRODUCTIONS, fig8, table1
+from chainslam.experiments.reproductions.runs import maps
+from chainslam.experiments.scenario import drawn_start
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.consistency import bound_margins
+from chainslam.slam.geometry.poses import wrap
 from studies.paper import following, page, rivals, study
 from studies.paper.following import ROWS as FOLLOWED
 from studies.paper.following_tables import read_following

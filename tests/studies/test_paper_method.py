@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.artifacts.settings import trial_of
+from chainslam.experiments.artifacts.settings import trial_of
 from studies.consistency.paper_method import KEPT, METHODS, table
 
 PAPER = trial_of(METHODS["paper-method"])

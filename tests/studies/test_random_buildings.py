@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
 from studies.exploration.random_buildings import faults
 
 SMALL = (22, 60, 65, 123, 214, 277)

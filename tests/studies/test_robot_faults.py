@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim.faults import NEVER, FaultsConfig
-from sim.robot import RobotConfig
+from chainslam.sim.faults import NEVER, FaultsConfig
+from chainslam.sim.robot import RobotConfig
 from studies.robots.faults import CASES, NAMES, SOUND, FaultsStudy, lines_of, with_table
 from studies.runner.rows import read
 

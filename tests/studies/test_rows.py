@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.usage import UsageError
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.usage import UsageError
 from studies.runner import rows
 from studies.runner import trials as trial_rows
 from studies.runner.trials import PARTS, one, rows_of

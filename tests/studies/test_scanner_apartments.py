@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.robot import RobotConfig
+from chainslam.sim.robot import RobotConfig
 from studies.robots.apartments import ROBOT, ApartmentsStudy, table
 
 

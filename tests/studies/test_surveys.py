@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from sim.worlds import load
+from chainslam.sim.worlds import load
 from studies.logs.surveys import SurveyStudy, bowed, table
 
 

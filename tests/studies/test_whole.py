@@ -5,8 +5,8 @@ from html import escape
 
 import pytest
 
-from experiments.artifacts.files import write
-from experiments.usage import UsageError
+from chainslam.experiments.artifacts.files import write
+from chainslam.experiments.usage import UsageError
 from studies.whole import REPORT, WholeStudy
 
 

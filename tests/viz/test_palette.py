@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from viz import palette
+from chainslam.slam.backends import BACKENDS
+from chainslam.viz import palette
 
 OKABE_ITO = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")
 VISIONS = {

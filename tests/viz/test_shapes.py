@@ -2,8 +2,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.lines import normals
-from viz.shapes import Changes, ellipses, hessian_cov, rounded, spread
+from chainslam.slam.geometry.lines import normals
+from chainslam.viz.shapes import Changes, ellipses, hessian_cov, rounded, spread
 
 seeds = st.integers(0, 2**32 - 1)
 

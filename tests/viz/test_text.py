@@ -6,8 +6,8 @@ import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
 
-from viz.figures.maps import png, saved
-from viz.text import literal
+from chainslam.viz.figures.maps import png, saved
+from chainslam.viz.text import literal
 
 WORDS = (r"$\alpha{$", "5 $ and 6 $", r"\$ \\$ $", "$", "$$$", "会议室 $x$")
 

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from viz import viewer
-from viz.viewer import Viewer, ViewerError, WebViewer
+from chainslam.viz import viewer
+from chainslam.viz.viewer import Viewer, ViewerError, WebViewer
 
 FAKE = """#!{python}
 import json, os, socket, sys, time

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
-from viz import palette
-from viz.timeline.colours import WallColours, packed
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz import palette
+from chainslam.viz.timeline.colours import WallColours, packed
 
 IDS = np.array([3, 5, 8])
 

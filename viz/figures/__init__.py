@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from slam.geometry.compiled import cache, is_users_own
+from chainslam.slam.geometry.compiled import cache, is_users_own
 
 BACKEND, HOME = "MPLBACKEND", "MPLCONFIGDIR"
 

@@ -19,8 +19,8 @@ from matplotlib.path import Path
 from matplotlib.text import Text
 from PIL import Image
 
-from slam.map.chains import Chain
-from slam.robot import RobotSpec
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import RobotSpec
 
 from .. import palette
 from ..text import literal

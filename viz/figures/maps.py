@@ -18,10 +18,10 @@ from matplotlib.patches import Circle, Ellipse, Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 
-from explore.goal import SetAside
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import RobotSpec
+from chainslam.explore.goal import SetAside
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import RobotSpec
 
 from .. import palette
 from ..shapes import ellipses

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from scipy.spatial import cKDTree
 
-from slam.evaluation.consistency import chi2_band
+from chainslam.slam.evaluation.consistency import chi2_band
 
 from .. import palette
 from ..shapes import SIGMAS, VAGUE_RAD, ellipses

@@ -16,9 +16,9 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from explore.planning.visibility_graph import NEIGHBOUR, neighbours
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, neighbours
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .. import palette
 from ..text import literal

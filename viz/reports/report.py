@@ -75,7 +75,7 @@ def filled(*sections: Section) -> tuple[Section, ...]:
 def html(page: Page) -> bytes:
     """Return the page as one HTML file that fetches nothing."""
     environment = Environment(
-        loader=PackageLoader("viz.reports", "."), autoescape=select_autoescape(default=True), trim_blocks=True
+        loader=PackageLoader("chainslam.viz.reports", "."), autoescape=select_autoescape(default=True), trim_blocks=True
     )
     return environment.get_template("report.html.j2").render(page=page, long_rows=LONG_ROWS).encode()
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int, UInt32
 
-from slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.lines import directions, normals
 
 from .drawn_step import DrawnStep
 from .recording import Timestamps

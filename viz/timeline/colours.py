@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Int, UInt32
 
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from .. import palette
 

@@ -6,16 +6,16 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.goal import SetAside
-from explore.goals.decider import Decision
-from explore.planning.visibility_graph import NEIGHBOUR
-from explore.step import Step
-from slam.association.matching import Matches
-from slam.association.recovery import Localisation
-from slam.extraction.segments import Segments
-from slam.map.chains import Chain
-from slam.robot import RobotSpec, Scan
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.goal import SetAside
+from chainslam.explore.goals.decider import Decision
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR
+from chainslam.explore.step import Step
+from chainslam.slam.association.matching import Matches
+from chainslam.slam.association.recovery import Localisation
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.robot import RobotSpec, Scan
 
 from .colours import WallColours
 

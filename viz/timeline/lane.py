@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float
 
-from explore.step import Step
+from chainslam.explore.step import Step
 
 from .block import Block
 from .drawn_step import DrawnStep, Keeper

@@ -7,8 +7,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import Float
 
-from explore.step import Step
-from slam.geometry.lines import through
+from chainslam.explore.step import Step
+from chainslam.slam.geometry.lines import through
 
 from .. import palette
 from .blueprints import blueprint, comparison, one_run

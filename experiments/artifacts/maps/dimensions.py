@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from viz.floor_plan import Dimension
+from chainslam.viz.floor_plan import Dimension
 
 from ...scoring.measurements import Measured
 from .mapped import MappedCorners, Room

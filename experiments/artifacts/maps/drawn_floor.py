@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from explore.floor.free_space import FloorTooLargeError, FreeSpace, FreeSpaceConfig
-from sim.logs.recorded_robot import Recording
-from slam.odometry.config import ScanMatchingConfig
+from chainslam.explore.floor.free_space import FloorTooLargeError, FreeSpace, FreeSpaceConfig
+from chainslam.sim.logs.recorded_robot import Recording
+from chainslam.slam.odometry.config import ScanMatchingConfig
 
 
 def drawn_floor(recording: Recording, poses_world: Float[np.ndarray, "s 3"], config: FreeSpaceConfig) -> FreeSpace:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from viz.floor_plan import Dimension
+from chainslam.viz.floor_plan import Dimension
 
 WALLS, TENTATIVE, DIMENSIONS, PATH = "WALLS", "WALLS-TENTATIVE", "DIMENSIONS", "PATH"
 OPEN_ENDS, NOTES = "OPEN-ENDS", "NOTES"

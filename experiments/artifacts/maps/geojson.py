@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import shapely
 
-from explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
-from explore.step import Step
-from slam.estimation.backend import Joint
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
+from chainslam.explore.step import Step
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scoring.corners import Corner, corners
 from ...scoring.records import Log

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from msgspec import defstruct
 
-from sim.logs.archive import ArchiveError
-from sim.logs.recorded_robot import MOST_M, are_covariances, within
+from chainslam.sim.logs.archive import ArchiveError
+from chainslam.sim.logs.recorded_robot import MOST_M, are_covariances, within
 
 from ..reading import read_arrays, read_json, told
 from ..schema import UnfitError, fit, many

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float, Int8, Integer
 
-from explore.floor.free_space import FreeSpace
+from chainslam.explore.floor.free_space import FreeSpace
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 """The greys of ROS map_server's map_saver."""

@@ -8,15 +8,15 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
-from explore.goal import SetAside
-from explore.step import Step
-from sim.logs.keyframes import RecordedLog
-from sim.worlds import World
-from slam.geometry.poses import compose, inverse, to_world
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
-from viz.figures.maps import Picture, draw_map, png
-from viz.figures.visibility import GraphPicture, draw_graph
+from chainslam.explore.goal import SetAside
+from chainslam.explore.step import Step
+from chainslam.sim.logs.keyframes import RecordedLog
+from chainslam.sim.worlds import World
+from chainslam.slam.geometry.poses import compose, inverse, to_world
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz.figures.maps import Picture, draw_map, png
+from chainslam.viz.figures.visibility import GraphPicture, draw_graph
 
 from ...scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ...scoring.corners import corners

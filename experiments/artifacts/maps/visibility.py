@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Int
 from msgspec import defstruct
 
-from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
-from explore.step import Step
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT
+from chainslam.explore.step import Step
 
 from ...scoring.records import Log, Route
 from ..files import stamp

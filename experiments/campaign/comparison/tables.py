@@ -11,9 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from jaxtyping import Float
 
-from sim.logs.archive import regular
-from slam.association.matching import MatchingConfig
-from slam.evaluation.consistency import chi2_band, pooled_band
+from chainslam.sim.logs.archive import regular
+from chainslam.slam.association.matching import MatchingConfig
+from chainslam.slam.evaluation.consistency import chi2_band, pooled_band
 
 from ...artifacts.files import csv_bytes, json_bytes, stamp, write
 from ...artifacts.reading import told

@@ -5,7 +5,7 @@ from math import isfinite, log
 from pathlib import Path
 from typing import Any
 
-from viz.reports.report import Page, PageTable, Section
+from chainslam.viz.reports.report import Page, PageTable, Section
 
 from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import NONE, digits_apart, number

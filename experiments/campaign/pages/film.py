@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from slam.backends import BACKENDS
+from chainslam.slam.backends import BACKENDS
 
 from ...replays.replay import ReplayOptions, read_run
 from ...views.timelines import record_comparison

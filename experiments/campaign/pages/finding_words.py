@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from viz.reports.report import PageTable
+from chainslam.viz.reports.report import PageTable
 
 from ...views.numbers import NONE, number, percent
 from ..comparison.words import ARMS_SHORT, within

@@ -5,8 +5,8 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from slam.evaluation.consistency import verdict_on_noise
-from viz.reports.report import Page, PageTable, Section, filled
+from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.viz.reports.report import Page, PageTable, Section, filled
 
 from ...artifacts.reading import read_json
 from ...views.numbers import NONE, number, percent

@@ -9,13 +9,13 @@ import shapely
 from jaxtyping import Float
 from msgspec import defstruct
 
-from explore.strategies import STRATEGIES
-from sim.worlds import DrawingOptions
-from viz import palette
-from viz.figures.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_figure
-from viz.figures.maps import png
-from viz.figures.plots import draw_coverage
-from viz.reports.report import PagePicture
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.worlds import DrawingOptions
+from chainslam.viz import palette
+from chainslam.viz.figures.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_figure
+from chainslam.viz.figures.maps import png
+from chainslam.viz.figures.plots import draw_coverage
+from chainslam.viz.reports.report import PagePicture
 
 from ...artifacts.reading import told
 from ...artifacts.schema import fit, many

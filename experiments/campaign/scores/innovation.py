@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.association.matching import KnownWalls, Matches, MatchingConfig
-from slam.association.methods import Matcher
-from slam.estimation.backend import Joint
-from slam.estimation.models import innovations
-from slam.evaluation.consistency import nis
-from slam.extraction.segments import Segments
-from slam.extraction.straightness import cov_of_faces
-from slam.map.reliability import ReliabilityConfig, are_clear
+from chainslam.slam.association.matching import KnownWalls, Matches, MatchingConfig
+from chainslam.slam.association.methods import Matcher
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.estimation.models import innovations
+from chainslam.slam.evaluation.consistency import nis
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.extraction.straightness import cov_of_faces
+from chainslam.slam.map.reliability import ReliabilityConfig, are_clear
 
 from ...scoring.innovations import share_in_own_band
 

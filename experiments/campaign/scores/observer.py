@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from explore.step import Step
-from slam.estimation.backend import Joint
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import to_world
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.step import Step
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scoring.association import OVERLAP_M, Votes
 from ...scoring.beam_votes import UNLABELLED, vote

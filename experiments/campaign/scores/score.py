@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from slam.estimation.backend import Joint
-from slam.evaluation.consistency import bound_margins
-from slam.evaluation.trajectories import ate, position_errors, rpe
-from slam.geometry.lines import normals
-from slam.geometry.poses import J, to_world, wrap
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.evaluation.consistency import bound_margins
+from chainslam.slam.evaluation.trajectories import ate, position_errors, rpe
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import J, to_world, wrap
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scoring.association import Votes, duplicate_lines
 from ...scoring.corners import corners

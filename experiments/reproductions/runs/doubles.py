@@ -6,11 +6,11 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Int
 
-from explore.step import Step
-from slam.geometry.lines import normals
-from slam.geometry.poses import wrap
-from slam.map.stochastic_map import StochasticMap
-from viz.shapes import hessian_cov
+from chainslam.explore.step import Step
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz.shapes import hessian_cov
 
 from ...replays.recordings import recorded
 from ...replays.replay import replay

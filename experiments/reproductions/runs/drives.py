@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from matplotlib.axes import Axes
 
-from slam.geometry.poses import to_world
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
-from viz import palette
-from viz.figures.curves import SmallMap
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz import palette
+from chainslam.viz.figures.curves import SmallMap
 
 from ...artifacts.presets import METHODS, preset_of
 from ...artifacts.settings import trial_of

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from viz import palette
-from viz.text import literal
+from chainslam.viz import palette
+from chainslam.viz.text import literal
 
 from ...scenario import TrialConfig
 from ...trial import TrialResult

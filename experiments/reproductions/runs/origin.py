@@ -12,14 +12,14 @@ import tyro
 from jaxtyping import Float
 from rich.table import Table
 
-from slam.backends.blocks.block_ekf import BlockEkf
-from slam.backends.fej_ekf import FejEkf
-from slam.backends.full_ekf import FullEkf
-from slam.backends.invariant_ekf import InvariantEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.backends.relocation_ekf import RelocationEkf
-from slam.estimation.backend import Backend
-from slam.geometry.lines import normals
+from chainslam.slam.backends.blocks.block_ekf import BlockEkf
+from chainslam.slam.backends.fej_ekf import FejEkf
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.invariant_ekf import InvariantEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.backends.relocation_ekf import RelocationEkf
+from chainslam.slam.estimation.backend import Backend
+from chainslam.slam.geometry.lines import normals
 
 from ...replays.corridor import Loop, drive
 from ...replays.observations import DriveObservations, ride

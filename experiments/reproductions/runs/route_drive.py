@@ -6,13 +6,13 @@ from itertools import groupby
 
 import numpy as np
 
-from explore.planning.visibility_graph import followed_wall
-from explore.planning.wall_routes import route
-from explore.step import Step
-from explore.strategies import Choice, Place, Situation, Strategy
-from explore.survey.viewpoints import lane
-from slam.geometry.poses import to_world
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.planning.visibility_graph import followed_wall
+from chainslam.explore.planning.wall_routes import route
+from chainslam.explore.step import Step
+from chainslam.explore.strategies import Choice, Place, Situation, Strategy
+from chainslam.explore.survey.viewpoints import lane
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scenario import Scenario, TrialConfig
 from ...scoring.coverage import alignment

@@ -11,11 +11,11 @@ import tyro
 from jaxtyping import Float
 from rich.table import Table
 
-from sim.chance import Chance, Channel, world_key
-from slam.backends import BACKENDS
-from slam.estimation.backend import Observations
-from slam.geometry.lines import through
-from slam.geometry.poses import J
+from chainslam.sim.chance import Chance, Channel, world_key
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import J
 
 from ...replays.corridor import look, on_ring, ring
 from ...scenario import P0, P0_SIGMAS, drawn_start

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from slam.backends import BACKENDS
-from viz.figures.plots import draw_traversal, traversals
+from chainslam.slam.backends import BACKENDS
+from chainslam.viz.figures.plots import draw_traversal, traversals
 
 from ...replays.observations import observations_of, ride
 from ...replays.recordings import recorded

@@ -4,7 +4,7 @@ from typing import Any
 
 import shapely
 
-from explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
+from chainslam.explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from slam.estimation.backend import PathKeeper
-from slam.estimation.gates import gate_level
-from slam.estimation.mounting import body_poses
-from slam.evaluation.consistency import anees, nees, share_in_band
-from slam.evaluation.relation_noise import (
+from chainslam.slam.estimation.backend import PathKeeper
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.estimation.mounting import body_poses
+from chainslam.slam.evaluation.consistency import anees, nees, share_in_band
+from chainslam.slam.evaluation.relation_noise import (
     Sigmas,
     adjoint_of_inverse,
     body_covs,
@@ -18,10 +18,10 @@ from slam.evaluation.relation_noise import (
     sigmas_of_path,
     sigmas_of_relations,
 )
-from slam.evaluation.relations import Relations, between, nearest_rows
-from slam.evaluation.trajectories import rms
-from slam.geometry.poses import inverse
-from slam.robot import ScannerSpec
+from chainslam.slam.evaluation.relations import Relations, between, nearest_rows
+from chainslam.slam.evaluation.trajectories import rms
+from chainslam.slam.geometry.poses import inverse
+from chainslam.slam.robot import ScannerSpec
 
 from .references import References
 from .smoothing import PairCovs

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sim.logs.archive import regular
-from sim.logs.recorded_robot import MOST_M
-from slam.evaluation.relations import (
+from chainslam.sim.logs.archive import regular
+from chainslam.sim.logs.recorded_robot import MOST_M
+from chainslam.slam.evaluation.relations import (
     Relations,
     errors_at_scans,
     errors_between_scans,
     paired_poses,
 )
-from slam.evaluation.trajectories import ate
-from slam.geometry.poses import wrap
+from chainslam.slam.evaluation.trajectories import ate
+from chainslam.slam.geometry.poses import wrap
 
 from ...usage import UsageError
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from slam.estimation.backend import Backend, Joint, Smoother
-from slam.estimation.mounting import belief_of_body, body_poses
-from slam.map.stochastic_map import StochasticMap
-from slam.robot import ScannerSpec
+from chainslam.slam.estimation.backend import Backend, Joint, Smoother
+from chainslam.slam.estimation.mounting import belief_of_body, body_poses
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.robot import ScannerSpec
 
 PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
 """Covariances of pairs of poses by their rows."""

@@ -7,10 +7,10 @@ import numpy as np
 import shapely
 from jaxtyping import Int
 
-from explore.step import Step
-from sim.robot import TrueRecord
-from sim.worlds import Contour, World
-from slam.evaluation.doubles import doubles
+from chainslam.explore.step import Step
+from chainslam.sim.robot import TrueRecord
+from chainslam.sim.worlds import Contour, World
+from chainslam.slam.evaluation.doubles import doubles
 
 from ...scenario import Scenario
 from ..association import Votes

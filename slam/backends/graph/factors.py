@@ -80,7 +80,7 @@ def odometry_factor(
 def line_factor(
     index: int, line: int, seen: tuple[float, float, float, float, float], epsilon: float
 ) -> gtsam.OrientedPlane3Factor:
-    """Say where a line was seen from pose `index`: the model of `slam.estimation.models.innovations`.
+    """Say where a line was seen from pose `index`: the model of `chainslam.slam.estimation.models.innovations`.
 
     `seen` is (alpha, r, C_alpha_alpha, C_alpha_r, C_r_r) in the robot frame, `epsilon` the angle by which it departs
     from the prediction now. The plane factor's error is (sin(epsilon), r - r_predicted) where the model has

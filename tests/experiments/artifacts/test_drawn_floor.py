@@ -5,12 +5,12 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from experiments.artifacts.maps.drawn_floor import drawn_floor
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.step import Step
-from sim.logs.recorded_robot import Recording
-from slam.robot import RobotSpec, Scan
-from viz.timeline.drawn_step import Keeper
+from chainslam.experiments.artifacts.maps.drawn_floor import drawn_floor
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.step import Step
+from chainslam.sim.logs.recorded_robot import Recording
+from chainslam.slam.robot import RobotSpec, Scan
+from chainslam.viz.timeline.drawn_step import Keeper
 
 BEARINGS = np.deg2rad(np.arange(-90.0, 91.0))
 

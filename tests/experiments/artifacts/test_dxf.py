@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from ezdxf import recover, units
 
-from experiments.artifacts.maps.dxf import DIMENSIONS, NOTES, OPEN_ENDS, PATH, TENTATIVE, WALLS, map_dxf
-from viz.floor_plan import Dimension
+from chainslam.experiments.artifacts.maps.dxf import DIMENSIONS, NOTES, OPEN_ENDS, PATH, TENTATIVE, WALLS, map_dxf
+from chainslam.viz.floor_plan import Dimension
 
 
 def _read(content):

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.artifacts.results import STEP_COLUMNS
-from experiments.campaign.comparison.comparison import compare
-from experiments.campaign.comparison.findings import findings
-from experiments.campaign.comparison.hypothesis import hypothesis
-from experiments.campaign.comparison.tables import GATE, band_scores, mark_rows, step_rows, trial_row
-from experiments.campaign.plan import Campaign, Trial, config_of
-from experiments.campaign.work import Job, perform, unpack
+from chainslam.experiments.artifacts.results import STEP_COLUMNS
+from chainslam.experiments.campaign.comparison.comparison import compare
+from chainslam.experiments.campaign.comparison.findings import findings
+from chainslam.experiments.campaign.comparison.hypothesis import hypothesis
+from chainslam.experiments.campaign.comparison.tables import GATE, band_scores, mark_rows, step_rows, trial_row
+from chainslam.experiments.campaign.plan import Campaign, Trial, config_of
+from chainslam.experiments.campaign.work import Job, perform, unpack
 
 HERE = Path(__file__).parents[1]
 BY_HAND = (

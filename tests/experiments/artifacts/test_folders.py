@@ -7,8 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from experiments.commands.cli import main
-from sim.logs.recorded_robot import FORMAT
+from chainslam.experiments.commands.cli import main
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 CAMPAIGN = (
     *("--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"),
@@ -230,6 +230,6 @@ def test_a_trial_that_is_none_gets_one_line_and_status_2(refused, words):
 
 @pytest.mark.parametrize(("name", "words"), [("steps.parquet", "report"), ("trials.parquet", "view")])
 def test_a_table_that_was_cut_short_gets_one_line_and_status_2(refused, name, words, monkeypatch):
-    monkeypatch.setattr("experiments.commands.view.available", lambda: "viewer")
+    monkeypatch.setattr("chainslam.experiments.commands.view.available", lambda: "viewer")
     for spoil in (cut, folder_for, lambda path: path.write_bytes(b"x,y\n1,2\n")):
         refused("campaign", name, [words, "DIR"], spoil)

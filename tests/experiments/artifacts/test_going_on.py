@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.artifacts.saved import SavedRun
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from experiments.usage import UsageError
-from explore.outcome import Outcome
-from sim.logs.recorded_robot import Recording
+from chainslam.experiments.artifacts.saved import SavedRun
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.outcome import Outcome
+from chainslam.sim.logs.recorded_robot import Recording
 
 
 @pytest.fixture

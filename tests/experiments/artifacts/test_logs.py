@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 
 @pytest.fixture(scope="module")

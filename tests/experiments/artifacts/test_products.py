@@ -11,13 +11,13 @@ import yaml
 from ezdxf import recover
 from PIL import Image
 
-from experiments.artifacts.maps.mapped import read_corners
-from experiments.artifacts.maps.occupancy import occupancy_files
-from experiments.artifacts.results import _dimensions, write_results
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from explore.floor.free_space import FreeSpace
-from sim.worlds import load
+from chainslam.experiments.artifacts.maps.mapped import read_corners
+from chainslam.experiments.artifacts.maps.occupancy import occupancy_files
+from chainslam.experiments.artifacts.results import _dimensions, write_results
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.sim.worlds import load
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import chainslam
-from experiments.artifacts.presets import robot_of
-from experiments.artifacts.schema import part_of, resolved
-from experiments.artifacts.settings import defaults, leaves, nested, parse_setting, read_settings
-from experiments.commands.cli import main
-from experiments.scenario import TrialConfig, check
-from experiments.usage import UsageError
-from experiments.views.settings_schema import config_schema
-from slam.geometry.quantities import fault
-from slam.robot import RobotError
+from chainslam.experiments.artifacts.presets import robot_of
+from chainslam.experiments.artifacts.schema import part_of, resolved
+from chainslam.experiments.artifacts.settings import defaults, leaves, nested, parse_setting, read_settings
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scenario import TrialConfig, check
+from chainslam.experiments.usage import UsageError
+from chainslam.experiments.views.settings_schema import config_schema
+from chainslam.slam.geometry.quantities import fault
+from chainslam.slam.robot import RobotError
 
 LEAVES = dict(leaves(defaults()))
 WHOLE = config_schema()

@@ -5,10 +5,10 @@ import os
 
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import config_record
-from experiments.artifacts.saved import read_trial
-from experiments.artifacts.settings import (
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import config_record
+from chainslam.experiments.artifacts.saved import read_trial
+from chainslam.experiments.artifacts.settings import (
     defaults,
     leaves,
     nested,
@@ -17,12 +17,12 @@ from experiments.artifacts.settings import (
     record_of,
     trial_of,
 )
-from experiments.commands.cli import main
-from experiments.commands.compare import Compare
-from experiments.commands.explore import Explore
-from experiments.scenario import TrialConfig
-from experiments.usage import UsageError
-from sim.logs.recorded_robot import FORMAT
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.commands.compare import Compare
+from chainslam.experiments.commands.explore import Explore
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 LEAVES = dict(leaves(defaults()))
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.artifacts.results import log_arrays, steps_csv
-from experiments.replays.recordings import recorded
-from experiments.replays.replay import ReplayOptions, replay
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from sim.logs.recorded_robot import RecordedRobot, recording_of
-from slam.robot import MotionCommand
+from chainslam.experiments.artifacts.results import log_arrays, steps_csv
+from chainslam.experiments.replays.recordings import recorded
+from chainslam.experiments.replays.replay import ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.logs.recorded_robot import RecordedRobot, recording_of
+from chainslam.slam.robot import MotionCommand
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 TOUCHED = np.array([False, False, True, True, False])

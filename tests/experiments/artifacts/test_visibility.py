@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.maps.visibility import VISIBILITY, graph_words, read_visibility, visibility_record
-from experiments.artifacts.results import write_results
-from experiments.scenario import TrialConfig
-from experiments.scoring.records import Route
-from experiments.trial import run_trial
-from experiments.usage import UsageError
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.maps.visibility import VISIBILITY, graph_words, read_visibility, visibility_record
+from chainslam.experiments.artifacts.results import write_results
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.records import Route
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

@@ -1,9 +1,9 @@
 """A campaign as the command line runs it, for the tests of what reads its folder."""
 
-from experiments.campaign.comparison.tables import write_tables
-from experiments.campaign.plan import trials
-from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import opened
+from chainslam.experiments.campaign.comparison.tables import write_tables
+from chainslam.experiments.campaign.plan import trials
+from chainslam.experiments.campaign.runner import on_cores, run_campaign
+from chainslam.experiments.campaign.store import opened
 
 
 def run(folder, campaign, jobs=1):

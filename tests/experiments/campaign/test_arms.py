@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.plan import ARMS, Campaign, Trial, config_of
-from experiments.campaign.work import Job, perform, unpack
-from experiments.commands.cli import main
-from experiments.replays import replay as replays
-from slam.association.matching import match
-from slam.association.methods import METHODS
+from chainslam.experiments.campaign.plan import ARMS, Campaign, Trial, config_of
+from chainslam.experiments.campaign.work import Job, perform, unpack
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.replays import replay as replays
+from chainslam.slam.association.matching import match
+from chainslam.slam.association.methods import METHODS
 
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 1, max_steps=12)
 DRIVE = Trial("paper-fig4", "nearest-robot", "", "recording", 2)

@@ -11,13 +11,13 @@ from itertools import count
 import distributed
 import pytest
 
-from experiments.campaign import cluster as of_dask
-from experiments.campaign.cluster import on_dask
-from experiments.campaign.comparison.tables import TIMINGS, trial_row
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import Store, opened
-from experiments.commands.cli import main
+from chainslam.experiments.campaign import cluster as of_dask
+from chainslam.experiments.campaign.cluster import on_dask
+from chainslam.experiments.campaign.comparison.tables import TIMINGS, trial_row
+from chainslam.experiments.campaign.plan import Campaign, trials
+from chainslam.experiments.campaign.runner import on_cores, run_campaign
+from chainslam.experiments.campaign.store import Store, opened
+from chainslam.experiments.commands.cli import main
 
 CAMPAIGN = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, max_steps=15)
 

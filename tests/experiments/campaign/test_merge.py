@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.campaign import merge as merging
-from experiments.campaign.merge import merge
-from experiments.campaign.plan import Campaign
-from experiments.campaign.store import read_campaigns
-from experiments.commands.cli import main
-from experiments.usage import UsageError
+from chainslam.experiments.campaign import merge as merging
+from chainslam.experiments.campaign.merge import merge
+from chainslam.experiments.campaign.plan import Campaign
+from chainslam.experiments.campaign.store import read_campaigns
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.usage import UsageError
 from tests.experiments.campaign.running import run
 
 WHOLE = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 2, arms=("closed",), max_steps=6)

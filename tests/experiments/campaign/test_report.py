@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.comparison.story import answer, story_of
-from experiments.campaign.comparison.words import command_of, interval, within
-from experiments.campaign.pages.page import marks_table, page_of
-from experiments.campaign.plan import Campaign
-from experiments.commands.cli import main
-from experiments.views.numbers import number
+from chainslam.experiments.campaign.comparison.story import answer, story_of
+from chainslam.experiments.campaign.comparison.words import command_of, interval, within
+from chainslam.experiments.campaign.pages.page import marks_table, page_of
+from chainslam.experiments.campaign.plan import Campaign
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.views.numbers import number
+from chainslam.viz.reports.report import LONG_ROWS, Page, PageTable, Section, filled, html
 from tests.experiments.campaign.running import run
-from viz.reports.report import LONG_ROWS, Page, PageTable, Section, filled, html
 
 CAMPAIGN = Campaign(
     ("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot", "nearest-start"), 2,
@@ -246,7 +246,7 @@ def test_lengths_that_no_run_reached_are_left_out():
 def test_the_command_on_the_page_runs_the_campaign_again():
     import tyro
 
-    from experiments.commands.compare import Compare
+    from chainslam.experiments.commands.compare import Compare
 
     words = command_of(CAMPAIGN).split()
     assert tyro.cli(Compare, args=words[2:]).campaign == CAMPAIGN

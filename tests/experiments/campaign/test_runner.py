@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.campaign import work
-from experiments.campaign.comparison.tables import TIMINGS, write_tables
-from experiments.campaign.plan import Campaign, Trial, config_of, trials
-from experiments.campaign.runner import on_cores, run_campaign
-from experiments.campaign.store import opened, read_campaigns
-from experiments.campaign.work import Job, perform
-from experiments.commands.cli import main
-from slam.extraction.extract import extract
+from chainslam.experiments.campaign import work
+from chainslam.experiments.campaign.comparison.tables import TIMINGS, write_tables
+from chainslam.experiments.campaign.plan import Campaign, Trial, config_of, trials
+from chainslam.experiments.campaign.runner import on_cores, run_campaign
+from chainslam.experiments.campaign.store import opened, read_campaigns
+from chainslam.experiments.campaign.work import Job, perform
+from chainslam.experiments.commands.cli import main
+from chainslam.slam.extraction.extract import extract
 from tests.experiments.campaign.running import run
 
 ROOT = Path(__file__).parents[3]
@@ -43,8 +43,8 @@ def tables(folder):
 
 STRUCK = """
 import os, signal, sys, time
-from experiments.commands import cli
-from experiments.campaign.store import Store
+from chainslam.experiments.commands import cli
+from chainslam.experiments.campaign.store import Store
 
 number, left, save = int(sys.argv.pop(1)), int(sys.argv.pop(1)), Store.save
 # Under nohup a process is born deaf to SIGHUP.
@@ -66,7 +66,9 @@ sys.exit(cli.main())
 
 def start(folder, *more, struck=None):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    program = ["-m", "experiments.commands.cli"] if struck is None else ["-c", STRUCK, *map(str, map(int, struck))]
+    program = (
+        ["-m", "chainslam.experiments.commands.cli"] if struck is None else ["-c", STRUCK, *map(str, map(int, struck))]
+    )
     command = [sys.executable, *program, "compare", *WORDS, "--out", str(folder), *more]
     return subprocess.Popen(command, env=environment, start_new_session=True, stdout=subprocess.DEVNULL)
 
@@ -100,7 +102,7 @@ def test_interrupted_it_says_so_and_keeps_what_is_done(number, undisturbed, tmp_
 
 
 def test_a_trial_that_fails_is_recorded_with_its_reason_and_the_rest_goes_on(tmp_path, monkeypatch):
-    from experiments.campaign import work
+    from chainslam.experiments.campaign import work
 
     drive = work._drive
 

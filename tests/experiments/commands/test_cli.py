@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 
 @pytest.mark.parametrize("listing", ["worlds", "backends", "strategies"])

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from experiments.commands.cli import COMMANDS, main
-from experiments.commands.parsing import options_of
+from chainslam.experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.commands.parsing import options_of
 
 ASK = """
 source {script}

@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import config_record
-from experiments.artifacts.saved import read_trial
-from experiments.commands import cli
-from experiments.commands.cli import main
-from experiments.scenario import MappingMissionConfig, TrialConfig
-from experiments.scoring.summary import TIMED
-from experiments.terminal.interrupts import STOPS, first_interrupt_waits, nothing_half_built_speaks
-from experiments.usage import UsageError
-from explore.goals.explorer_config import ExplorerConfig
-from sim.logs.recorded_robot import FORMAT
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import config_record
+from chainslam.experiments.artifacts.saved import read_trial
+from chainslam.experiments.commands import cli
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scenario import MappingMissionConfig, TrialConfig
+from chainslam.experiments.scoring.summary import TIMED
+from chainslam.experiments.terminal.interrupts import STOPS, first_interrupt_waits, nothing_half_built_speaks
+from chainslam.experiments.usage import UsageError
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 ROOT = Path(__file__).parents[3]
 
@@ -201,7 +201,7 @@ def test_an_interrupt_while_a_compiled_module_loads_is_one(monkeypatch, capsys, 
 def test_a_signal_that_comes_when_all_is_done_changes_no_status(number):
     code = (
         "import atexit, os, sys\n"
-        "from experiments.commands import cli\n"
+        "from chainslam.experiments.commands import cli\n"
         f"atexit.register(os.kill, os.getpid(), {int(number)})\n"
         "sys.argv = ['chainslam', 'strategies']\n"
         "sys.exit(cli.process())"
@@ -247,7 +247,7 @@ def test_a_second_ctrl_c_at_any_line_of_a_commands_end_changes_no_status(monkeyp
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
     out = tmp_path / "run"
-    command = [sys.executable, "-m", "experiments.commands.cli", "explore", "hall", "--out", str(out)]
+    command = [sys.executable, "-m", "chainslam.experiments.commands.cli", "explore", "hall", "--out", str(out)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import chainslam
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 8"><rect x="1" y="1" width="8" height="6" fill="none"'
 SVG += ' stroke="black"/><g id="furniture"><rect x="2" y="2" width="2" height="2"/></g></svg>'

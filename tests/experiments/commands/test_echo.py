@@ -9,13 +9,13 @@ import pytest
 import shapely
 from PIL import Image
 
-from experiments.artifacts.files import json_bytes
-from experiments.commands.cli import main
-from experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
-from experiments.scenario import TrialConfig, load_world
-from experiments.terminal.console import say
-from experiments.trial import run_trial
-from sim.worlds import DrawingOptions, load
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
+from chainslam.experiments.scenario import TrialConfig, load_world
+from chainslam.experiments.terminal.console import say
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.worlds import DrawingOptions, load
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" {}><rect width="{}" height="{}" fill="none" stroke="black"/></svg>'

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from experiments.commands.cli import COMMANDS, main
-from experiments.commands.parsing import options_of
+from chainslam.experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.commands.parsing import options_of
 
 WORLD = ["explore", "rooms"]
 

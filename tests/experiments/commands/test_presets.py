@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.artifacts.presets import METHODS
-from experiments.artifacts.settings import defaults, differing, leaves, record_of
-from experiments.campaign.comparison.tables import read_rows
-from experiments.campaign.comparison.words import command_of
-from experiments.campaign.plan import CLOSED, Trial, config_of
-from experiments.commands.cli import _parse, main
-from experiments.scenario import TrialConfig
+from chainslam.experiments.artifacts.presets import METHODS
+from chainslam.experiments.artifacts.settings import defaults, differing, leaves, record_of
+from chainslam.experiments.campaign.comparison.tables import read_rows
+from chainslam.experiments.campaign.comparison.words import command_of
+from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of
+from chainslam.experiments.commands.cli import _parse, main
+from chainslam.experiments.scenario import TrialConfig
 
 DOCS = Path(__file__).parents[3] / "docs" / "exploration.md"
 METHOD = "mission.mapper.matching.method"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from experiments.commands.cli import main
-from experiments.scenario import TrialConfig, build
-from experiments.trial import default_mission, run_scenario
-from experiments.views.timelines import TimelineOutput
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.trial import default_mission, run_scenario
+from chainslam.experiments.views.timelines import TimelineOutput
 
 WORLD = "paper-fig4"
 
@@ -36,7 +36,7 @@ def test_a_recording_that_cannot_be_written_costs_one_line_and_nothing_else(tmp_
 
 
 def test_a_trouble_while_recording_is_told_and_the_run_goes_on(tmp_path, monkeypatch):
-    from viz.timeline import Timeline
+    from chainslam.viz.timeline import Timeline
 
     def fail(*_):
         raise RuntimeError("out of\nink")
@@ -56,7 +56,7 @@ def test_a_viewer_that_went_is_one_line_and_the_results_are_kept(tmp_path, capsy
         raise RuntimeError("gRPC connection severed")
 
     monkeypatch.setattr(
-        "experiments.views.timelines.Viewer", lambda: SimpleNamespace(url="rerun+http://127.0.0.1:9/proxy")
+        "chainslam.experiments.views.timelines.Viewer", lambda: SimpleNamespace(url="rerun+http://127.0.0.1:9/proxy")
     )
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", lambda *_: None)
     monkeypatch.setattr(rr.RecordingStream, "flush", severed)
@@ -98,8 +98,8 @@ def test_a_recording_needs_no_pandas_and_leaves_it_as_it_was(tmp_path):
     code = f"""
 import io, sys
 from pathlib import Path
-from experiments.scenario import load_world
-from experiments.views.timelines import TimelineOutput
+from chainslam.experiments.scenario import load_world
+from chainslam.experiments.views.timelines import TimelineOutput
 assert TimelineOutput("t", ["graph"], load_world({WORLD!r}), False, Path({str(tmp_path / "x.rrd")!r})).close() == []
 assert "rerun" in sys.modules and "pandas" not in sys.modules
 import pandas, pyarrow
@@ -115,7 +115,7 @@ assert pyarrow.array(table["b"]).null_count == 1
 
 def test_rerun_is_imported_only_when_a_recording_is_asked_for(tmp_path):
     code = (
-        "import sys; from experiments.commands.cli import main; "
+        "import sys; from chainslam.experiments.commands.cli import main; "
         f"main(['explore', {WORLD!r}, '--max-steps', '2', '--out', {str(tmp_path)!r}]); "
         "sys.exit('rerun' in sys.modules)"
     )

@@ -6,15 +6,15 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from experiments.artifacts.presets import robot_of, stated
-from experiments.artifacts.saved import read_trial
-from experiments.artifacts.settings import parse_setting, trial_of
-from experiments.commands.cli import main
-from experiments.commands.compare import Compare
-from experiments.commands.explore import Explore
-from experiments.usage import UsageError
-from sim.robots import ROBOTS
-from slam.robot import RobotSpec
+from chainslam.experiments.artifacts.presets import robot_of, stated
+from chainslam.experiments.artifacts.saved import read_trial
+from chainslam.experiments.artifacts.settings import parse_setting, trial_of
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.commands.compare import Compare
+from chainslam.experiments.commands.explore import Explore
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.robots import ROBOTS
+from chainslam.slam.robot import RobotSpec
 
 
 def test_the_papers_robot_is_the_default():

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import config_record
-from experiments.artifacts.saved import read_trial
-from experiments.artifacts.settings import asked
-from experiments.campaign.comparison.tables import doubles
-from experiments.campaign.comparison.words import command_of
-from experiments.campaign.plan import CLOSED, Trial, config_of, gate_of
-from experiments.commands.cli import _parse, main
-from experiments.views.run_page import run_page
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import config_record
+from chainslam.experiments.artifacts.saved import read_trial
+from chainslam.experiments.artifacts.settings import asked
+from chainslam.experiments.campaign.comparison.tables import doubles
+from chainslam.experiments.campaign.comparison.words import command_of
+from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of, gate_of
+from chainslam.experiments.commands.cli import _parse, main
+from chainslam.experiments.views.run_page import run_page
 
 GATE = "mission.mapper.matching.gate"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.commands.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[3]
 HEAVY = (
@@ -44,7 +44,9 @@ def imported(program):
     ],
 )
 def test_the_help_and_the_listings_import_only_what_they_show(words, needed):
-    program = f"from experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    program = (
+        f"from chainslam.experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    )
     assert imported(program) <= needed
 
 
@@ -53,13 +55,15 @@ def test_the_help_and_the_listings_import_only_what_they_show(words, needed):
     [["strategies"], ["explore", "--help"], ["replay", "--help"], ["report", "no-such-folder"], ["compare", "--help"]],
 )
 def test_a_command_that_runs_no_step_loads_no_compiler(words):
-    program = f"from experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    program = (
+        f"from chainslam.experiments.commands.cli import main\ntry:\n    main({words!r})\nexcept SystemExit:\n    pass"
+    )
     assert "numba" not in imported(f"import os\nos.dup2(os.open(os.devnull, os.O_WRONLY), 1)\n{program}")
 
 
 def test_a_campaigns_worker_imports_nothing_that_draws():
     drawing = {"matplotlib", "rerun", "jinja2", "pandas", "gtsam"}
-    assert not imported("import experiments.campaign.work") & drawing
+    assert not imported("import chainslam.experiments.campaign.work") & drawing
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands import cli
-from experiments.commands.cli import main
-from experiments.terminal.streams import MOST_LETTERS, one_line
+from chainslam.experiments.commands import cli
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.terminal.streams import MOST_LETTERS, one_line
 
 ROOT = Path(__file__).parents[3]
 
@@ -102,7 +102,7 @@ def test_a_closed_stream_keeps_its_place_from_other_files(tmp_path, run):
 
 def test_the_module_ends_like_the_command():
     with subprocess.Popen(
-        [sys.executable, "-m", "experiments.commands.cli", "worlds"],
+        [sys.executable, "-m", "chainslam.experiments.commands.cli", "worlds"],
         cwd=ROOT,
         stdout=deaf(),
         stderr=subprocess.PIPE,

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.commands.cli import main
-from viz.viewer import ViewerError
+from chainslam.experiments.commands.cli import main
+from chainslam.viz.viewer import ViewerError
 
 WORLD, STEPS = "paper-fig4", 5
 
@@ -28,8 +28,8 @@ def home(tmp_path_factory):
 def opened(monkeypatch):
     """What is opened in the place of a viewer."""
     files = []
-    monkeypatch.setattr("experiments.commands.view.Viewer", files.append)
-    monkeypatch.setattr("experiments.commands.view.available", lambda: "viewer")
+    monkeypatch.setattr("chainslam.experiments.commands.view.Viewer", files.append)
+    monkeypatch.setattr("chainslam.experiments.commands.view.available", lambda: "viewer")
     return files
 
 
@@ -121,7 +121,7 @@ def test_without_a_display_nothing_is_made(home, tmp_path, capsys, monkeypatch):
     def none():
         raise ViewerError("expected a display")
 
-    monkeypatch.setattr("experiments.commands.view.available", none)
+    monkeypatch.setattr("chainslam.experiments.commands.view.available", none)
     shutil.copytree(home / "run", tmp_path / "run")
     capsys.readouterr()
     assert main(["view", str(tmp_path / "run")]) == 1
@@ -150,7 +150,7 @@ def test_a_browser_is_served_until_ctrl_c_and_told_how_to_come_over_ssh(tmp_path
             Served.closed = True
 
     (tmp_path / "run.rrd").write_bytes(b"")
-    monkeypatch.setattr("experiments.commands.view.WebViewer", Served)
+    monkeypatch.setattr("chainslam.experiments.commands.view.WebViewer", Served)
     monkeypatch.delenv("DISPLAY", raising=False)
     assert main(["view", str(tmp_path), "--web"]) == 0
     told = capsys.readouterr().out

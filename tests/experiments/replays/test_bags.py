@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from experiments.commands.cli import main
-from slam.geometry.poses import compose, inverse
+from chainslam.experiments.commands.cli import main
+from chainslam.slam.geometry.poses import compose, inverse
 from tests.sim.logs.written_bag import PLACE, pose_at, room_bag
 
 pytestmark = pytest.mark.usefixtures("_unchecked")

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from experiments.commands.cli import main
-from experiments.scoring.without_truth.references import References, read_path, read_relations, scored_by
-from experiments.usage import UsageError
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scoring.without_truth.references import References, read_path, read_relations, scored_by
+from chainslam.experiments.usage import UsageError
 
 
 def lines(path, rows):

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from experiments.replays.oracles import PerfectExtraction, Witness, of_true_lines
-from experiments.scoring.truth import truth_of
-from sim.chance import Chance
-from sim.lidar import LidarConfig, RangeFinder
-from sim.robot import RobotConfig
-from slam.config import MapperConfig
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.map.reliability import Reliability
-from slam.robot import Scan
+from chainslam.experiments.replays.oracles import PerfectExtraction, Witness, of_true_lines
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.sim.chance import Chance
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.sim.robot import RobotConfig
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.map.reliability import Reliability
+from chainslam.slam.robot import Scan
 
 
 def test_walls_of_true_lines_lie_on_them_however_short_they_are():

@@ -8,14 +8,14 @@ import yaml
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from experiments.commands.cli import main
-from experiments.replays import real_log
-from experiments.replays.real_log import RealOptions, read_real_run
-from experiments.scenario import TrialConfig
-from slam.geometry.lines import directions, normals
-from viz.timeline.blueprints import comparison, one_run
-from viz.timeline.layers.sights import UNITS_PER_M
-from viz.timeline.words import legend
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.replays import real_log
+from chainslam.experiments.replays.real_log import RealOptions, read_real_run
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.viz.timeline.blueprints import comparison, one_run
+from chainslam.viz.timeline.layers.sights import UNITS_PER_M
+from chainslam.viz.timeline.words import legend
 
 ROOM = (6.0, 4.0)
 STRAIGHTNESS = "mission.mapper.walls.reliability.straightness"

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.artifacts.reading import read_json
-from experiments.artifacts.results import write_results
-from experiments.commands.cli import main
-from experiments.replays.oracles import true_odometry
-from experiments.replays.recordings import recorded
-from experiments.replays.replay import ReplayOptions, read_run, replay
-from experiments.scenario import TrialConfig, sigmas_of
-from experiments.trial import run_trial
-from sim.logs.recorded_robot import RecordedRobot
-from slam.backends import BACKENDS, BackendOptions
-from slam.backends.kalman.config import EkfConfig
-from slam.evaluation.from_start import Start
-from slam.extraction.config import ExtractionConfig
-from slam.geometry.poses import compose, wrap
-from slam.robot import MotionCommand
+from chainslam.experiments.artifacts.reading import read_json
+from chainslam.experiments.artifacts.results import write_results
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.replays.oracles import true_odometry
+from chainslam.experiments.replays.recordings import recorded
+from chainslam.experiments.replays.replay import ReplayOptions, read_run, replay
+from chainslam.experiments.scenario import TrialConfig, sigmas_of
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.logs.recorded_robot import RecordedRobot
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.evaluation.from_start import Start
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.robot import MotionCommand
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.reproductions import fig10
-from experiments.reproductions.runs import doubles
-from experiments.reproductions.runs.doubles import LASTING, Double, ModelSpace, first_double
-from experiments.reproductions.runs.drives import drive_by_walls
-from viz.shapes import ellipses
+from chainslam.experiments.reproductions import fig10
+from chainslam.experiments.reproductions.runs import doubles
+from chainslam.experiments.reproductions.runs.doubles import LASTING, Double, ModelSpace, first_double
+from chainslam.experiments.reproductions.runs.drives import drive_by_walls
+from chainslam.viz.shapes import ellipses
 
 few = settings(max_examples=25, deadline=None, derandomize=True)
 

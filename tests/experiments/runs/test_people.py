@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.artifacts.settings import nested, trial_of
-from experiments.trial import run_trial
+from chainslam.experiments.artifacts.settings import nested, trial_of
+from chainslam.experiments.trial import run_trial
 
 PEOPLE = "robot.faults.people"
 

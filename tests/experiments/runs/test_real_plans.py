@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
 
 PLANS = Path(__file__).parents[2] / "data" / "plans"
 

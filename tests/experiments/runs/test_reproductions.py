@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments import reproductions
-from experiments.commands.cli import main
-from experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig4, fig8, standing, table1
-from experiments.reproductions.runs import maps
-from experiments.reproductions.runs.traversals import passes
-from viz.figures.panels import panels
+from chainslam.experiments import reproductions
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.reproductions import REPRODUCTIONS, Entry, Reproduction, eq4, fig4, fig8, standing, table1
+from chainslam.experiments.reproductions.runs import maps
+from chainslam.experiments.reproductions.runs.traversals import passes
+from chainslam.viz.figures.panels import panels
 
 PAPER_NAMES = ["table1", "fig4", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "eq4", "standing"]
 few = settings(max_examples=15, deadline=None, derandomize=True)

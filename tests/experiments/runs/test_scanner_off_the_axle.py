@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.replays.recordings import recorded
-from experiments.replays.replay import ReplayOptions, replay
-from experiments.scenario import TrialConfig
-from experiments.scoring.swept import visible_floor
-from experiments.trial import run_trial
-from explore.floor.accumulated_returns import returns
-from sim.faults import FaultsConfig
-from sim.robot import RobotConfig, SimulatedRobot
-from sim.worlds import load
-from slam.geometry.lines import distance_to_segments
-from slam.geometry.poses import compose, to_world, wrap
-from slam.robot import MotionCommand, ScannerSpec
+from chainslam.experiments.replays.recordings import recorded
+from chainslam.experiments.replays.replay import ReplayOptions, replay
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.swept import visible_floor
+from chainslam.experiments.trial import run_trial
+from chainslam.explore.floor.accumulated_returns import returns
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.geometry.poses import compose, to_world, wrap
+from chainslam.slam.robot import MotionCommand, ScannerSpec
 
 OFF = RobotConfig(scanner=ScannerSpec(0.12, -0.06, 0.7))
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.scoring.without_truth.smoothing import smooth
-from experiments.trial import run_trial
-from slam.backends.graph.isam import Isam
-from slam.robot import ScannerSpec
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.without_truth.smoothing import smooth
+from chainslam.experiments.trial import run_trial
+from chainslam.slam.backends.graph.isam import Isam
+from chainslam.slam.robot import ScannerSpec
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

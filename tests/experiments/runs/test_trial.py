@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import experiments.trial as trial_module
-from experiments.artifacts.results import write_results
-from experiments.scenario import TrialConfig, build
-from experiments.scoring.summary import TIMED, odometry_path, pose_nees
-from experiments.trial import run_trial
-from experiments.usage import UsageError
+import chainslam.experiments.trial as trial_module
+from chainslam.experiments.artifacts.results import write_results
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.scoring.summary import TIMED, odometry_path, pose_nees
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
 
 FILES = (
     "config.json summary.json steps.csv log.npz map.npz map.geojson map.svg map.dxf map.png"
@@ -56,10 +56,10 @@ def test_nees_of_odometry_with_its_own_covariance_is_chi_square(world, scripted_
     for seed in range(300):
         robot = build(TrialConfig("square", seed=seed), world).robot
         robot.sense()
-        from slam.robot import MotionCommand
+        from chainslam.slam.robot import MotionCommand
 
         odometry = robot.drive(MotionCommand(0.15, 0.1))
-        from slam.geometry.poses import compose, inverse
+        from chainslam.slam.geometry.poses import compose, inverse
 
         error = compose(inverse(world.start), robot.true_pose) - odometry.motion
         values.append(error @ np.linalg.solve(odometry.cov, error))

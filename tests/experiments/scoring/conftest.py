@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.scoring.truth import truth_of
-from sim.robot import RobotConfig
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.sim.robot import RobotConfig
 from tests.experiments.by_hand import true_map
 
 

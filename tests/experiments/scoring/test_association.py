@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scoring.association import OVERLAP_M, Votes, duplicate_lines, duplicate_pairs
-from experiments.scoring.beam_votes import UNLABELLED, vote
-from experiments.scoring.truth import truth_of
-from sim.robot import RobotConfig
-from slam.extraction.segments import Segments
+from chainslam.experiments.scoring.association import OVERLAP_M, Votes, duplicate_lines, duplicate_pairs
+from chainslam.experiments.scoring.beam_votes import UNLABELLED, vote
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.sim.robot import RobotConfig
+from chainslam.slam.extraction.segments import Segments
 
 WALLS = np.array([0, 0, 1, 2, 2, 3])
 """Of six faces: two walls have two each."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.logs.columns import Columns
+from chainslam.sim.logs.columns import Columns
 
 
 def rows(count):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scoring.corners import LABEL_REACH_M, Corner, corners, label_distances
-from slam.geometry.poses import inverse, to_world
-from slam.map.chains import Chain, OpenEnd
+from chainslam.experiments.scoring.corners import LABEL_REACH_M, Corner, corners, label_distances
+from chainslam.slam.geometry.poses import inverse, to_world
+from chainslam.slam.map.chains import Chain, OpenEnd
 
 SQUARE = np.array([[[0, 0], [5, 0]], [[5, 0], [5, 5]], [[5, 5], [0, 5]], [[0, 5], [0, 0]]], dtype=float)
 IDS = np.array([2, 3, 7, 8])

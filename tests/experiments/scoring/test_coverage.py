@@ -7,8 +7,8 @@ import pytest
 import shapely
 from scipy.optimize import minimize
 
-from experiments.scoring.association import Votes
-from experiments.scoring.coverage import (
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.coverage import (
     CLOSED_SHARE,
     NEAR_M,
     NEAR_NOISY_M,
@@ -22,12 +22,12 @@ from experiments.scoring.coverage import (
     own_alignment,
     sample,
 )
-from experiments.scoring.records import Sketch
-from experiments.scoring.truth import truth_of
-from sim.robot import RobotConfig
-from sim.worlds import World
-from slam.geometry.poses import compose, inverse, to_world
-from slam.map.chains import Chain, OpenEnd
+from chainslam.experiments.scoring.records import Sketch
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
+from chainslam.slam.geometry.poses import compose, inverse, to_world
+from chainslam.slam.map.chains import Chain, OpenEnd
 
 OUTER, PILLAR = [0, 1, 2, 3], [4, 5, 6, 7]
 STILL = np.zeros(3)

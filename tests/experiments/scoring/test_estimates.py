@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from experiments.scoring.statistics import LEAST, estimate, mean_interval, paired, share_better
+from chainslam.experiments.scoring.statistics import LEAST, estimate, mean_interval, paired, share_better
 
 
 def test_the_mean_the_runs_and_the_effect_size_are_the_plain_ones():

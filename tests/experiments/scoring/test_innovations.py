@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from experiments.scoring.innovations import WINDOW, innovation_scores, nis_in_band, windowed_nis
+from chainslam.experiments.scoring.innovations import WINDOW, innovation_scores, nis_in_band, windowed_nis
 
 STEPS = 60
 pytestmark = pytest.mark.usefixtures("_unchecked")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime, least_squares
 
-from experiments.scoring.summary import joint_anees, map_error, map_scores
-from slam.estimation.backend import Joint
+from chainslam.experiments.scoring.summary import joint_anees, map_error, map_scores
+from chainslam.slam.estimation.backend import Joint
 from tests.experiments.by_hand import TRUE, marked, matrix, xi_of
 
 LINES = 4

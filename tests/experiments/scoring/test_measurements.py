@@ -3,15 +3,22 @@
 import numpy as np
 import pytest
 
-from experiments.artifacts.maps.mapped import read_corners
-from experiments.artifacts.results import write_results
-from experiments.commands.cli import main
-from experiments.scenario import TrialConfig
-from experiments.scoring.corners import corners
-from experiments.scoring.measurements import area, corner_jacobian, corner_points, distance, distances, perimeter
-from experiments.trial import run_trial
-from slam.geometry.line_kernels import intersect
-from slam.geometry.lines import normals
+from chainslam.experiments.artifacts.maps.mapped import read_corners
+from chainslam.experiments.artifacts.results import write_results
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.corners import corners
+from chainslam.experiments.scoring.measurements import (
+    area,
+    corner_jacobian,
+    corner_points,
+    distance,
+    distances,
+    perimeter,
+)
+from chainslam.experiments.trial import run_trial
+from chainslam.slam.geometry.line_kernels import intersect
+from chainslam.slam.geometry.lines import normals
 
 RNG = np.random.default_rng(8)
 

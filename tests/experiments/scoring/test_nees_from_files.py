@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import logm
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 
 ENTRIES = ("xx", "xy", "xt", "yy", "yt", "tt")
 STEPS = 20

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from experiments.scoring.without_truth.normalised import normalised_path, normalised_relations, pair_covs_of
-from experiments.scoring.without_truth.references import References
-from slam.backends import BACKENDS
-from slam.evaluation.axioms.room import Room, see
-from slam.evaluation.relations import Relations, between
-from slam.geometry.poses import compose, inverse
-from slam.robot import Odometry, ScannerSpec
+from chainslam.experiments.scoring.without_truth.normalised import normalised_path, normalised_relations, pair_covs_of
+from chainslam.experiments.scoring.without_truth.references import References
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.axioms.room import Room, see
+from chainslam.slam.evaluation.relations import Relations, between
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.robot import Odometry, ScannerSpec
 
 STEPS, RUNS = 60, 10
 START_COV = np.diag([1e-4, 1e-4, 1e-5]) ** 2

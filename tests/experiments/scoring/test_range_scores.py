@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.scoring.summary import range_scores
-from slam.association.ranges.errors import RangeErrors
+from chainslam.experiments.scoring.summary import range_scores
+from chainslam.slam.association.ranges.errors import RangeErrors
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

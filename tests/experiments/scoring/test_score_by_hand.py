@@ -2,16 +2,24 @@ import numpy as np
 import pytest
 import shapely
 
-from experiments.scoring.association import Votes, duplicate_lines
-from experiments.scoring.corners import corners, label_distances
-from experiments.scoring.coverage import NEAR_M, alignment, began, closed_contours, coverage, own_alignment, sample
-from experiments.scoring.swept import swept, visible_floor
-from experiments.scoring.truth import collinear, truth_of
-from sim.robot import RobotConfig
-from sim.worlds import World
-from slam.extraction.segments import Segments
-from slam.geometry.line_kernels import intersect
-from slam.geometry.poses import compose, to_world
+from chainslam.experiments.scoring.association import Votes, duplicate_lines
+from chainslam.experiments.scoring.corners import corners, label_distances
+from chainslam.experiments.scoring.coverage import (
+    NEAR_M,
+    alignment,
+    began,
+    closed_contours,
+    coverage,
+    own_alignment,
+    sample,
+)
+from chainslam.experiments.scoring.swept import swept, visible_floor
+from chainslam.experiments.scoring.truth import collinear, truth_of
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.line_kernels import intersect
+from chainslam.slam.geometry.poses import compose, to_world
 
 CONFIG = RobotConfig()
 ALIGNED = np.zeros(3)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.campaign.comparison.comparison import Measure, cell_scores, difference
-from experiments.campaign.comparison.hypothesis import hypothesis, verdict
-from experiments.scoring.statistics import estimate, holm, paired, share_better
+from chainslam.experiments.campaign.comparison.comparison import Measure, cell_scores, difference
+from chainslam.experiments.campaign.comparison.hypothesis import hypothesis, verdict
+from chainslam.experiments.scoring.statistics import estimate, holm, paired, share_better
 
 
 def runs(rng, seeds=20, spread=0.0):

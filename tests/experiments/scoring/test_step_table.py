@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from experiments.artifacts.results import STEP_COLUMNS, steps_csv
-from experiments.scoring.summary import nees_of_poses
+from chainslam.experiments.artifacts.results import STEP_COLUMNS, steps_csv
+from chainslam.experiments.scoring.summary import nees_of_poses
 from tests.experiments.by_hand import COVS, OFF, TRUE, log_of
 
 

@@ -8,14 +8,14 @@ import shapely
 from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
-from experiments.scoring.coverage import alignment
-from experiments.scoring.records import Sketch
-from experiments.scoring.summary import Ending, nees_of_poses, pose_nees_from_start
-from explore.goal import GivenUp, SetAside
-from explore.outcome import Outcome
-from slam.geometry.lines import through
-from slam.geometry.poses import compose, inverse, to_world
-from slam.map.chains import OpenEnd
+from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.records import Sketch
+from chainslam.experiments.scoring.summary import Ending, nees_of_poses, pose_nees_from_start
+from chainslam.explore.goal import GivenUp, SetAside
+from chainslam.explore.outcome import Outcome
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import compose, inverse, to_world
+from chainslam.slam.map.chains import OpenEnd
 from tests.experiments.by_hand import COVS, OFF, TRUE, log_of, marked, xi_of
 
 

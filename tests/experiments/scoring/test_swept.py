@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from experiments.scoring.swept import CELL_M, Floor, swept, visible_floor
-from sim.faults import FaultsConfig
-from sim.lidar import RangeFinder
-from sim.robot import RobotConfig
-from sim.worlds import World
+from chainslam.experiments.scoring.swept import CELL_M, Floor, swept, visible_floor
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import RangeFinder
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
 
 ROOM = shapely.Polygon(
     [(1.0, -2.0), (4.02, -2.0), (4.02, 0.01), (1.0, 0.01)], [[(2, -1), (2, -1.5), (3, -1.5), (3, -1)]]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.scoring import truth
-from experiments.scoring.truth import collinear, truth_of
-from sim.robot import RobotConfig
+from chainslam.experiments.scoring import truth
+from chainslam.experiments.scoring.truth import collinear, truth_of
+from chainslam.sim.robot import RobotConfig
 
 
 def same(*faces):

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from experiments.commands.cli import COMMANDS, main
-from experiments.terminal import answers
+from chainslam.experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.terminal import answers
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

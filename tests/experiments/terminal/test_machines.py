@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from experiments.commands import cli
-from experiments.commands.cli import COMMANDS, main
-from experiments.commands.parsing import options_of
+from chainslam.experiments.commands import cli
+from chainslam.experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.commands.parsing import options_of
 
 ASCII = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 """Python takes UTF-8 in the C locale unless this forbids it."""
@@ -59,7 +59,7 @@ def test_a_terminal_of_no_columns_is_one_of_unknown_width(said, left, monkeypatc
 def test_names_of_files_are_read_in_a_locale_of_ascii_only(tmp_path):
     (tmp_path / "Büro 漢.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
     plain = {name: value for name, value in os.environ.items() if not name.startswith(("LC_", "LANG", "PYTHONUTF8"))}
-    words = [sys.executable, "-m", "experiments.commands.cli", "explore", "Büro 漢.svg"]
+    words = [sys.executable, "-m", "chainslam.experiments.commands.cli", "explore", "Büro 漢.svg"]
     found = subprocess.run(
         words, cwd=tmp_path, env={**plain, "LC_ALL": "C", "PYTHONPATH": os.getcwd(), **ASCII}, capture_output=True,
     )  # fmt: skip

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from experiments.commands.cli import main
-from experiments.terminal.progress import bar_of, duration, print_summary, total_of
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.terminal.progress import bar_of, duration, print_summary, total_of
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from experiments.commands.cli import COMMANDS, main
-from experiments.commands.replay import Replay
-from experiments.terminal.word_order import MANY, _positional, _values, file_in, in_order, swallowed, with_files
+from chainslam.experiments.commands.cli import COMMANDS, main
+from chainslam.experiments.commands.replay import Replay
+from chainslam.experiments.terminal.word_order import (
+    MANY,
+    _positional,
+    _values,
+    file_in,
+    in_order,
+    swallowed,
+    with_files,
+)
 
 CLASSES = {name: entry.load() for name, entry in COMMANDS.items()}
 GREEDY = [

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments.commands.cli import main
-from experiments.views.gif import gif_of
-from viz import palette
-from viz.figures.animation import FRAMES, LAST_MS, animated, shown_steps
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.views.gif import gif_of
+from chainslam.viz import palette
+from chainslam.viz.figures.animation import FRAMES, LAST_MS, animated, shown_steps
 
 
 @pytest.fixture(scope="module")

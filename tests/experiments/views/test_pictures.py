@@ -4,10 +4,10 @@ import sys
 
 import pytest
 
-from experiments.commands.cli import main
-from experiments.views.pictures import main as draw
-from experiments.views.pictures import read_pictured
-from experiments.views.saved_map import saved_map
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.views.pictures import main as draw
+from chainslam.experiments.views.pictures import read_pictured
+from chainslam.experiments.views.saved_map import saved_map
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.artifacts.files import json_bytes
-from experiments.artifacts.results import config_record
-from experiments.artifacts.saved import read_trial
-from experiments.commands.cli import _parse, main
-from experiments.views.run_page import run_page
-from sim.logs.recorded_robot import FORMAT
+from chainslam.experiments.artifacts.files import json_bytes
+from chainslam.experiments.artifacts.results import config_record
+from chainslam.experiments.artifacts.saved import read_trial
+from chainslam.experiments.commands.cli import _parse, main
+from chainslam.experiments.views.run_page import run_page
+from chainslam.sim.logs.recorded_robot import FORMAT
 
 
 @pytest.fixture(scope="module")

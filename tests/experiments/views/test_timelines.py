@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.commands.cli import main
-from experiments.replays.replay import ReplayOptions, read_run, replay
-from experiments.scenario import load_world
-from experiments.scoring.summary import TIMED
-from experiments.views.timelines import TimelineOutput, record_comparison
-from viz.timeline.colours import pale
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.replays.replay import ReplayOptions, read_run, replay
+from chainslam.experiments.scenario import load_world
+from chainslam.experiments.scoring.summary import TIMED
+from chainslam.experiments.views.timelines import TimelineOutput, record_comparison
+from chainslam.viz.timeline.colours import pale
 
 WORLD, STEPS = "paper-fig4", 70
 EXPLORE = ["explore", WORLD, "--backend", "full-ekf", "--max-steps", str(STEPS)]

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from explore.floor.carrying_kernels import carried, nearest
-from slam.geometry.poses import rotation
+from chainslam.explore.floor.carrying_kernels import carried, nearest
+from chainslam.slam.geometry.poses import rotation
 
 
 @settings(max_examples=60, deadline=None)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from explore.floor.free_space import FreeSpace
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.slam.robot import Scan
 from tests.explore.floor.plain_clearance import full_clearance
 
 

@@ -7,10 +7,10 @@ import pytest
 import shapely
 
 import chainslam
-from experiments.artifacts.fences import fence_of
-from experiments.commands.cli import main
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from slam.robot import Scan
+from chainslam.experiments.artifacts.fences import fence_of
+from chainslam.experiments.commands.cli import main
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.slam.robot import Scan
 
 BOX = ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0))
 

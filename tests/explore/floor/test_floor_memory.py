@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.floor.floor_memory import FloorMemory, FloorMemoryConfig
-from explore.floor.free_space import FreeSpace
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import compose, inverse, to_world, wrap
-from slam.robot import Odometry, Scan
+from chainslam.explore.floor.floor_memory import FloorMemory, FloorMemoryConfig
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import compose, inverse, to_world, wrap
+from chainslam.slam.robot import Odometry, Scan
 
 FACES = np.array(
     [

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from sim.lidar import LidarConfig, RangeFinder
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.robot import Scan
 from tests.explore.floor.plain_clearance import full_clearance
 
 CELL = FreeSpaceConfig().cell_m

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.floor.kernels import HALF_DIAGONAL, squared_distances
-from slam.geometry.poses import compose
-from slam.robot import RobotSpec, Scan, ScannerSpec
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.floor.kernels import HALF_DIAGONAL, squared_distances
+from chainslam.slam.geometry.poses import compose
+from chainslam.slam.robot import RobotSpec, Scan, ScannerSpec
 
 CELL = FreeSpaceConfig().cell_m
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from experiments.scenario import load_world
-from explore.floor.lost_returns import RUN, SCANS, LostReturns, _runs_of
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.people import PeopleConfig
-from sim.robot import RobotConfig, SimulatedRobot
-from sim.worlds import World
-from slam.robot import MotionCommand, ScannerSpec
+from chainslam.experiments.scenario import load_world
+from chainslam.explore.floor.lost_returns import RUN, SCANS, LostReturns, _runs_of
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.people import PeopleConfig
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.robot import MotionCommand, ScannerSpec
 
 ROOMS = load_world("rooms")
 AHEAD = ScannerSpec(0.1, -0.05, 0.5 * np.pi)

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.floor.accumulated_returns import NEAR_BEYOND_M, SCANS, AccumulatedReturns, returns, steadied
-from explore.floor.free_space import FreeSpace
-from explore.following.driving import Pilot
-from explore.following.driving_config import DrivingConfig
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Path, Planner
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import arc, compose, to_world
-from slam.robot import MotionCommand, Odometry, Scan
+from chainslam.explore.floor.accumulated_returns import NEAR_BEYOND_M, SCANS, AccumulatedReturns, returns, steadied
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following.driving import Pilot
+from chainslam.explore.following.driving_config import DrivingConfig
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Path, Planner
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import arc, compose, to_world
+from chainslam.slam.robot import MotionCommand, Odometry, Scan
 
 few = settings(max_examples=80, deadline=None, derandomize=True)
 CONFIG = DrivingConfig()

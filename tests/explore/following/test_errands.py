@@ -5,9 +5,9 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from explore.following.driving import Pilot
-from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
-from slam.robot import MotionCommand
+from chainslam.explore.following.driving import Pilot
+from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from chainslam.slam.robot import MotionCommand
 
 CONFIG = FollowingConfig()
 REST, STEP = MotionCommand(0.0, 0.0), MotionCommand(0.1, 0.0)

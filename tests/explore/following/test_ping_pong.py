@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.following.ping_pong import WallErrand
-from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.goals.explorer import Explorer
-from explore.goals.explorer_config import ExplorerConfig
-from explore.strategies.nearest_robot import NearestRobot
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import arc, compose
-from slam.map.chains import HEAD, TAIL
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following.ping_pong import WallErrand
+from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.goals.explorer import Explorer
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.strategies.nearest_robot import NearestRobot
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import arc, compose
+from chainslam.slam.map.chains import HEAD, TAIL
+from chainslam.slam.robot import Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

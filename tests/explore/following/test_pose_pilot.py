@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.following.driving import Pilot
-from explore.following.driving_config import DrivingConfig
-from explore.following.pose_pilot import PosePilot, pilot_of
-from explore.following.safe_steps import is_safe, keeps_clear, least_gap, step_away, step_towards
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Path, Planner
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import arc, compose, to_world
-from slam.robot import MotionCommand, RobotSpec, Scan, fitted
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.following.driving import Pilot
+from chainslam.explore.following.driving_config import DrivingConfig
+from chainslam.explore.following.pose_pilot import PosePilot, pilot_of
+from chainslam.explore.following.safe_steps import is_safe, keeps_clear, least_gap, step_away, step_towards
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Path, Planner
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import arc, compose, to_world
+from chainslam.slam.robot import MotionCommand, RobotSpec, Scan, fitted
 from tests.slam.test_mapper import faces_of
 
 LONG = RobotSpec(outline_m=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2)))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.following.track import Track, track_of
-from slam.geometry.poses import compose
+from chainslam.explore.following.track import Track, track_of
+from chainslam.slam.geometry.poses import compose
 
 STANDOFF_M = 0.35
 

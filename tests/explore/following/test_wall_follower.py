@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.following import wall_follower as module
-from explore.following.behaviour import Behaviour
-from explore.following.driving import Ahead
-from explore.following.track import Track
-from explore.following.wall_follower import WallFollower
-from explore.following.wall_following import FollowingConfig, Surroundings
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.poses import arc, compose
-from slam.map.chains import HEAD, TAIL
-from slam.robot import MotionCommand, Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following import wall_follower as module
+from chainslam.explore.following.behaviour import Behaviour
+from chainslam.explore.following.driving import Ahead
+from chainslam.explore.following.track import Track
+from chainslam.explore.following.wall_follower import WallFollower
+from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import arc, compose
+from chainslam.slam.map.chains import HEAD, TAIL
+from chainslam.slam.robot import MotionCommand, Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

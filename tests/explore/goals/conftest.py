@@ -2,7 +2,7 @@
 
 import pytest
 
-from explore.goals import explorer as module
+from chainslam.explore.goals import explorer as module
 from tests.explore.goals.scripted import Scripted
 
 

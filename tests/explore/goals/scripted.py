@@ -5,12 +5,12 @@ from dataclasses import replace
 import networkx as nx
 import numpy as np
 
-from explore.following.wall_following import Errand
-from explore.goals.explorer import Explorer
-from explore.goals.explorer_config import ExplorerConfig
-from explore.strategies import Choice
-from slam.map.chains import Chain, OpenEnd
-from slam.robot import MotionCommand
+from chainslam.explore.following.wall_following import Errand
+from chainslam.explore.goals.explorer import Explorer
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.strategies import Choice
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.robot import MotionCommand
 
 ON = MotionCommand(0.1, 0.0)
 NO_SWEEP = replace(ExplorerConfig(), sweep=False)

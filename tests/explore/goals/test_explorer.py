@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.following.wall_following import FollowingConfig
-from explore.goals import explorer as module
-from explore.planning.visibility_graph import followed_wall
-from explore.strategies import Choice, Place
+from chainslam.explore.following.wall_following import FollowingConfig
+from chainslam.explore.goals import explorer as module
+from chainslam.explore.planning.visibility_graph import followed_wall
+from chainslam.explore.strategies import Choice, Place
 from tests.explore.goals.scripted import NO_SWEEP, ON, First, around_of, ask, ends_at, explorer_at, names
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from explore.goals.ledger import Event, Ledger
-from slam.map.chains import OpenEnd
+from chainslam.explore.goals.ledger import Event, Ledger
+from chainslam.slam.map.chains import OpenEnd
 
 
 def test_an_end_that_is_taken_up_is_given_up_no_longer_and_what_was_known_of_it_is_kept():

@@ -6,12 +6,12 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.following.driving_config import DrivingConfig
-from explore.goals.decider import Decision
-from explore.goals.lost import Lost, LostConfig
-from explore.goals.replay_driver import ReplayDriver
-from explore.outcome import Outcome
-from slam.robot import MotionCommand, Scan
+from chainslam.explore.following.driving_config import DrivingConfig
+from chainslam.explore.goals.decider import Decision
+from chainslam.explore.goals.lost import Lost, LostConfig
+from chainslam.explore.goals.replay_driver import ReplayDriver
+from chainslam.explore.outcome import Outcome
+from chainslam.slam.robot import MotionCommand, Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 """The surroundings are stood in for."""

@@ -7,11 +7,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.goals import paper_errand
-from explore.goals.paper_errand import PaperErrand
-from slam.map.chains import HEAD, TAIL, OpenEnd
-from slam.robot import MotionCommand, Scan
+from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.goals import paper_errand
+from chainslam.explore.goals.paper_errand import PaperErrand
+from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
+from chainslam.slam.robot import MotionCommand, Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 ON = MotionCommand(0.1, 0.0)

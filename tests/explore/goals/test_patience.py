@@ -6,9 +6,9 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.goals.explorer import Explorer
-from explore.goals.explorer_config import ExplorerConfig
-from explore.strategies import STRATEGIES
+from chainslam.explore.goals.explorer import Explorer
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.strategies import STRATEGIES
 
 NO_SWEEP = replace(ExplorerConfig(), sweep=False)
 

@@ -7,25 +7,25 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.floor_memory import FloorMemory
-from explore.floor.free_space import FloorTooLargeError, FreeSpace
-from explore.floor.touches import REACH_M, Touches
-from explore.following.wall_following import FollowingConfig, Surroundings
-from explore.goals.decider import Decision
-from explore.goals.retreat import Retreat, RetreatConfig
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from explore.outcome import Outcome
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from explore.strategies import STRATEGIES
-from sim.lidar import LidarConfig, RangeFinder
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.geometry.poses import compose
-from slam.mapper import Mapper
-from slam.robot import MotionCommand, Odometry, RobotSpec, Scan
+from chainslam.explore.floor.floor_memory import FloorMemory
+from chainslam.explore.floor.free_space import FloorTooLargeError, FreeSpace
+from chainslam.explore.floor.touches import REACH_M, Touches
+from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.goals.decider import Decision
+from chainslam.explore.goals.retreat import Retreat, RetreatConfig
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.poses import compose
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, Scan
 
 FACES = np.array(
     [[[0.0, 0.0], [9.0, 0.0]], [[9.0, 0.0], [9.0, 3.0]], [[9.0, 3.0], [0.0, 3.0]], [[0.0, 3.0], [0.0, 0.0]]]

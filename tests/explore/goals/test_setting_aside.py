@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.goals import explorer as explorer_module
-from explore.goals import second_tries
-from explore.outcome import Outcome
-from slam.robot import MotionCommand
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.goals import explorer as explorer_module
+from chainslam.explore.goals import second_tries
+from chainslam.explore.outcome import Outcome
+from chainslam.slam.robot import MotionCommand
 from tests.explore.goals.scripted import NO_SWEEP, ask, ends_at, explorer_at
 
 

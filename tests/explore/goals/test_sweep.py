@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.goals.ledger import Ledger
-from explore.goals.sweep import Sweep, SweepConfig
-from explore.strategies import Place
+from chainslam.explore.goals.ledger import Ledger
+from chainslam.explore.goals.sweep import Sweep, SweepConfig
+from chainslam.explore.strategies import Place
 
 
 @pytest.mark.parametrize("trouble", ["", "the way was blocked"])

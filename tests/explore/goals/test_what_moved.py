@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.goals import second_tries as module
-from explore.goals.ledger import Event, Ledger
-from explore.goals.second_tries import SecondTries
-from explore.outcome import Outcome
-from slam.robot import Scan
+from chainslam.explore.goals import second_tries as module
+from chainslam.explore.goals.ledger import Event, Ledger
+from chainslam.explore.goals.second_tries import SecondTries
+from chainslam.explore.outcome import Outcome
+from chainslam.slam.robot import Scan
 from tests.explore.goals.scripted import NO_SWEEP, around_of, ask, ends_at, explorer_at
 
 pytestmark = pytest.mark.usefixtures("_unchecked")

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig, build
-from experiments.trial import default_mission
-from explore import mission
-from slam.geometry import compiled
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.experiments.trial import default_mission
+from chainslam.explore import mission
+from chainslam.slam.geometry import compiled
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

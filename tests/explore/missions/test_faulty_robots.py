@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig
-from sim.worlds import listing
-from slam.odometry.diagnosis import Diagnosis
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import listing
+from chainslam.slam.odometry.diagnosis import Diagnosis
 
 FROM = 30
 FAULTS = {

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig, build
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from slam.estimation.backend import Joint
-from slam.mapper import Mapper
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.mapper import Mapper
 
 
 class Jumping:

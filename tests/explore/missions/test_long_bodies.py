@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from sim.robot import RobotConfig
-from sim.worlds import World
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import World
 
 ROOMS = shapely.orient_polygons(
     shapely.box(0, 0, 6.1, 4).difference(

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.evaluation.consistency import pose_errors
-from slam.geometry.lines import distance_to_segments
-from slam.mapper import Mapper
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.evaluation.consistency import pose_errors
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2

@@ -5,13 +5,13 @@ import pytest
 import shapely
 from shapely import affinity
 
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.mapper import Mapper
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

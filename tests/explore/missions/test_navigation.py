@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.following.wall_following import FollowingConfig
-from explore.goals.explorer_config import ExplorerConfig
-from explore.mission import MissionConfig, explore_mission
-from explore.outcome import Outcome
-from explore.planning.navigators import FloorNavigator
-from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
-from explore.planning.wall_routes import route
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.backends import BACKENDS
-from slam.geometry.lines import normals
-from slam.mapper import Mapper
+from chainslam.explore.following.wall_following import FollowingConfig
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.mission import MissionConfig, explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.planning.navigators import FloorNavigator
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT
+from chainslam.explore.planning.wall_routes import route
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.mapper import Mapper
 
 STAND_OFF_M, RANGE_M, PITCH_M, BODY_M = 0.35, 4.0, 0.05, 0.2
 

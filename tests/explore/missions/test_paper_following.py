@@ -7,18 +7,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from explore.following.behaviour import Behaviour
-from explore.following.end_errand import EndErrand
-from explore.following.wall_following import FollowingConfig
-from explore.goals.explorer_config import ExplorerConfig
-from explore.limits import Limits, limited
-from explore.mission import MissionConfig, explore_mission
-from explore.outcome import Outcome
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.backends import BACKENDS
-from slam.mapper import Mapper
+from chainslam.explore.following.behaviour import Behaviour
+from chainslam.explore.following.end_errand import EndErrand
+from chainslam.explore.following.wall_following import FollowingConfig
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import MissionConfig, explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2

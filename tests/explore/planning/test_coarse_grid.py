@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from explore.planning.coarse_grid import MOST_CELLS, block_cells, blocks_with_any, cells_of
+from chainslam.explore.planning.coarse_grid import MOST_CELLS, block_cells, blocks_with_any, cells_of
 
 CELL_M = 0.05
 

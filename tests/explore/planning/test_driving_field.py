@@ -5,13 +5,13 @@ import pytest
 import shapely
 from skimage.graph import MCP_Geometric
 
-from explore.floor.free_space import FreeSpace
-from explore.planning import driving_field
-from explore.planning.driving_field import DrivingField
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from sim.lidar import LidarConfig, RangeFinder
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.planning import driving_field
+from chainslam.explore.planning.driving_field import DrivingField
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.robot import Scan
 
 LENGTH = PathConfig(narrow_cost=0.0)
 SEEDS = range(4)

@@ -6,9 +6,9 @@ import pytest
 import shapely
 from shapely import affinity
 
-from explore.planning.footprints import AHEAD, HEADINGS_RAD, footprints, heading_of, rooms_of
-from explore.planning.headings import BACK, TURN_M, Ground, Room, cheapest
-from slam.robot import RobotSpec
+from chainslam.explore.planning.footprints import AHEAD, HEADINGS_RAD, footprints, heading_of, rooms_of
+from chainslam.explore.planning.headings import BACK, TURN_M, Ground, Room, cheapest
+from chainslam.slam.robot import RobotSpec
 
 CELL_M = 0.05
 LONG = RobotSpec(outline_m=((0.3, 0.12), (-0.3, 0.12), (-0.3, -0.12), (0.3, -0.12)))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from explore.planning.lanes import lanes_of
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from slam.geometry.lines import normals
+from chainslam.explore.planning.lanes import lanes_of
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.slam.geometry.lines import normals
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

@@ -8,13 +8,13 @@ import pytest
 import shapely
 from skimage.graph import MCP_Geometric
 
-from explore.floor.free_space import FreeSpace
-from explore.planning import paths
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from explore.planning.sight import cells_within, sees
-from sim.lidar import LidarConfig, RangeFinder
-from slam.robot import Scan
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.planning import paths
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.explore.planning.sight import cells_within, sees
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.robot import Scan
 
 CONFIG = PathConfig()
 CELL = 0.05

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from explore.planning.visibility_graph import NEIGHBOUR, SIGHT, VisibilityGraph, followed_wall, neighbours
-from slam.estimation.backend import Belief, Joint
-from slam.geometry.lines import normals, through
-from slam.map.chains import Chain, OpenEnd, connect
-from slam.map.stochastic_map import StochasticMap
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT, VisibilityGraph, followed_wall, neighbours
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.chains import Chain, OpenEnd, connect
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 
 def map_of(segments, pose=(0.0, 0.0, 0.0), ids=None, tentative=()):

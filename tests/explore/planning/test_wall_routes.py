@@ -3,7 +3,7 @@
 import networkx as nx
 import numpy as np
 
-from explore.planning.wall_routes import sequence
+from chainslam.explore.planning.wall_routes import sequence
 
 
 def random_graphs(seed, count=60):

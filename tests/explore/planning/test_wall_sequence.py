@@ -7,12 +7,12 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
-from explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
-from explore.planning.passable import PathConfig
-from explore.planning.paths import Planner
-from explore.planning.wall_sequence import WallSearch
-from slam.robot import Scan
+from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from chainslam.explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.explore.planning.wall_sequence import WallSearch
+from chainslam.slam.robot import Scan
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

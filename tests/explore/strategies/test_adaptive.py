@@ -7,14 +7,14 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from explore.mission import explore_mission
-from explore.strategies import Place, Watchful, make_strategy
-from explore.strategies.adaptive import Adaptive
-from explore.strategies.nearest_robot import NearestRobot
-from sim.robot import SimulatedRobot
-from sim.worlds import load
-from slam.backends import BACKENDS
-from slam.mapper import Mapper
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.strategies import Place, Watchful, make_strategy
+from chainslam.explore.strategies.adaptive import Adaptive
+from chainslam.explore.strategies.nearest_robot import NearestRobot
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 KNOWN = (0, 1)
 

@@ -6,10 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.strategies.expectation import OBSERVATION_SIGMAS, drift_sigmas, expect, position_sigma, walls_seen_from
-from explore.strategies.uncertainty import Uncertainty, new_wall_nats, unknown_wall
-from slam.geometry.lines import directions, normals
-from slam.robot import WheelSpec
+from chainslam.explore.strategies.expectation import (
+    OBSERVATION_SIGMAS,
+    drift_sigmas,
+    expect,
+    position_sigma,
+    walls_seen_from,
+)
+from chainslam.explore.strategies.uncertainty import Uncertainty, new_wall_nats, unknown_wall
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.robot import WheelSpec
 
 few = settings(max_examples=25, deadline=None, derandomize=True)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
 
-from explore.strategies import Place
-from explore.strategies.frontier import Frontier
-from explore.strategies.nearest_robot import NearestRobot
+from chainslam.explore.strategies import Place
+from chainslam.explore.strategies.frontier import Frontier
+from chainslam.explore.strategies.nearest_robot import NearestRobot
 
 SEEDS = range(5)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from explore.following.wall_following import Surroundings
-from explore.strategies.inconsistency import LEVEL, Monitor, gained_information, stated
-from slam.association.joint_compatibility import Nis
-from slam.estimation.backend import Joint
-from slam.geometry.lines import normals
-from slam.geometry.poses import J, compose
-from slam.robot import Odometry, Scan
+from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.strategies.inconsistency import LEVEL, Monitor, gained_information, stated
+from chainslam.slam.association.joint_compatibility import Nis
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import J, compose
+from chainslam.slam.robot import Odometry, Scan
 
 START = np.array([3.0, -2.0, 0.4])
 START_COV = np.diag([0.02, 0.02, 0.01]) ** 2

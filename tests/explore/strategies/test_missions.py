@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.following.wall_following import Surroundings
-from explore.goal import GivenUp
-from explore.goals.explorer import Explorer
-from explore.goals.explorer_config import ExplorerConfig
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from explore.planning.visibility_graph import VisibilityGraph
-from explore.strategies import STRATEGIES, Strategy
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.mapper import Mapper
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.goal import GivenUp
+from chainslam.explore.goals.explorer import Explorer
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.planning.visibility_graph import VisibilityGraph
+from chainslam.explore.strategies import STRATEGIES, Strategy
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2

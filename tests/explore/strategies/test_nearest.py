@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from explore.strategies import STRATEGIES
-from explore.strategies.nearest_robot import NearestRobot
-from explore.strategies.nearest_start import NearestStart
-from explore.strategies.same_chain import SameChain
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.explore.strategies.nearest_robot import NearestRobot
+from chainslam.explore.strategies.nearest_start import NearestStart
+from chainslam.explore.strategies.same_chain import SameChain
 
 SEEDS = range(8)
 

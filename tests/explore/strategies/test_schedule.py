@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from explore.strategies import STRATEGIES, make_strategy
+from chainslam.explore.strategies import STRATEGIES, make_strategy
 
 
 @pytest.mark.parametrize("name", list(STRATEGIES))

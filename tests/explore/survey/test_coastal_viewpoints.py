@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.goals.ledger import Ledger
-from explore.goals.sweep import Sweep, SweepConfig
-from explore.limits import Limits, limited
-from explore.mission import explore_mission
-from explore.planning.driving_field import DrivingField
-from explore.strategies import STRATEGIES
-from explore.survey.coastal_viewpoints import coastal_viewpoints
-from explore.survey.frontiers import PIECE_M, frontiers, pieces
-from explore.survey.trusted_walls import TrustedWalls
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.geometry.lines import distance_to_segments
-from slam.mapper import Mapper
+from chainslam.explore.goals.ledger import Ledger
+from chainslam.explore.goals.sweep import Sweep, SweepConfig
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.planning.driving_field import DrivingField
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.explore.survey.coastal_viewpoints import coastal_viewpoints
+from chainslam.explore.survey.frontiers import PIECE_M, frontiers, pieces
+from chainslam.explore.survey.trusted_walls import TrustedWalls
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.mapper import Mapper
 
 COAST_M = 3.0
 REACH_M = 3.2

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.floor.free_space import FreeSpace
-from explore.survey.moving_things import _is_amid_free_floor, moving_returns
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from sim.people import hidden_by
-from slam.geometry.poses import to_world
-from slam.robot import Scan, ScannerSpec
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.survey.moving_things import _is_amid_free_floor, moving_returns
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.sim.people import hidden_by
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.robot import Scan, ScannerSpec
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 PERSON_M = 0.2

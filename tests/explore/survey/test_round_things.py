@@ -5,12 +5,12 @@ import pytest
 import shapely
 from shapely.geometry.polygon import orient
 
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from explore.survey.round_things import is_round
-from sim.worlds import World
-from slam.geometry.circles import RoundConfig
-from slam.map.chains import HEAD, OpenEnd
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.explore.survey.round_things import is_round
+from chainslam.sim.worlds import World
+from chainslam.slam.geometry.circles import RoundConfig
+from chainslam.slam.map.chains import HEAD, OpenEnd
 
 CONFIG = RoundConfig()
 FARAWAY = [[(20.0, 0.0), (26.0, 0.0)], [(20.0, 5.0), (20.0, 0.0)]]

@@ -5,11 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore.goals.ledger import Ledger
-from explore.goals.sweep import Sweep, SweepConfig
-from explore.planning.driving_field import DrivingField
-from explore.survey.unmapped_obstacles import APART_M, LOOK_BEYOND_M, is_mapped, obstacle_viewpoints, unmapped_obstacles
-from slam.geometry.lines import distance_to_segments
+from chainslam.explore.goals.ledger import Ledger
+from chainslam.explore.goals.sweep import Sweep, SweepConfig
+from chainslam.explore.planning.driving_field import DrivingField
+from chainslam.explore.survey.unmapped_obstacles import (
+    APART_M,
+    LOOK_BEYOND_M,
+    is_mapped,
+    obstacle_viewpoints,
+    unmapped_obstacles,
+)
+from chainslam.slam.geometry.lines import distance_to_segments
 
 
 def without_some(scene, rng):

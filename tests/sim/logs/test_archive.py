@@ -9,8 +9,8 @@ import zlib
 import numpy as np
 import pytest
 
-from sim.logs import archive
-from sim.logs.archive import ArchiveError, read_archive
+from chainslam.sim.logs import archive
+from chainslam.sim.logs.archive import ArchiveError, read_archive
 
 LAYOUT = {"ranges": "float s k", "time": "float s"}
 

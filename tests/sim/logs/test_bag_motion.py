@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from experiments.replays.motion_of_scans import motion_of_scans
-from sim.logs.bag_topics import TopicsWanted
-from sim.logs.recorded_log import read_recorded_log
-from sim.logs.recorded_robot import RecordingError, recording_of
-from slam.geometry.poses import compose, inverse
+from chainslam.experiments.replays.motion_of_scans import motion_of_scans
+from chainslam.sim.logs.bag_topics import TopicsWanted
+from chainslam.sim.logs.recorded_log import read_recorded_log
+from chainslam.sim.logs.recorded_robot import RecordingError, recording_of
+from chainslam.slam.geometry.poses import compose, inverse
 from tests.sim.logs.written_bag import PLACE, Bag, pose_at, room_bag
 from tests.slam.streaming_base import ranges_from
 

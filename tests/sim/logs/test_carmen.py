@@ -5,11 +5,11 @@ import gzip
 import numpy as np
 import pytest
 
-from sim.logs import keyframes
-from sim.logs.keyframes import KeyframesConfig
-from sim.logs.recorded_log import is_own_log, read_recorded_log
-from sim.logs.recorded_robot import RecordingError, recording_of
-from slam.geometry.poses import compose, inverse, wrap
+from chainslam.sim.logs import keyframes
+from chainslam.sim.logs.keyframes import KeyframesConfig
+from chainslam.sim.logs.recorded_log import is_own_log, read_recorded_log
+from chainslam.sim.logs.recorded_robot import RecordingError, recording_of
+from chainslam.slam.geometry.poses import compose, inverse, wrap
 
 
 def flaser(x, y=0.0, theta=0.0, time_s=None, ranges=(), beams=180, laser=None):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.logs.recorded_robot import (
+from chainslam.sim.logs.recorded_robot import (
     MOST_M,
     RecordedRobot,
     RecordingError,
@@ -12,7 +12,7 @@ from sim.logs.recorded_robot import (
     read_log,
     recording_of,
 )
-from slam.robot import MotionCommand
+from chainslam.slam.robot import MotionCommand
 
 STEPS, BEAMS = 3, 5
 

@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sim.logs import rosbag
-from sim.logs.recorded_log import read_recorded_log
-from sim.logs.recorded_robot import RecordingError
-from slam.geometry.poses import compose, inverse
+from chainslam.sim.logs import rosbag
+from chainslam.sim.logs.recorded_log import read_recorded_log
+from chainslam.sim.logs.recorded_robot import RecordingError
+from chainslam.slam.geometry.poses import compose, inverse
 from tests.sim.logs.written_bag import Bag
 
 KINDS = ("ros1", "sqlite", "mcap")

@@ -6,7 +6,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from slam.geometry.poses import compose
+from chainslam.slam.geometry.poses import compose
 from tests.slam.streaming_base import ranges_from
 
 BEAMS = 5

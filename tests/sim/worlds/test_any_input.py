@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from sim.worlds import World, WorldError, load
+from chainslam.sim.worlds import World, WorldError, load
 from tests.sim.worlds.test_bad_input import BOX, NS, ROOM, _geo, _plan
 
 QUICK = settings(

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 from shapely.errors import GEOSException
 
-from sim.worlds import DrawingOptions, World, WorldError, load, registry
-from sim.worlds.readers.geojson import features
+from chainslam.sim.worlds import DrawingOptions, World, WorldError, load, registry
+from chainslam.sim.worlds.readers.geojson import features
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
 NS = 'xmlns="http://www.w3.org/2000/svg"'

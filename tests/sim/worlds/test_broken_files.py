@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from sim.worlds import World, WorldError, load
+from chainslam.sim.worlds import World, WorldError, load
 from tests.fuzzing import worlds
 
 EACH = 30

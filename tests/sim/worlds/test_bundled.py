@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.worlds import WORLDS, World, load
+from chainslam.sim.worlds import WORLDS, World, load
 
 TABLE_1 = {("A", "B"): 6.50, ("A", "C"): 8.35, ("B", "C"): 7.60}
 """Table 1 of the paper, measured by hand, m."""

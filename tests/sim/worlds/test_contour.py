@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.worlds import World, load
-from sim.worlds.drawing import Drawing
-from sim.worlds.solid import build
+from chainslam.sim.worlds import World, load
+from chainslam.sim.worlds.drawing import Drawing
+from chainslam.sim.worlds.solid import build
 
 RADIUS_M, RANGE_M, GRID_M, PITCH_M = 0.2, 4.0, 0.08, 0.1
 

@@ -4,8 +4,8 @@ import ezdxf
 import pytest
 from ezdxf import units
 
-from sim.worlds import DrawingOptions, World, WorldError, load
-from sim.worlds.readers.foreign import FORMATS
+from chainslam.sim.worlds import DrawingOptions, World, WorldError, load
+from chainslam.sim.worlds.readers.foreign import FORMATS
 
 UNITS = {
     "metres": (units.M, 1.0), "millimetres": (units.MM, 1e3), "centimetres": (units.CM, 1e2),
@@ -114,7 +114,7 @@ def _many(document, space):
 
 @pytest.mark.parametrize("more", [_loop, _many], ids=["loop", "many"])
 def test_blocks_without_end_are_refused(tmp_path, more, monkeypatch):
-    monkeypatch.setattr("sim.worlds.readers.dxf.ENTITIES_MAX", 2000)
+    monkeypatch.setattr("chainslam.sim.worlds.readers.dxf.ENTITIES_MAX", 2000)
     with pytest.raises(WorldError, match="blocks"):
         _save(tmp_path, more=more)
 

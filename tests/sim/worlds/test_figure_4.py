@@ -6,7 +6,7 @@ import networkx as nx
 import numpy as np
 import shapely
 
-from sim.worlds import load
+from chainslam.sim.worlds import load
 
 STAND_OFF_M, RANGE_M, PITCH_M, BODY_M = 0.35, 4.0, 0.05, 0.2
 

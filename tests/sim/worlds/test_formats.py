@@ -8,7 +8,7 @@ import shapely
 from PIL import Image, ImageDraw
 from shapely.affinity import rotate
 
-from sim.worlds import DrawingOptions, World, load
+from chainslam.sim.worlds import DrawingOptions, World, load
 
 WALLS = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0], [4, 0, 4, 2.5], [4, 3.6, 4, 6]]
 BLOCK = [(5.5, 2), (6.5, 2), (6.5, 3), (5.5, 3)]

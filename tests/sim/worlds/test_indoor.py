@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from sim.worlds import DrawingOptions, World, WorldError, load
+from chainslam.sim.worlds import DrawingOptions, World, WorldError, load
 
 EAST_M, NORTH_M = 75_000.0, 111_200.0
 """A degree at latitude 47.6, roughly."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.worlds import load
+from chainslam.sim.worlds import load
 
 PLANS = Path(__file__).parents[2] / "data" / "plans"
 FLOORS = {"apartment": (25.6, 19.3, 2), "school": (332.9, 302.9, 3)}

@@ -6,9 +6,9 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sim.worlds import World, WorldError, listing, load
-from sim.worlds.random.floor_plan import DOOR_M, STYLES, floor_plan
-from sim.worlds.world import SENSOR_RANGE_M
+from chainslam.sim.worlds import World, WorldError, listing, load
+from chainslam.sim.worlds.random.floor_plan import DOOR_M, STYLES, floor_plan
+from chainslam.sim.worlds.world import SENSOR_RANGE_M
 
 SEEDS = st.integers(0, 2**64 - 1)
 QUICK = settings(max_examples=10, deadline=None, database=None)

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from sim.worlds import World, WorldError, load
+from chainslam.sim.worlds import World, WorldError, load
 
 QUICK = settings(
     max_examples=25, deadline=None, database=None, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sim.worlds import DrawingOptions, World, WorldError, load
+from chainslam.sim.worlds import DrawingOptions, World, WorldError, load
 
 HEADER = "image: m.png\nresolution: {}\norigin: {}\nnegate: {}\noccupied_thresh: {}\nfree_thresh: {}\nmode: {}\n"
 

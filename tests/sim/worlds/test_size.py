@@ -8,9 +8,9 @@ import pytest
 import shapely
 from PIL import Image
 
-from sim.worlds import WorldError, limits, load
-from sim.worlds.drawing import Drawing
-from sim.worlds.solid import solid_of
+from chainslam.sim.worlds import WorldError, limits, load
+from chainslam.sim.worlds.drawing import Drawing
+from chainslam.sim.worlds.solid import solid_of
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" data-metres-per-unit="1">'
 ROOM = '<rect width="90" height="90" fill="none" stroke="black"/>'

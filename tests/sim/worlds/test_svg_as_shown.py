@@ -9,10 +9,10 @@ import shapely
 from PIL import Image
 from scipy.ndimage import binary_dilation, binary_erosion
 
-from sim.worlds import WorldError
-from sim.worlds.readers.svg.reader import read_svg
-from sim.worlds.rooms import WALL_M
-from sim.worlds.solid import solid_of
+from chainslam.sim.worlds import WorldError
+from chainslam.sim.worlds.readers.svg.reader import read_svg
+from chainslam.sim.worlds.rooms import WALL_M
+from chainslam.sim.worlds.solid import solid_of
 from tests.fuzzing.drawn_svg import drawn_svg, plain
 
 PIXELS = 60

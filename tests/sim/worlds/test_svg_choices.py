@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.worlds import DrawingOptions, World, WorldError, load
-from sim.worlds.readers.svg.reader import read_svg
-from sim.worlds.solid import solid_of
+from chainslam.sim.worlds import DrawingOptions, World, WorldError, load
+from chainslam.sim.worlds.readers.svg.reader import read_svg
+from chainslam.sim.worlds.solid import solid_of
 from tests.fuzzing.drawn_svg import UNKNOWN
 
 INKSCAPE = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.worlds import WorldError, load
-from sim.worlds.text import LONGEST, name_of, printable
+from chainslam.sim.worlds import WorldError, load
+from chainslam.sim.worlds.text import LONGEST, name_of, printable
 
 BOX = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]]
 STRANGE = "\ufffd"

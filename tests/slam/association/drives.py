@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.second_looks.closures import Drive
-from slam.geometry.poses import compose, inverse
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.second_looks.closures import Drive
+from chainslam.slam.geometry.poses import compose, inverse
 
 NICHES = [(2, -0.8, 3, 0), (7, -0.5, 8.5, 0), (11.9, 3, 13, 4), (4, 8, 5.5, 8.6), (9, 8, 10, 9), (-0.7, 5, 0, 6)]
 RING = shapely.box(0, 0, 12, 8).difference(shapely.box(2, 2, 10, 6)).union(

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.association.matchers.joint_assignment import assign
-from slam.association.matching import KnownWalls, MatchingConfig
-from slam.estimation.backend import Joint
+from chainslam.slam.association.matchers.joint_assignment import assign
+from chainslam.slam.association.matching import KnownWalls, MatchingConfig
+from chainslam.slam.estimation.backend import Joint
 from tests.slam.association.test_matching import PIECES, straight_pieces, three_walls
 
 CONFIG = MatchingConfig(method="assignment")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from slam.association.kernels.hypothesis_kernels import agree
-from slam.association.kernels.rest_kernels import compatible
-from slam.association.matching import KnownWalls, match
-from slam.estimation.backend import Joint
-from slam.estimation.gates import gate_level, pair_levels
-from slam.extraction.segments import Segments
+from chainslam.slam.association.kernels.hypothesis_kernels import agree
+from chainslam.slam.association.kernels.rest_kernels import compatible
+from chainslam.slam.association.matching import KnownWalls, match
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.estimation.gates import gate_level, pair_levels
+from chainslam.slam.extraction.segments import Segments
 
 SURE = np.zeros(1, bool)
 """Of a segment of many beams."""

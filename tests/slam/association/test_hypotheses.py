@@ -7,12 +7,12 @@ import pytest
 import shapely
 from scipy.stats import multivariate_normal
 
-from slam.association.kernels.hypothesis_kernels import agree
-from slam.association.kernels.rest_kernels import compatible, nearest_alone
-from slam.association.matching import KnownWalls, match
-from slam.estimation.backend import Joint
-from slam.estimation.gates import gate_level
-from slam.robot import Odometry
+from chainslam.slam.association.kernels.hypothesis_kernels import agree
+from chainslam.slam.association.kernels.rest_kernels import compatible, nearest_alone
+from chainslam.slam.association.matching import KnownWalls, match
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.robot import Odometry
 from tests.slam.association.test_matching import Walker, faces_of, straight_pieces
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from slam.association.kernels.candidate_kernels import Candidates
-from slam.association.matchers.joint_assignment import NEW, acting, hypotheses
-from slam.association.matching import MatchingConfig, limits_of
+from chainslam.slam.association.kernels.candidate_kernels import Candidates
+from chainslam.slam.association.matchers.joint_assignment import NEW, acting, hypotheses
+from chainslam.slam.association.matching import MatchingConfig, limits_of
 
 CONFIG = MatchingConfig(method="assignment")
 LIMITS = limits_of(CONFIG)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from slam.association.joint_compatibility import relocate
-from slam.association.kernels.rest_kernels import compatible
-from slam.estimation.backend import Joint, Observations
-from slam.estimation.gates import gate_level, pair_levels
-from slam.estimation.models import innovations, lines_robot
-from slam.geometry.poses import wrap
+from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.kernels.rest_kernels import compatible
+from chainslam.slam.estimation.backend import Joint, Observations
+from chainslam.slam.estimation.gates import gate_level, pair_levels
+from chainslam.slam.estimation.models import innovations, lines_robot
+from chainslam.slam.geometry.poses import wrap
 
 
 def test_relocation_is_conditioning_in_information_form():

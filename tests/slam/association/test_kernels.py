@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.association.kernels.candidate_kernels import Known, Limits, Seen, candidates
-from slam.association.kernels.joint_kernels import taken_together
-from slam.geometry.poses import wrap
+from chainslam.slam.association.kernels.candidate_kernels import Known, Limits, Seen, candidates
+from chainslam.slam.association.kernels.joint_kernels import taken_together
+from chainslam.slam.geometry.poses import wrap
 
 few = settings(max_examples=40, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import shapely
 
-from slam.association.kernels.correlation_kernels import best_in_blocks, largest_ahead, mean_at
-from slam.association.place_search import Window, place_on
-from slam.association.second_looks.closures import Closure, held, settled
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.submaps import Returns
-from slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
+from chainslam.slam.association.kernels.correlation_kernels import best_in_blocks, largest_ahead, mean_at
+from chainslam.slam.association.place_search import Window, place_on
+from chainslam.slam.association.second_looks.closures import Closure, held, settled
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.association.second_looks.loop_search import LoopSearch
+from chainslam.slam.association.second_looks.submaps import Returns
+from chainslam.slam.geometry.poses import compose, inverse, to_robot, to_world, wrap
 from tests.slam.association.drives import drifting, driven, followed, motions_of, off_m, returns_at, round_the_ring
 
 CONFIG = SecondLooksConfig()

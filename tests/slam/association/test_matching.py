@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.joint_compatibility import relocate
-from slam.association.matching import KnownWalls, MatchingConfig, match
-from slam.association.methods import METHODS
-from slam.backends import BACKENDS
-from slam.estimation.backend import Joint
-from slam.estimation.models import lines_robot
-from slam.extraction.segments import Segments
-from slam.geometry.lines import through
-from slam.geometry.poses import compose, inverse, wrap
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.matching import KnownWalls, MatchingConfig, match
+from chainslam.slam.association.methods import METHODS
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.estimation.models import lines_robot
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 
 SURE = np.zeros(1, bool)
 """Of a segment of many beams."""

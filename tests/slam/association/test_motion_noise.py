@@ -4,12 +4,19 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from slam.association.joint_compatibility import NO_NIS, seen_halfway
-from slam.association.motion_noise import FACTORS, MotionInnovation, MotionNoise, gains_of, motion_root, surprise
-from slam.estimation.backend import Joint, Observations
-from slam.estimation.models import lines_robot
-from slam.geometry.poses import rotation
-from slam.robot import Odometry
+from chainslam.slam.association.joint_compatibility import NO_NIS, seen_halfway
+from chainslam.slam.association.motion_noise import (
+    FACTORS,
+    MotionInnovation,
+    MotionNoise,
+    gains_of,
+    motion_root,
+    surprise,
+)
+from chainslam.slam.estimation.backend import Joint, Observations
+from chainslam.slam.estimation.models import lines_robot
+from chainslam.slam.geometry.poses import rotation
+from chainslam.slam.robot import Odometry
 
 ANCHORS = np.array([[3.0, 1.0], [-1.0, 2.5], [0.5, -2.0]])
 MEAN = np.concatenate([np.zeros(3), np.column_stack([[0.0, 1.9, -1.5], np.zeros(3)]).ravel()])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sim.faults import FaultsConfig
-from sim.robot import RobotConfig, SimulatedRobot
-from slam.association.ranges.own_body import OwnBody
-from slam.robot import MotionCommand, RobotSpec, Scan, ScannerSpec
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.slam.association.ranges.own_body import OwnBody
+from chainslam.slam.robot import MotionCommand, RobotSpec, Scan, ScannerSpec
 from tests.sim.test_robot import room
 
 BEARINGS = np.linspace(-np.pi, np.pi, 180, endpoint=False)

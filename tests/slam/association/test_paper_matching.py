@@ -5,18 +5,18 @@ import pytest
 import shapely
 from scipy.stats import chi2
 
-from slam.association.joint_compatibility import relocate
-from slam.association.matchers.paper_matching import match_alone, relocate_robot
-from slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
-from slam.association.methods import METHODS, Method
-from slam.association.view import View
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.estimation.backend import Joint, Observations
-from slam.extraction.segments import Segments
-from slam.geometry.lines import segment_distances
-from slam.geometry.poses import wrap
-from slam.mapper import Mapper
+from chainslam.slam.association.joint_compatibility import relocate
+from chainslam.slam.association.matchers.paper_matching import match_alone, relocate_robot
+from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
+from chainslam.slam.association.methods import METHODS, Method
+from chainslam.slam.association.view import View
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import Joint, Observations
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import segment_distances
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.mapper import Mapper
 
 PAPER = MatchingConfig(method="paper")
 NEAR_M = PAPER.shared.within_m

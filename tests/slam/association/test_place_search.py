@@ -5,12 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from slam.association.place_search import place_of
-from slam.association.recovery import RecoveryConfig
-from slam.extraction.extract import extract
-from slam.geometry.poses import rotation, wrap
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.slam.association.place_search import place_of
+from chainslam.slam.association.recovery import RecoveryConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.geometry.poses import rotation, wrap
+from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import loop
 from tests.slam.map.test_openings import map_of as walls_of
 

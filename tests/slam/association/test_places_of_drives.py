@@ -7,13 +7,13 @@ import pytest
 import shapely
 from scipy.stats import chi2
 
-from slam.association.second_looks.closures import closure_links, settled
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.landmarks import NO_SIGHTINGS
-from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.solve import normal_equations, without_lines
-from slam.association.second_looks.submaps import Returns
-from slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.association.second_looks.closures import closure_links, settled
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.association.second_looks.landmarks import NO_SIGHTINGS
+from chainslam.slam.association.second_looks.loop_search import LoopSearch
+from chainslam.slam.association.second_looks.solve import normal_equations, without_lines
+from chainslam.slam.association.second_looks.submaps import Returns
+from chainslam.slam.geometry.poses import compose, inverse, wrap
 from tests.slam.association.drives import STATED, along, driven, followed, motions_of, off_m, returns_at
 
 CONFIG = SecondLooksConfig()

@@ -5,19 +5,19 @@ import pytest
 import shapely
 from scipy.optimize import approx_fprime
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.kernels.bow_kernels import bows
-from slam.association.ranges.bias import RangeBias
-from slam.association.ranges.calibrated_backend import CalibratedBackend
-from slam.association.ranges.errors import RangeErrors, RangesConfig
-from slam.association.ranges.heard import Ranges
-from slam.association.ranges.scale import RangeScale
-from slam.backends import BACKENDS
-from slam.estimation.backend import Observations
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.geometry.poses import compose, rotation, wrap
-from slam.robot import LidarSpec, Odometry, RobotSpec, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.kernels.bow_kernels import bows
+from chainslam.slam.association.ranges.bias import RangeBias
+from chainslam.slam.association.ranges.calibrated_backend import CalibratedBackend
+from chainslam.slam.association.ranges.errors import RangeErrors, RangesConfig
+from chainslam.slam.association.ranges.heard import Ranges
+from chainslam.slam.association.ranges.scale import RangeScale
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.geometry.poses import compose, rotation, wrap
+from chainslam.slam.robot import LidarSpec, Odometry, RobotSpec, Scan
 from tests.slam.test_mapper import faces_of
 
 SIGMA_M = 0.01

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.refuted import Rays, refuted
-from slam.association.second_looks.second_looks import second_looks
-from slam.association.second_looks.solve import Unknowns
-from slam.backends import BACKENDS
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.visible_extent import sure_pieces
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import compose, inverse
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan, ScannerSpec
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.association.second_looks.refuted import Rays, refuted
+from chainslam.slam.association.second_looks.second_looks import second_looks
+from chainslam.slam.association.second_looks.solve import Unknowns
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.visible_extent import sure_pieces
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan, ScannerSpec
 from tests.slam.association.drives import along, driven, faces_of, motions_of
 
 CONFIG = SecondLooksConfig()

@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from slam.association.second_looks.closures import Closure, Drive, settled
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.landmarks import associated, firm, joined
-from slam.association.second_looks.second_looks import second_looks
-from slam.association.second_looks.solve import begun, normal_equations, of_links, of_sightings, solved
-from slam.association.second_looks.walls import surveyed
-from slam.extraction.segments import Segments
-from slam.geometry.lines import lines_to_world, through
-from slam.geometry.poses import compose, inverse, rotation, to_robot, wrap
+from chainslam.slam.association.second_looks.closures import Closure, Drive, settled
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.association.second_looks.landmarks import associated, firm, joined
+from chainslam.slam.association.second_looks.second_looks import second_looks
+from chainslam.slam.association.second_looks.solve import begun, normal_equations, of_links, of_sightings, solved
+from chainslam.slam.association.second_looks.walls import surveyed
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import lines_to_world, through
+from chainslam.slam.geometry.poses import compose, inverse, rotation, to_robot, wrap
 from tests.slam.association.drives import driven
 
 WALLS = np.array([[[6, 0], [0, 0]], [[0, 0], [0, 4]], [[0, 4], [6, 4]], [[6, 4], [6, 0]], [[2, 1.5], [4, 1.5]]], float)
@@ -198,7 +198,7 @@ def test_two_poses_err_together_as_the_whole_information_says():
 
 @pytest.mark.parametrize("at_once", [2, 64])
 def test_the_covariance_is_that_of_the_whole_information_and_the_floor(at_once, monkeypatch):
-    monkeypatch.setattr("slam.association.second_looks.walls.AT_ONCE", at_once)
+    monkeypatch.setattr("chainslam.slam.association.second_looks.walls.AT_ONCE", at_once)
     true, _, motions, sightings, owner = problem()
     links = [driven(motions).links(CONFIG.doubt, CONFIG)]
     found = solved(begun(true, sightings, owner), links, sightings, owner, CONFIG)

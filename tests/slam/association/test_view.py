@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.association.matching import KnownWalls, MatchingConfig
-from slam.association.methods import METHODS
-from slam.association.view import near_segments
-from slam.backends import BACKENDS
-from slam.estimation.backend import Joint
-from slam.extraction.segments import Segments
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import compose, rotation, to_robot, wrap
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.matching import KnownWalls, MatchingConfig
+from chainslam.slam.association.methods import METHODS
+from chainslam.slam.association.view import near_segments
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import compose, rotation, to_robot, wrap
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 from tests.slam.test_mapper import AT_ITS_WORD, P0, faces_of
 
 CONFIG = MatchingConfig()

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from slam.association.second_looks.closures import Closure
-from slam.association.second_looks.landmarks import firm, joined
-from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.second_looks import _with_walls, second_looks
-from slam.association.second_looks.solve import begun
-from slam.association.second_looks.submaps import Returns
-from slam.association.second_looks.walls import merged, spans
-from slam.geometry.poses import compose, inverse
+from chainslam.slam.association.second_looks.closures import Closure
+from chainslam.slam.association.second_looks.landmarks import firm, joined
+from chainslam.slam.association.second_looks.loop_search import LoopSearch
+from chainslam.slam.association.second_looks.second_looks import _with_walls, second_looks
+from chainslam.slam.association.second_looks.solve import begun
+from chainslam.slam.association.second_looks.submaps import Returns
+from chainslam.slam.association.second_looks.walls import merged, spans
+from chainslam.slam.geometry.poses import compose, inverse
 from tests.slam.association.drives import driven
 from tests.slam.association.test_second_looks import CONFIG, WALLS, drive, problem, segments_at
 

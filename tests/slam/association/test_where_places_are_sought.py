@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.association.place_search import Place, apart
-from slam.association.second_looks import loop_search
-from slam.association.second_looks.closures import Closure, settled
-from slam.association.second_looks.config import SecondLooksConfig
-from slam.association.second_looks.loop_search import LoopSearch
-from slam.association.second_looks.submaps import Returns
-from slam.geometry.poses import compose, inverse
+from chainslam.slam.association.place_search import Place, apart
+from chainslam.slam.association.second_looks import loop_search
+from chainslam.slam.association.second_looks.closures import Closure, settled
+from chainslam.slam.association.second_looks.config import SecondLooksConfig
+from chainslam.slam.association.second_looks.loop_search import LoopSearch
+from chainslam.slam.association.second_looks.submaps import Returns
+from chainslam.slam.geometry.poses import compose, inverse
 from tests.slam.association.drives import driven, followed
 
 pytestmark = pytest.mark.usefixtures("_unchecked")

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Observations
-from slam.geometry.poses import arc, compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.poses import arc, compose, wrap
+from chainslam.slam.robot import Odometry
 
 
 def normal(alpha):

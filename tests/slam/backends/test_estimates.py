@@ -4,11 +4,11 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from slam.estimation.backend import Observations
-from slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
-from slam.geometry.poses import arc, compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.evaluation.consistency import joint_error, nees, pose_covariances, pose_errors
+from chainslam.slam.geometry.poses import arc, compose, wrap
+from chainslam.slam.robot import Odometry
 
 RUNS = 60
 

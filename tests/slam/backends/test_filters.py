@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS, BackendOptions
-from slam.backends.blocks.block_ekf import weighted_mean
-from slam.backends.full_ekf import FullEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.backends.kalman.dense_map import DenseMap
-from slam.estimation.backend import Observations
-from slam.estimation.models import Initialisation, Linear, Motion
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.backends.blocks.block_ekf import weighted_mean
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.backends.kalman.dense_map import DenseMap
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import Initialisation, Linear, Motion
+from chainslam.slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS
-from slam.backends.frame.frame import Frame
-from slam.backends.kalman.config import EkfConfig
-from slam.estimation.backend import Joint
-from slam.geometry.poses import compose, inverse, to_world, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.frame.frame import Frame
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.geometry.poses import compose, inverse, to_world, wrap
+from chainslam.slam.robot import Odometry
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

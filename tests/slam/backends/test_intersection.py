@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from slam.backends.blocks.intersection_ekf import IntersectionMap
-from slam.estimation.models import Initialisation, Linear, Motion
+from chainslam.slam.backends.blocks.intersection_ekf import IntersectionMap
+from chainslam.slam.estimation.models import Initialisation, Linear, Motion
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from slam.backends.full_ekf import FullEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.geometry.poses import compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.robot import Odometry
 from tests.slam.backends.conftest import Walls
 
 START, P0 = np.array([0.0, -1.0, 0.3]), np.diag([0.01, 0.01, 0.002]) ** 2

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from slam.geometry.poses import wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Odometry
 
 every_back_end = pytest.mark.parametrize("name", list(BACKENDS))
 START, P0 = np.array([12.0, -7.0, 0.4]), np.diag([0.02, 0.02, 0.004]) ** 2

@@ -5,8 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from experiments.scenario import TrialConfig, build
-from slam.backends import BACKENDS, BackendOptions
+from chainslam.experiments.scenario import TrialConfig, build
+from chainslam.slam.backends import BACKENDS, BackendOptions
 
 START, P0 = np.zeros(3), 1e-4 * np.eye(3)
 

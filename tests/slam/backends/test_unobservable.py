@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS, BackendOptions
-from slam.backends.kalman.config import EkfConfig
-from slam.backends.kalman.dense_map import DenseMap
-from slam.backends.kalman.linear import carry, equality
-from slam.estimation.backend import Observations
-from slam.estimation.models import initialise, innovations, move
-from slam.geometry.poses import J
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.backends.kalman.dense_map import DenseMap
+from chainslam.slam.backends.kalman.linear import carry, equality
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import initialise, innovations, move
+from chainslam.slam.geometry.poses import J
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

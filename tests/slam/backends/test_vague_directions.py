@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.replays.oracles import as_stated
-from slam.backends import BACKENDS
-from slam.backends.kalman.config import EkfConfig
-from slam.estimation.backend import POSE
-from slam.estimation.models import innovations
-from slam.evaluation.own_gauge import own_gauge
-from slam.geometry.lines import directions, normals
+from chainslam.experiments.replays.oracles import as_stated
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.estimation.backend import POSE
+from chainslam.slam.estimation.models import innovations
+from chainslam.slam.evaluation.own_gauge import own_gauge
+from chainslam.slam.geometry.lines import directions, normals
 from tests.slam.backends.conftest import Walls
 
 few = settings(max_examples=20, deadline=None, derandomize=True)

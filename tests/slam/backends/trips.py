@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import least_squares
 
-from slam.estimation.backend import Observations
-from slam.estimation.models import innovations, lines_robot
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import compose, inverse, to_robot, wrap
-from slam.robot import Odometry
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import innovations, lines_robot
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import compose, inverse, to_robot, wrap
+from chainslam.slam.robot import Odometry
 
 P0 = np.array([[4e-4, 5e-5, 1e-5], [5e-5, 3e-4, -2e-5], [1e-5, -2e-5, 1e-4]])
 ODOMETRY_COV = np.array([[1e-4, 2e-5, 3e-5], [2e-5, 4e-5, 1e-5], [3e-5, 1e-5, 2e-4]])

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.models import halfway, initialise, innovations, lines_robot, move, stack
-from slam.extraction.kernels.line_kernels import fit_run, polar, prefix_sums
-from slam.geometry.lines import lines_to_world
-from slam.geometry.poses import to_robot, to_world, wrap
+from chainslam.slam.estimation.models import halfway, initialise, innovations, lines_robot, move, stack
+from chainslam.slam.extraction.kernels.line_kernels import fit_run, polar, prefix_sums
+from chainslam.slam.geometry.lines import lines_to_world
+from chainslam.slam.geometry.poses import to_robot, to_world, wrap
 
 seeds = st.integers(0, 2**32)
 few = settings(max_examples=20, deadline=None, derandomize=True)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS, BackendOptions
-from slam.estimation.mounting import (
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.estimation.mounting import (
     belief_of_body,
     body_poses,
     carried,
@@ -14,10 +14,10 @@ from slam.estimation.mounting import (
     scanner_poses,
     start_of_scanner,
 )
-from slam.extraction.segments import Segments
-from slam.geometry.lines import through
-from slam.geometry.poses import compose, inverse, to_robot, to_world
-from slam.robot import Odometry, ScannerSpec
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import compose, inverse, to_robot, to_world
+from chainslam.slam.robot import Odometry, ScannerSpec
 
 SCANNER = ScannerSpec(0.12, -0.05, 0.4)
 AT_AXLE = ScannerSpec()

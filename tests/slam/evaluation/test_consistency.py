@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import expm, solve
 from scipy.stats import chi2, kstest
 
-from slam.estimation.backend import Joint
-from slam.evaluation.consistency import (
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.evaluation.consistency import (
     _to_invariant,
     anees,
     bound_margins,
@@ -19,8 +19,8 @@ from slam.evaluation.consistency import (
     pose_errors,
     share_in_band,
 )
-from slam.geometry.lines import normals
-from slam.geometry.poses import compose
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import compose
 
 RNG = np.random.default_rng(4)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from slam.evaluation.doubles import doubles
+from chainslam.slam.evaluation.doubles import doubles
 
 
 def turned(ends, angle):

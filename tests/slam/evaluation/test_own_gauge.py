@@ -6,9 +6,9 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from slam.evaluation.own_gauge import own_gauge
-from slam.geometry.lines import normals
-from slam.geometry.poses import J, rotation
+from chainslam.slam.evaluation.own_gauge import own_gauge
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import J, rotation
 
 
 def walls_of(rng, count=6):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.backends.full_ekf import FullEkf
-from slam.evaluation.axioms.broken import BrokenError
-from slam.evaluation.axioms.check import axioms_of
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.evaluation.axioms.broken import BrokenError
+from chainslam.slam.evaluation.axioms.check import axioms_of
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 SOUND = "covariances stay sound through any program of verbs"

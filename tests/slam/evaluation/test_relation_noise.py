@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from slam.evaluation.relation_noise import (
+from chainslam.slam.evaluation.relation_noise import (
     adjoint_of_inverse,
     body_covs,
     relation_covs,
@@ -13,8 +13,8 @@ from slam.evaluation.relation_noise import (
     sigmas_of_relations,
     triangles,
 )
-from slam.evaluation.relations import Relations, between
-from slam.geometry.poses import compose, inverse
+from chainslam.slam.evaluation.relations import Relations, between
+from chainslam.slam.geometry.poses import compose, inverse
 
 STEP = 1e-6
 

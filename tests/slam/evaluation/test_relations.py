@@ -5,7 +5,7 @@ import pytest
 from evo.core import metrics, sync
 from evo.core.trajectory import PoseTrajectory3D
 
-from slam.evaluation.relations import (
+from chainslam.slam.evaluation.relations import (
     Relations,
     errors_at_scans,
     errors_between_scans,
@@ -14,7 +14,7 @@ from slam.evaluation.relations import (
     paired_poses,
     relation_errors,
 )
-from slam.evaluation.trajectories import ate
+from chainslam.slam.evaluation.trajectories import ate
 
 
 def matrix(pose):

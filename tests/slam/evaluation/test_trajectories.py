@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from evo.core import metrics, sync, trajectory
 
-from slam.evaluation.trajectories import aligned, ate, position_errors, rpe
-from slam.geometry.poses import compose
+from chainslam.slam.evaluation.trajectories import aligned, ate, position_errors, rpe
+from chainslam.slam.geometry.poses import compose
 
 
 def paths(seed, steps=40):

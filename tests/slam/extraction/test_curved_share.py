@@ -5,13 +5,13 @@ import pytest
 import shapely
 from shapely.geometry.polygon import orient
 
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig, SimulatedRobot
-from sim.worlds import World, load
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.curved_share import SCANS, curved_beams, few_straight, returns_of_scan
-from slam.extraction.extract import extract
-from slam.robot import MotionCommand
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.sim.worlds import World, load
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.curved_share import SCANS, curved_beams, few_straight, returns_of_scan
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.robot import MotionCommand
 
 
 def said(world, beams):

@@ -4,11 +4,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.shared import SharedConfig
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.segments import EndKind
-from slam.extraction.visible_extent import sure_pieces
+from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import EndKind
+from chainslam.slam.extraction.visible_extent import sure_pieces
 from tests.slam.extraction.test_extract import room_scan
 
 CONFIG = ExtractionConfig(shared=SharedConfig(door_m=0.12, within_m=0.02))

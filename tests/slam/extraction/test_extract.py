@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from sim.lidar import LidarConfig, RangeFinder, noisy
-from slam.extraction.extract import extract
-from slam.extraction.segments import EndKind
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import wrap
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import EndKind
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Scan
 
 SIGMA = 0.01
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.geometry.poses import wrap
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Scan
 
 SIGMA = 0.01
 

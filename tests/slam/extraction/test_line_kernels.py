@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from slam.extraction.kernels.line_kernels import (
+from chainslam.slam.extraction.kernels.line_kernels import (
     Line,
     crossing,
     fit_run,

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sim.lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import beams_of_scan, extract, rules_of
-from slam.extraction.kernels.returns_kernels import returns_of, rolled
-from slam.extraction.segments import EndKind
-from slam.map.polylines.change_points import ChangePoints, ChangePointsConfig
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder, beam_sigmas, noisy
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import beams_of_scan, extract, rules_of
+from chainslam.slam.extraction.kernels.returns_kernels import returns_of, rolled
+from chainslam.slam.extraction.segments import EndKind
+from chainslam.slam.map.polylines.change_points import ChangePoints, ChangePointsConfig
+from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import CLOSED
 from tests.slam.map.polylines.test_change_points import look, random_poses
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.range_noise import range_noise
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.range_noise import range_noise
+from chainslam.slam.robot import Scan
 from tests.slam.association.drives import faces_of
 
 RULES = ExtractionConfig()

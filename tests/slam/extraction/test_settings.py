@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from slam.estimation.shared import SharedConfig
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.visible_extent import sure_pieces
+from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.visible_extent import sure_pieces
 from tests.slam.extraction.test_extract import CLOSED, PLACES, loop, room_scan, scan_of
 
 FAR_OFF = {

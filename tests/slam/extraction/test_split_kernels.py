@@ -8,12 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import beams_of_scan, extract, rules_of
-from slam.extraction.kernels.line_kernels import prefix_sums
-from slam.extraction.kernels.returns_kernels import positions_of, returns_of, rolled
-from slam.extraction.kernels.split_kernels import bend_within, candidates, choose, cut_at, settled, split_gains, surest
-from slam.robot import Scan
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import beams_of_scan, extract, rules_of
+from chainslam.slam.extraction.kernels.line_kernels import prefix_sums
+from chainslam.slam.extraction.kernels.returns_kernels import positions_of, returns_of, rolled
+from chainslam.slam.extraction.kernels.split_kernels import (
+    bend_within,
+    candidates,
+    choose,
+    cut_at,
+    settled,
+    split_gains,
+    surest,
+)
+from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import room_scan
 
 SIGMA = 0.01

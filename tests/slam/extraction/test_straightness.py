@@ -7,19 +7,19 @@ import pytest
 import scipy.stats
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.estimation.backend import Belief, Joint
-from slam.extraction.extract import extract
-from slam.extraction.straightness import StraightnessConfig, cov_of_bows, cov_of_faces, cov_of_misfits
-from slam.extraction.straightness_kernels import edge_cov, edge_variance, faces_cov, misfit_variances
-from slam.geometry.lines import normals, through
-from slam.geometry.poses import wrap
-from slam.map.reliability import ReliabilityConfig, are_clear, as_told
-from slam.map.stochastic_map import StochasticMap
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.straightness import StraightnessConfig, cov_of_bows, cov_of_faces, cov_of_misfits
+from chainslam.slam.extraction.straightness_kernels import edge_cov, edge_variance, faces_cov, misfit_variances
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.map.reliability import ReliabilityConfig, are_clear, as_told
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 
 
 @pytest.mark.parametrize(("length", "middle"), [(0.1, 0.0), (0.4, 1.3), (0.2, -2.0)])

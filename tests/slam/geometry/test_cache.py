@@ -5,7 +5,7 @@ import tempfile
 
 import pytest
 
-from slam.geometry import compiled
+from chainslam.slam.geometry import compiled
 
 
 @pytest.fixture

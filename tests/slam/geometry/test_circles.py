@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from slam.geometry.circles import DEFAULT, cov_of_rounding, radius_of
-from slam.geometry.lines import through
+from chainslam.slam.geometry.circles import DEFAULT, cov_of_rounding, radius_of
+from chainslam.slam.geometry.lines import through
 
 
 def chords(radius_m, count=6, step=0.7):

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-import slam.geometry.compiled as compiled_module
+import chainslam.slam.geometry.compiled as compiled_module
 
 CALLED = """
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 {constant}
 @compiled
 def inner(x):
@@ -16,7 +16,7 @@ def inner(x):
 """
 CALLER = '''
 from inner_kernels import inner
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 @compiled
 def outer(xs):
     """Sums."""
@@ -62,7 +62,7 @@ def test_a_home_that_cannot_be_written_does_not_stop_a_kernel(tmp_path: Path) ->
 
 
 def test_dividing_by_zero_is_infinite_as_in_numpy() -> None:
-    from slam.geometry.compiled import compiled
+    from chainslam.slam.geometry.compiled import compiled
 
     @compiled
     def inverse(x: float) -> float:
@@ -77,7 +77,9 @@ def test_another_installation_of_the_same_source_has_machine_code_of_its_own(tmp
     for place in ("one", "other", "one"):
         path = tmp_path / place / "twin_kernels.py"
         path.parent.mkdir(exist_ok=True)
-        path.write_text("from slam.geometry.compiled import compiled\n\n\n@compiled\ndef same(x):\n    return x\n")
+        path.write_text(
+            "from chainslam.slam.geometry.compiled import compiled\n\n\n@compiled\ndef same(x):\n    return x\n"
+        )
         spec = importlib.util.spec_from_file_location("twin_kernels", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)

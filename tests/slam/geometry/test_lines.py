@@ -6,9 +6,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.line_kernels import intersect
-from slam.geometry.lines import directions, distance_to_segments, lines_to_world, normals, project, through
-from slam.geometry.poses import J, to_world
+from chainslam.slam.geometry.line_kernels import intersect
+from chainslam.slam.geometry.lines import directions, distance_to_segments, lines_to_world, normals, project, through
+from chainslam.slam.geometry.poses import J, to_world
 
 seeds = st.integers(0, 2**32)
 few = settings(max_examples=25, deadline=None, derandomize=True)

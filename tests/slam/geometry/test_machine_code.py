@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from slam.geometry import machine_code
-from slam.geometry.machine_code import decide, kinds
+from chainslam.slam.geometry import machine_code
+from chainslam.slam.geometry.machine_code import decide, kinds
 
 pytestmark = pytest.mark.skipif(not machine_code.IS_KNOWN, reason="numba loads machine code by itself here")
 KERNELS = """
 from typing import NamedTuple
 import numpy as np
-from slam.geometry.compiled import compiled
+from chainslam.slam.geometry.compiled import compiled
 class Pair(NamedTuple):
     sums: np.ndarray
     largest: float
@@ -79,7 +79,7 @@ def test_what_was_compiled_runs_without_numba_and_other_arguments_get_code_of_th
 
 def test_all_that_was_kept_is_linked_at_once_where_that_is_asked_for(tmp_path: Path) -> None:
     run(tmp_path, "1")
-    asks = "from slam.geometry.compiled import link_kernels; from its_kernels import *; link_kernels(); "
+    asks = "from chainslam.slam.geometry.compiled import link_kernels; from its_kernels import *; link_kernels(); "
     assert run(tmp_path, "-c", asks + "print(len(described._made), len(depth._made))") == ["4", "0"]
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slam.geometry.matrix_kernels import gain_of, squared_distance, whitening, wrapped
-from slam.geometry.poses import wrap
+from chainslam.slam.geometry.matrix_kernels import gain_of, squared_distance, whitening, wrapped
+from chainslam.slam.geometry.poses import wrap
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 7, 24])

@@ -6,7 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from slam.geometry.poses import J, arc, compose, inverse, rotation, to_robot, to_world, turned, wrap, wrap_positive
+from chainslam.slam.geometry.poses import (
+    J,
+    arc,
+    compose,
+    inverse,
+    rotation,
+    to_robot,
+    to_world,
+    turned,
+    wrap,
+    wrap_positive,
+)
 
 metres = st.floats(-50.0, 50.0)
 angles = st.floats(-20.0, 20.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from slam.geometry.segment_kernels import lie_beside
+from chainslam.slam.geometry.segment_kernels import lie_beside
 
 
 @pytest.mark.parametrize("seed", range(6))

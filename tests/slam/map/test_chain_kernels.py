@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.map.kernels.chain_kernels import (
+from chainslam.slam.map.kernels.chain_kernels import (
     HEAD,
     TAIL,
     Reach,

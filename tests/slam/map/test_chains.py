@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.backend import Belief, Joint
-from slam.estimation.shared import SharedConfig
-from slam.geometry.lines import normals, through
-from slam.map.chains import HEAD, TAIL, connect
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.chains import HEAD, TAIL, connect
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 few = settings(max_examples=40, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -8,16 +8,16 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends import BACKENDS
-from slam.backends.full_ekf import FullEkf
-from slam.estimation.backend import Belief
-from slam.geometry.lines import directions, normals, through
-from slam.geometry.poses import rotation
-from slam.map.chains import connect
-from slam.map.displacement import across, along
-from slam.map.extents import WallsConfig
-from slam.map.landmarks import Landmarks
-from slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.geometry.lines import directions, normals, through
+from chainslam.slam.geometry.poses import rotation
+from chainslam.slam.map.chains import connect
+from chainslam.slam.map.displacement import across, along
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
 from tests.slam.test_mapper import AT_ITS_WORD, faces_of, walk
 
 NEAR_M = 1.0

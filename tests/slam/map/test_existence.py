@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.geometry.lines import normals, through
-from slam.map.existence import JUST_BEGUN, NOWHERE, ExistenceConfig, log_odds, looked_at
-from slam.map.kernels.existence_kernels import Odds, crossing, look
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.existence import JUST_BEGUN, NOWHERE, ExistenceConfig, log_odds, looked_at
+from chainslam.slam.map.kernels.existence_kernels import Odds, crossing, look
+from chainslam.slam.robot import Scan
 
 CONFIG = ExistenceConfig()
 ODDS = CONFIG.odds(5)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.poses import to_world
-from slam.map.kernels.extent_kernels import CORNER, OCCLUDED, kept_piece, note_whole, seen_along, stretch
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.kernels.extent_kernels import CORNER, OCCLUDED, kept_piece, note_whole, seen_along, stretch
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

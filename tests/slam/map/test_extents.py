@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.estimation.backend import Belief, Joint
-from slam.extraction.extract import extract
-from slam.extraction.segments import EndKind
-from slam.geometry.lines import normals, through
-from slam.map.extents import WallsConfig
-from slam.map.landmarks import Landmarks
-from slam.map.polylines.change_points import ChangePointsConfig
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import EndKind
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.robot import Scan
 
 SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)
 CONFIG = WallsConfig()

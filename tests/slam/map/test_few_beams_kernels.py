@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.poses import to_world
-from slam.map.kernels.few_beams_kernels import Same, distances, lines_of, paired
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.map.kernels.few_beams_kernels import Same, distances, lines_of, paired
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.extraction.segments import EndKind, Segments
-from slam.geometry.lines import through
-from slam.geometry.poses import to_robot
-from slam.map.existence import ExistenceConfig, LandmarkCandidates
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.extraction.segments import EndKind, Segments
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import to_robot
+from chainslam.slam.map.existence import ExistenceConfig, LandmarkCandidates
+from chainslam.slam.robot import Scan
 
 SIGMA_M = 0.005
 GATE, ANGLE_RAD, LEAST_BEAMS = 0.99, 1.05, 3

@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.association.matching import MatchingConfig
-from slam.estimation.backend import Belief, Joint
-from slam.geometry.lines import directions, normals
-from slam.map.merging import MergingConfig, duplicate_of, lying_along
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.association.matching import MatchingConfig
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.map.merging import MergingConfig, duplicate_of, lying_along
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 CONFIG = MergingConfig()
 twice = partial(duplicate_of, one_wall=MatchingConfig().one_wall)

@@ -8,16 +8,16 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.backends import BACKENDS
-from slam.estimation.backend import Belief
-from slam.geometry.lines import normals, through
-from slam.map.chains import HEAD, TAIL, connect
-from slam.map.kernels.ray_kernels import Watch, between
-from slam.map.openings import Openings, passing
-from slam.map.stochastic_map import StochasticMap
-from slam.mapper import Mapper
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.chains import HEAD, TAIL, connect
+from chainslam.slam.map.kernels.ray_kernels import Watch, between
+from chainslam.slam.map.openings import Openings, passing
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Scan
 
 BEARINGS = np.deg2rad(np.arange(-180.0, 180.0, 2.0))
 

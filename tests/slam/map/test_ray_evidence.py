@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.extraction.config import ExtractionConfig
-from slam.extraction.extract import extract
-from slam.extraction.segments import EndKind, Segments
-from slam.extraction.visible_extent import owners_of_beams, sure_pieces
-from slam.geometry.lines import normals, through
-from slam.map.kernels.ray_evidence import ray_evidence
-from slam.robot import Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.extraction.config import ExtractionConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import EndKind, Segments
+from chainslam.slam.extraction.visible_extent import owners_of_beams, sure_pieces
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.kernels.ray_evidence import ray_evidence
+from chainslam.slam.robot import Scan
 
 
 def faces_of(polygon):

@@ -4,14 +4,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.estimation.backend import Belief, Joint
-from slam.extraction.segments import EndKind, Segments
-from slam.geometry.lines import directions, normals
-from slam.map.extents import WallsConfig
-from slam.map.landmarks import Landmarks
-from slam.map.polylines.change_points import ChangePointsConfig
-from slam.map.records import Records
-from slam.map.reliability import Reliability
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.extraction.segments import EndKind, Segments
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.map.records import Records
+from chainslam.slam.map.reliability import Reliability
 
 SETTINGS = (WallsConfig(), ChangePointsConfig(), 5)
 SUMS = ("observations", "residue")

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.backends import BACKENDS
-from slam.extraction.extract import extract
-from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig
-from slam.extraction.straightness_kernels import edge_cov
-from slam.geometry.poses import compose, inverse
-from slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.extraction.straightness import StraightnessConfig
+from chainslam.slam.extraction.straightness_kernels import edge_cov
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.map.reliability import Reliability, ReliabilityConfig, are_clear, as_told
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 
 SIGMA_M = 0.01
 STEPS = shapely.Polygon([

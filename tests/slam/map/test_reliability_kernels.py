@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.map.kernels.record_kernels import rows_of
-from slam.map.kernels.reliability_kernels import add_fits, add_lengths, as_told, misfits, off_line_cov
+from chainslam.slam.map.kernels.record_kernels import rows_of
+from chainslam.slam.map.kernels.reliability_kernels import add_fits, add_lengths, as_told, misfits, off_line_cov
 
 few = settings(max_examples=50, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

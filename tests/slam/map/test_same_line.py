@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from slam.estimation.backend import Joint
-from slam.map.merging import same_line
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.map.merging import same_line
 
 
 def pair(rng, turn=0.0, offset=0.0):

@@ -5,10 +5,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.geometry.poses import to_world, wrap
-from slam.map.kernels.merging_kernels import lying_along
-from slam.map.kernels.wall_kernels import distances, ends_world
-from slam.map.polylines.kernels.vertex_kernels import Bounds, bends, laid_across, on_segments
+from chainslam.slam.geometry.poses import to_world, wrap
+from chainslam.slam.map.kernels.merging_kernels import lying_along
+from chainslam.slam.map.kernels.wall_kernels import distances, ends_world
+from chainslam.slam.map.polylines.kernels.vertex_kernels import Bounds, bends, laid_across, on_segments
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slam.geometry.poses import compose
-from slam.odometry.diagnosis import composed
-from slam.robot import Odometry
+from chainslam.slam.geometry.poses import compose
+from chainslam.slam.odometry.diagnosis import composed
+from chainslam.slam.robot import Odometry
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import shapely
 
-from experiments.scenario import load_world
-from sim.faults import FaultsConfig
-from sim.lidar import LidarConfig
-from sim.robot import RobotConfig, SimulatedRobot
-from sim.worlds import World
-from slam.estimation.mounting import odometry_of_scanner
-from slam.geometry.poses import compose, inverse
-from slam.odometry.diagnosis import Diagnosis, DiagnosisConfig
-from slam.odometry.robot_faults import Fault, expected, tried_first
-from slam.odometry.scan_matching import told_by_scans
-from slam.robot import MotionCommand, Odometry, ScannerSpec
+from chainslam.experiments.scenario import load_world
+from chainslam.sim.faults import FaultsConfig
+from chainslam.sim.lidar import LidarConfig
+from chainslam.sim.robot import RobotConfig, SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.estimation.mounting import odometry_of_scanner
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.odometry.diagnosis import Diagnosis, DiagnosisConfig
+from chainslam.slam.odometry.robot_faults import Fault, expected, tried_first
+from chainslam.slam.odometry.scan_matching import told_by_scans
+from chainslam.slam.robot import MotionCommand, Odometry, ScannerSpec
 
 ROOMS = load_world("rooms")
 NO_BUDGET = DiagnosisConfig(rescues=10**6)

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from slam.geometry.poses import to_world
-from slam.odometry.field_kernels import LikelihoodField, field_of, score
-from slam.odometry.point_kernels import BESIDE, joined, surface_normals, thinned
-from slam.odometry.point_to_line import Prior, Surfaces, settle
-from slam.odometry.search_kernels import Window, correlate, refine
-from slam.odometry.surface_kernels import NEAREST, normal_equations, sorted_into_buckets, surface_near
+from chainslam.slam.geometry.poses import to_world
+from chainslam.slam.odometry.field_kernels import LikelihoodField, field_of, score
+from chainslam.slam.odometry.point_kernels import BESIDE, joined, surface_normals, thinned
+from chainslam.slam.odometry.point_to_line import Prior, Surfaces, settle
+from chainslam.slam.odometry.search_kernels import Window, correlate, refine
+from chainslam.slam.odometry.surface_kernels import NEAREST, normal_equations, sorted_into_buckets, surface_near
 
 seeds = st.integers(0, 2**32)
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.evaluation.consistency import nees
-from slam.geometry.poses import compose, inverse, wrap
-from slam.odometry import scan_matching
-from slam.odometry.config import ScanMatchingConfig
-from slam.odometry.matched_robot import MatchedRobot
-from slam.odometry.scan_matching import ScanMatcher
-from slam.odometry.search_kernels import Window
-from slam.robot import MotionCommand, Odometry, Robot, Scan, ScannerSpec
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.evaluation.consistency import nees
+from chainslam.slam.geometry.poses import compose, inverse, wrap
+from chainslam.slam.odometry import scan_matching
+from chainslam.slam.odometry.config import ScanMatchingConfig
+from chainslam.slam.odometry.matched_robot import MatchedRobot
+from chainslam.slam.odometry.scan_matching import ScanMatcher
+from chainslam.slam.odometry.search_kernels import Window
+from chainslam.slam.robot import MotionCommand, Odometry, Robot, Scan, ScannerSpec
 
 ROOM = shapely.box(0, 0, 5, 3.5).difference(shapely.box(2, 2, 2.8, 3.5)).difference(shapely.box(4, 0, 5, 0.6))
 CORRIDOR = shapely.box(-50, 0, 50, 2)

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief, Joint
-from slam.map.chains import Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from viz.figures.maps import Picture, draw_map, png
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz.figures.maps import Picture, draw_map, png
 
 
 def picture(closed, size=2.0):

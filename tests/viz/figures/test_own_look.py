@@ -8,8 +8,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from viz.figures.maps import saved
-from viz.figures.plots import draw_nees
+from chainslam.viz.figures.maps import saved
+from chainslam.viz.figures.plots import draw_nees
 
 CURVES = {"full-ekf": np.linspace(0.0, 2.0, 20)}
 
@@ -39,7 +39,10 @@ def test_settings_of_the_user_change_no_figure_and_stay(seed):
 
 
 def test_a_backend_that_is_not_there_is_left_to_those_who_ask_for_it():
-    code = "import os, viz.figures, matplotlib; print(os.environ['MPLBACKEND'], matplotlib.rcParams['backend'].lower())"
+    code = (
+        "import os, chainslam.viz.figures, matplotlib;"
+        " print(os.environ['MPLBACKEND'], matplotlib.rcParams['backend'].lower())"
+    )
     backends = {"module://not_there.backend": "agg", "svg": "svg"}
     for backend, taken in backends.items():
         environment = {**os.environ, "MPLBACKEND": backend, "PYTHONPATH": os.getcwd()}

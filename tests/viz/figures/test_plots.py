@@ -1,9 +1,16 @@
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from viz.figures.maps import saved
-from viz.figures.plots import _dense, draw_model_space, draw_nees, draw_trajectories, draw_traversal, traversals
+from chainslam.slam.backends import BACKENDS
+from chainslam.viz.figures.maps import saved
+from chainslam.viz.figures.plots import (
+    _dense,
+    draw_model_space,
+    draw_nees,
+    draw_trajectories,
+    draw_traversal,
+    traversals,
+)
 
 SQUARE = (np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]),)
 

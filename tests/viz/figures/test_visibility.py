@@ -9,13 +9,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from explore.planning.visibility_graph import NEIGHBOUR, SIGHT
-from slam.estimation.backend import Belief, Joint
-from slam.map.chains import Chain, OpenEnd
-from slam.map.stochastic_map import StochasticMap
-from viz.figures.graph_shapes import CLEAR, beside_m, free_normals, nodes_of
-from viz.figures.maps import png
-from viz.figures.visibility import GraphPicture, draw_graph
+from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.map.chains import Chain, OpenEnd
+from chainslam.slam.map.stochastic_map import StochasticMap
+from chainslam.viz.figures.graph_shapes import CLEAR, beside_m, free_normals, nodes_of
+from chainslam.viz.figures.maps import png
+from chainslam.viz.figures.visibility import GraphPicture, draw_graph
 
 few = settings(max_examples=25, deadline=None, derandomize=True)
 IDS = np.array([3, 5, 8, 120])

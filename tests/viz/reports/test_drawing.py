@@ -2,7 +2,7 @@
 
 import pytest
 
-from viz.reports.drawing import drawing
+from chainslam.viz.reports.drawing import drawing
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 3">'
 BAD = {

@@ -3,7 +3,7 @@
 import numpy as np
 import rerun as rr
 
-from slam.evaluation.consistency import chi2_band
+from chainslam.slam.evaluation.consistency import chi2_band
 
 from ... import palette
 from ..block import Block

@@ -7,8 +7,8 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float, Int
 
-from explore.goal import Goal
-from slam.geometry.lines import normals
+from chainslam.explore.goal import Goal
+from chainslam.slam.geometry.lines import normals
 
 from ... import palette
 from ..block import Block

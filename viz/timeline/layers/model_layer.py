@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from slam.geometry.lines import normals
-from slam.geometry.poses import wrap
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import wrap
 
 from ... import palette
 from ...shapes import VAGUE_RAD, VERTICES, ellipses, hessian_cov

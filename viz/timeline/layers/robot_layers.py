@@ -4,8 +4,8 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import to_world
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import to_world
 
 from ... import palette
 from ...shapes import ellipses, spread

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from explore.step import Step
+from chainslam.explore.step import Step
 
 from ... import palette
 from ..colours import packed

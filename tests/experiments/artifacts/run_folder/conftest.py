@@ -3,7 +3,7 @@
 import jaxtyping
 import pytest
 
-from experiments.commands.cli import main
+from chainslam.experiments.commands.cli import main
 from tests.experiments.artifacts.run_folder.striking import WORDS
 
 

@@ -15,8 +15,8 @@ STRUCK = """
 import os, signal, sys
 from contextlib import contextmanager
 from types import SimpleNamespace
-from experiments.artifacts import running_log
-from experiments.commands import cli, replay
+from chainslam.experiments.artifacts import running_log
+from chainslam.experiments.commands import cli, replay
 
 place, number, nth = sys.argv.pop(1), int(sys.argv.pop(1)), int(sys.argv.pop(1))
 # Under nohup a process is born deaf to SIGHUP.

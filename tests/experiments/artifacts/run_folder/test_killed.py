@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from experiments.artifacts.run_folder import LOCK
-from experiments.artifacts.saved import read_saved
-from experiments.commands.cli import main
+from chainslam.experiments.artifacts.run_folder import LOCK
+from chainslam.experiments.artifacts.saved import read_saved
+from chainslam.experiments.commands.cli import main
 from tests.experiments.artifacts.run_folder.striking import ROOT, WORDS, parts, struck
 from tests.experiments.commands.test_control import timeless
 

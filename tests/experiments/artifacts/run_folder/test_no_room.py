@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from experiments.artifacts.running_log import RunningLog, read_running
-from experiments.commands.cli import main
+from chainslam.experiments.artifacts.running_log import RunningLog, read_running
+from chainslam.experiments.commands.cli import main
 from tests.experiments.artifacts.run_folder.striking import ROOT, WORDS
 from tests.experiments.commands.test_control import timeless
 
@@ -41,7 +41,7 @@ def test_a_folder_that_vanishes_is_one_line_and_status_1(at, tmp_path, capsys, m
 
 
 def test_a_campaign_whose_folder_vanishes_is_one_line_and_status_1(tmp_path, capsys, monkeypatch):
-    from experiments.campaign.store import Store
+    from chainslam.experiments.campaign.store import Store
 
     folder, save = tmp_path / "campaign", Store.save
 
@@ -89,7 +89,16 @@ def test_output_that_nobody_takes_costs_no_results(reader, status, lines, whole,
     os.close(read)
     if reader == "full":
         os.dup2(os.open("/dev/full", os.O_WRONLY), write)
-    command = [sys.executable, "-m", "experiments.commands.cli", *WORDS, "--max-steps", "8", "--out", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "chainslam.experiments.commands.cli",
+        *WORDS,
+        "--max-steps",
+        "8",
+        "--out",
+        str(folder),
+    ]
     ended = subprocess.run(
         command, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=write, stderr=subprocess.PIPE, text=True
     )

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.artifacts import run_folder
-from experiments.artifacts.results import RUN_FILES, config_record, write_results
-from experiments.artifacts.run_folder import LOCK, held, refuse_others, settle
-from experiments.commands.cli import main
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from experiments.usage import UsageError
+from chainslam.experiments.artifacts import run_folder
+from chainslam.experiments.artifacts.results import RUN_FILES, config_record, write_results
+from chainslam.experiments.artifacts.run_folder import LOCK, held, refuse_others, settle
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
 from tests.experiments.artifacts.run_folder.striking import ROOT, WORDS
 from tests.experiments.commands.test_control import timeless
 
@@ -102,7 +102,7 @@ def test_two_runs_on_one_folder_the_second_is_refused(tmp_path, capsys):
 
 def test_a_lock_is_let_go_by_the_kernel_and_missed_in_one_line_where_there_is_none(tmp_path, capsys, monkeypatch):
     holder = (
-        "import os, sys; from pathlib import Path; from experiments.artifacts.run_folder import held\n"
+        "import os, sys; from pathlib import Path; from chainslam.experiments.artifacts.run_folder import held\n"
         "with held(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", holder, str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)})

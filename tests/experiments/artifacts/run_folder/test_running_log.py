@@ -5,12 +5,12 @@ import os
 import numpy as np
 import pytest
 
-from experiments.artifacts import running_log
-from experiments.artifacts.run_folder import FolderGoneError
-from experiments.artifacts.running_log import RunningLog, read_running
-from experiments.scenario import TrialConfig
-from experiments.trial import run_trial
-from experiments.usage import UsageError
+from chainslam.experiments.artifacts import running_log
+from chainslam.experiments.artifacts.run_folder import FolderGoneError
+from chainslam.experiments.artifacts.running_log import RunningLog, read_running
+from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.trial import run_trial
+from chainslam.experiments.usage import UsageError
 
 
 def test_the_stream_holds_every_step_bit_for_bit_and_drops_what_was_cut_short(tmp_path):

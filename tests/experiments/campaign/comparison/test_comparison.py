@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.campaign.comparison.comparison import (
+from chainslam.experiments.campaign.comparison.comparison import (
     AT_MARKS,
     MEASURES,
     Measure,
@@ -17,8 +17,8 @@ from experiments.campaign.comparison.comparison import (
     runs_of,
     select,
 )
-from experiments.campaign.plan import Campaign
-from experiments.scoring import statistics
+from chainslam.experiments.campaign.plan import Campaign
+from chainslam.experiments.scoring import statistics
 
 BACKENDS = ("block-ekf", "full-ekf", "graph")
 STRATEGIES = ("nearest-robot", "nearest-start")

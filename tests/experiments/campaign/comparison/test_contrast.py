@@ -7,13 +7,13 @@ from shutil import copytree
 
 import pytest
 
-from experiments.campaign.contrast import contrast
-from experiments.campaign.pages.contrast_page import verdict
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.store import opened
-from experiments.campaign.work import Done, pack
-from experiments.commands.cli import main
-from experiments.usage import UsageError
+from chainslam.experiments.campaign.contrast import contrast
+from chainslam.experiments.campaign.pages.contrast_page import verdict
+from chainslam.experiments.campaign.plan import Campaign, trials
+from chainslam.experiments.campaign.store import opened
+from chainslam.experiments.campaign.work import Done, pack
+from chainslam.experiments.commands.cli import main
+from chainslam.experiments.usage import UsageError
 from tests.experiments.campaign.running import run
 
 CAMPAIGN = Campaign(("paper-fig4",), ("full-ekf",), ("nearest-robot",), 3, arms=("closed",), max_steps=6)

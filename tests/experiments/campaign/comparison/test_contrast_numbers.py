@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.campaign.comparison.comparison import MEASURES
-from experiments.campaign.contrast import COMPARED, NAMES, contrast, read_contrast
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.scores.score import TrialScores
-from experiments.campaign.store import opened
-from experiments.campaign.work import Done, pack
-from experiments.scoring import statistics
-from experiments.usage import UsageError
+from chainslam.experiments.campaign.comparison.comparison import MEASURES
+from chainslam.experiments.campaign.contrast import COMPARED, NAMES, contrast, read_contrast
+from chainslam.experiments.campaign.plan import Campaign, trials
+from chainslam.experiments.campaign.scores.score import TrialScores
+from chainslam.experiments.campaign.store import opened
+from chainslam.experiments.campaign.work import Done, pack
+from chainslam.experiments.scoring import statistics
+from chainslam.experiments.usage import UsageError
 
 BACKENDS, ARMS = ("block-ekf", "full-ekf"), ("closed", "replay-true")
 CAMPAIGN = Campaign(("paper-fig4",), BACKENDS, ("nearest-robot",), 3, arms=ARMS, max_steps=6)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.campaign.comparison.families import in_family, is_clear
-from experiments.scoring.statistics import FEW_RUNS
+from chainslam.experiments.campaign.comparison.families import in_family, is_clear
+from chainslam.experiments.scoring.statistics import FEW_RUNS
 
 
 def by_definition(values):

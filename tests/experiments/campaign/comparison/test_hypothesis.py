@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.campaign.comparison.hypothesis import MATCHES_WITHIN, hypothesis, verdict
-from experiments.scoring import statistics
-from experiments.scoring.statistics import FEW_RUNS
+from chainslam.experiments.campaign.comparison.hypothesis import MATCHES_WITHIN, hypothesis, verdict
+from chainslam.experiments.scoring import statistics
+from chainslam.experiments.scoring.statistics import FEW_RUNS
 
 CONTENDER, BASELINE = ("nearest-start", "block-ekf"), ("nearest-robot", "full-ekf")
 MARKS = ("10", "20", "33", "end")

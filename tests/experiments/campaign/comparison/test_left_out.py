@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.campaign import store as of_store
-from experiments.campaign.comparison.tables import write_tables
-from experiments.campaign.pages.page import page_of
-from experiments.campaign.plan import Campaign, trials
-from experiments.campaign.store import opened
-from experiments.campaign.work import Done, pack
-from experiments.commands.cli import main
+from chainslam.experiments.campaign import store as of_store
+from chainslam.experiments.campaign.comparison.tables import write_tables
+from chainslam.experiments.campaign.pages.page import page_of
+from chainslam.experiments.campaign.plan import Campaign, trials
+from chainslam.experiments.campaign.store import opened
+from chainslam.experiments.campaign.work import Done, pack
+from chainslam.experiments.commands.cli import main
+from chainslam.viz.reports.report import html, latex
 from studies.exploration.suite import table
 from tests.experiments.campaign.running import run
-from viz.reports.report import html, latex
 
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot",), 3, arms=("closed",), max_steps=4)
 WORDS = (

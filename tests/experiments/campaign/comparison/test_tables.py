@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import chi2, norm
 
-from experiments.campaign.comparison.tables import (
+from chainslam.experiments.campaign.comparison.tables import (
     FIRST,
     GATE,
     band_scores,
@@ -24,10 +24,10 @@ from experiments.campaign.comparison.tables import (
     write_table,
     write_tables,
 )
-from experiments.campaign.plan import Campaign, Trial
-from experiments.campaign.scores.score import TrialScores
-from experiments.scoring.measurements import Z_95
-from experiments.usage import UsageError
+from chainslam.experiments.campaign.plan import Campaign, Trial
+from chainslam.experiments.campaign.scores.score import TrialScores
+from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.usage import UsageError
 
 NAMES = {
     "world": "w", "strategy": "nearest-robot", "backend": "full-ekf", "mode": "closed", "association": "own", "seed": 1,

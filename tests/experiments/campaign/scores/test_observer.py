@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.campaign.scores.observer import (
+from chainslam.experiments.campaign.scores.observer import (
     EVERY_M,
     MARKS_M,
     NEAR_M,
@@ -15,12 +15,12 @@ from experiments.campaign.scores.observer import (
     _lying_on,
     association_counts,
 )
-from experiments.scoring.association import Votes
-from experiments.scoring.beam_votes import UNLABELLED, vote
-from slam.estimation.backend import Joint
-from slam.extraction.segments import Segments
-from slam.geometry.lines import through
-from slam.geometry.poses import inverse, to_world
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.beam_votes import UNLABELLED, vote
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import through
+from chainslam.slam.geometry.poses import inverse, to_world
 from tests.experiments.by_hand import step_of, true_map
 
 SQUARE = np.array([[[0, 0], [5, 0]], [[5, 0], [5, 5]], [[5, 5], [0, 5]], [[0, 5], [0, 0]]], dtype=float)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from experiments.scoring.summary import nees_of_poses
-from slam.geometry.poses import compose, inverse, to_world
+from chainslam.experiments.scoring.summary import nees_of_poses
+from chainslam.slam.geometry.poses import compose, inverse, to_world
 from tests.experiments.campaign.scores.thirteen_steps import (
     COVS,
     OFF,

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from experiments.campaign.scores.innovation import InnovationEar
-from experiments.campaign.scores.observer import Fate, Moment
-from experiments.campaign.scores.score import offsets, record_of, wall_errors
-from experiments.scoring.association import Votes
-from experiments.scoring.coverage import alignment
-from experiments.scoring.summary import nees_of_poses
-from slam.estimation.backend import Joint
-from slam.geometry.poses import inverse, to_world
-from slam.map.chains import OpenEnd
-from slam.map.reliability import ReliabilityConfig
+from chainslam.experiments.campaign.scores.innovation import InnovationEar
+from chainslam.experiments.campaign.scores.observer import Fate, Moment
+from chainslam.experiments.campaign.scores.score import offsets, record_of, wall_errors
+from chainslam.experiments.scoring.association import Votes
+from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.summary import nees_of_poses
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.geometry.poses import inverse, to_world
+from chainslam.slam.map.chains import OpenEnd
+from chainslam.slam.map.reliability import ReliabilityConfig
 from tests.experiments.campaign.scores.thirteen_steps import (
     COVS,
     OFF,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from experiments.campaign.scores.observer import Observer
-from experiments.campaign.scores.score import record_of
-from experiments.trial import TrialResult
+from chainslam.experiments.campaign.scores.observer import Observer
+from chainslam.experiments.campaign.scores.score import record_of
+from chainslam.experiments.trial import TrialResult
 
 N = 13
 RNG = np.random.default_rng(12)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slam.backends.graph.graph import Graph
-from slam.estimation.backend import Observations
-from slam.geometry.poses import J
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.poses import J
 
 P0 = np.diag([0.1, 0.1, np.deg2rad(2.0)]) ** 2
 START = np.array([0.0, -1.0, 0.3])

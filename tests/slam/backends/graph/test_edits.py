@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from slam.backends.graph.batch import GraphBatch
-from slam.backends.graph.graph import Graph
-from slam.estimation.backend import StaleBeliefError
-from slam.robot import Odometry
+from chainslam.slam.backends.graph.batch import GraphBatch
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.estimation.backend import StaleBeliefError
+from chainslam.slam.robot import Odometry
 from tests.slam.backends.trips import ODOMETRY_COV, P0, START, Trip, assert_same, everything
 
 pytestmark = pytest.mark.usefixtures("_unchecked")

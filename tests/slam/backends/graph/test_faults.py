@@ -4,13 +4,13 @@ import gtsam
 import numpy as np
 import pytest
 
-from slam.backends.graph.batch import GraphBatch
-from slam.backends.graph.graph import Graph, UnsolvableError
-from slam.backends.graph.isam import Isam
-from slam.estimation.backend import ContradictionError, Observations
-from slam.geometry.lines import normals
-from slam.geometry.poses import compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.graph.batch import GraphBatch
+from chainslam.slam.backends.graph.graph import Graph, UnsolvableError
+from chainslam.slam.backends.graph.isam import Isam
+from chainslam.slam.estimation.backend import ContradictionError, Observations
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.robot import Odometry
 from tests.slam.backends.trips import (
     HUNDREDTH_DEGREE,
     MILLIMETRE,
@@ -248,7 +248,7 @@ def test_what_gtsam_raises_is_what_is_recovered_from():
     values.insert(gtsam.symbol("x", 0), gtsam.Pose3())
     graph = gtsam.NonlinearFactorGraph()
     graph.push_back(gtsam.PriorFactorPose3(gtsam.symbol("x", 1), gtsam.Pose3(), gtsam.noiseModel.Unit.Create(6)))
-    from slam.backends.graph.graph import FAULTS
+    from chainslam.slam.backends.graph.graph import FAULTS
 
     with pytest.raises(FAULTS):
         isam.update(graph, values)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from slam.backends.graph.batch import GraphBatch
-from slam.backends.graph.config import GraphConfig
-from slam.backends.graph.graph import Graph
-from slam.evaluation.relation_noise import relation_covs
-from slam.evaluation.relations import between
-from slam.geometry.lines import normals
-from slam.geometry.poses import compose, rotation, to_world, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.graph.batch import GraphBatch
+from chainslam.slam.backends.graph.config import GraphConfig
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.evaluation.relation_noise import relation_covs
+from chainslam.slam.evaluation.relations import between
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import compose, rotation, to_world, wrap
+from chainslam.slam.robot import Odometry
 from tests.slam.backends.trips import (
     HUNDREDTH_DEGREE,
     MILLIMETRE,

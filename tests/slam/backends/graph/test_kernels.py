@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends.graph.ahead import Ahead
-from slam.backends.graph.kernels import cov_world, guess, joint_ahead, moved_lines, odometry_noise
-from slam.geometry.lines import normals
-from slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
+from chainslam.slam.backends.graph.ahead import Ahead
+from chainslam.slam.backends.graph.kernels import cov_world, guess, joint_ahead, moved_lines, odometry_noise
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import compose, inverse, rotation, to_robot, to_world, wrap
 
 few = settings(max_examples=20, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from slam.backends.graph.graph import Graph
-from slam.estimation.backend import Observations
-from slam.geometry.lines import directions, normals
-from slam.geometry.poses import compose, to_robot, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.graph.graph import Graph
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import compose, to_robot, wrap
+from chainslam.slam.robot import Odometry
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

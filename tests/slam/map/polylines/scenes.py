@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from sim.lidar import LidarConfig, RangeFinder
-from slam.backends import BACKENDS
-from slam.geometry.poses import compose, inverse
-from slam.mapper import Mapper
-from slam.robot import Odometry, Scan
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.poses import compose, inverse
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Odometry, Scan
 
 SIGMA_M, WALL = 0.01, 7
 AROUND = np.array([[[3.0, -4.0], [3.0, 2.0]], [[3.0, 2.0], [-3.0, 2.0]], [[-3.0, 2.0], [-3.0, -4.0]]])

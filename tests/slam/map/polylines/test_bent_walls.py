@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
 from tests.slam.map.polylines import scenes
 
 

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief
-from slam.estimation.shared import SharedConfig
-from slam.extraction.extract import extract
-from slam.map.polylines.change_points import ChangePoint, ChangePoints, ChangePointsConfig
-from slam.map.polylines.kernels.change_point_kernels import (
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.map.polylines.change_points import ChangePoint, ChangePoints, ChangePointsConfig
+from chainslam.slam.map.polylines.kernels.change_point_kernels import (
     beams_on_lines,
     feet_along,
     places_between,
     surest,
     turns_of_beams,
 )
-from slam.map.polylines.wall_beams import beams_on_walls
-from slam.map.records import Records
-from slam.robot import Scan
+from chainslam.slam.map.polylines.wall_beams import beams_on_walls
+from chainslam.slam.map.records import Records
+from chainslam.slam.robot import Scan
 from tests.slam.map.polylines.scenes import SIGMA_M, WALL, bent, scans
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief, Joint
-from slam.map.extents import WallsConfig
-from slam.map.landmarks import Landmarks
-from slam.map.polylines.change_points import ChangePointsConfig
-from slam.map.polylines.kernels.split_kernels import Fit, best_split, binned, fitted, placed
-from slam.map.polylines.splits import Split, Splits
-from slam.map.records import Records
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.map.polylines.kernels.split_kernels import Fit, best_split, binned, fitted, placed
+from chainslam.slam.map.polylines.splits import Split, Splits
+from chainslam.slam.map.records import Records
 from tests.slam.map.polylines.scenes import WALL
 
 

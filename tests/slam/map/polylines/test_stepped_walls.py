@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from slam.backends import BACKENDS
-from slam.config import MapperConfig
-from slam.estimation.backend import Belief, Joint
-from slam.estimation.shared import SharedConfig
-from slam.extraction.extract import extract
-from slam.map.extents import WallsConfig
-from slam.map.landmarks import Landmarks
-from slam.map.polylines.change_points import ChangePointsConfig
-from slam.map.polylines.wall_beams import beams_on_walls
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.config import MapperConfig
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.estimation.shared import SharedConfig
+from chainslam.slam.extraction.extract import extract
+from chainslam.slam.map.extents import WallsConfig
+from chainslam.slam.map.landmarks import Landmarks
+from chainslam.slam.map.polylines.change_points import ChangePointsConfig
+from chainslam.slam.map.polylines.wall_beams import beams_on_walls
 from tests.slam.map.polylines import scenes
 from tests.slam.map.polylines.scenes import WALL, stepped
 

@@ -5,12 +5,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief, Joint
-from slam.extraction.segments import Segments
-from slam.geometry.lines import directions, through
-from slam.geometry.poses import to_robot, to_world
-from slam.map.polylines import vertices
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.geometry.lines import directions, through
+from chainslam.slam.geometry.poses import to_robot, to_world
+from chainslam.slam.map.polylines import vertices
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 POSE = np.array([1.0, 2.0, 0.7])
 vertices_within = partial(vertices.vertices_within, one_wall=0.9999)
