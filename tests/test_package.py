@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("chainslam", "slam", "explore", "sim", "viz", "experiments")
+ROOMS = ("slam", "explore", "sim", "viz", "experiments")
 pytestmark = pytest.mark.long
 
 
@@ -30,9 +30,9 @@ def sources(tmp_path_factory):
     copy = tmp_path_factory.mktemp("sources")
     listed = run("git", "ls-files", "--cached", "--others", "--exclude-standard", cwd=ROOT).splitlines()
     for name in listed:
-        if (ROOT / name).is_file():
+        if (ROOT / name).is_file() or (ROOT / name).is_symlink():
             (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, copy / name)
+            shutil.copy(ROOT / name, copy / name, follow_symlinks=False)
     return copy
 
 
@@ -77,18 +77,35 @@ def test_what_is_installed_runs_outside_the_checkout(wheel, tmp_path):
         "import sys; from chainslam.experiments.commands.cli import main; sys.exit(main())",
     )
     env = {"OMP_NUM_THREADS": "1", "PYTHONPATH": ""}
-    where = run(python, "-c", "import experiments, sim; print(experiments.__file__, sim.__file__)", cwd=tmp_path, **env)
-    assert [Path(path).is_relative_to(packages) for path in where.split()] == [True, True]
+    assert {path.name for path in packages.iterdir() if path.is_dir()} == {"chainslam", f"{wheel.name[:15]}.dist-info"}
+    for room in ROOMS:  # a user's own packages of these names are not ours
+        (tmp_path / room).mkdir()
+        (tmp_path / room / "__init__.py").write_text("raise ImportError('not ours')\n")
     assert "paper-fig8" in run(python, "-c", code, "worlds", cwd=tmp_path, **env)
     assert run(python, "-c", code, "--version", cwd=tmp_path, **env).startswith("chainslam ")
     run(python, "-c", code, "explore", "paper-fig8", "--max-steps", "20", "--out", "run", cwd=tmp_path, **env)
     assert (tmp_path / "run" / "map.png").is_file()
     run(python, "-c", code, "report", "run", cwd=tmp_path, **env)
     assert (tmp_path / "run" / "report.html").is_file()
-    assert all((packages / room / "py.typed").is_file() for room in ROOMS)
+    assert all((packages / "chainslam" / room / "py.typed").is_file() for room in ROOMS)
     said = run(
         python, "-c", "import chainslam; print(chainslam.__file__, len(chainslam.load('run').map))", cwd=tmp_path, **env
     )
     assert Path(said.split()[0]).is_relative_to(packages)
     assert int(said.split()[1]) > 0
     assert (packages / "../../../bin/chainslam").resolve().is_file() or (packages / "bin" / "chainslam").is_file()
+
+
+def test_editors_see_the_types_of_what_is_installed_for_development(sources, tmp_path):
+    venv.create(tmp_path / "venv", with_pip=False)
+    packages = Path(sysconfig.get_path("purelib", vars={"base": str(tmp_path / "venv")}))
+    pip = (sys.executable, "-m", "pip", "--quiet", "install", "--no-deps", "--no-index", "--no-build-isolation")
+    run(*pip, "--target", packages, "--editable", sources, cwd=tmp_path)
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    (tmp_path / "use.py").write_text(
+        "import chainslam\nfrom chainslam.slam.robot import Scan\nreveal_type(chainslam.explore)\nreveal_type(Scan.take)\n"
+    )
+    python = ("--python-executable", tmp_path / "venv" / "bin" / "python")
+    said = run(sys.executable, "-m", "mypy", "--cache-dir", tmp_path, *python, "use.py", cwd=tmp_path, PYTHONPATH="")
+    assert "-> chainslam.experiments.library.runs.Run" in said
+    assert "Any" not in said.splitlines()[1]
