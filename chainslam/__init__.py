@@ -71,6 +71,8 @@ def __getattr__(name: str) -> Any:
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'chainslam' has no attribute {name!r}")
     value = getattr(import_module(_PLACE_OF[name]), name)
+    if name in ("BACKENDS", "STRATEGIES", "READERS"):
+        import_module("chainslam.experiments.campaign.plugins").register_installed()
     globals()[name] = value
     return value
 

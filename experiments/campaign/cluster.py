@@ -9,7 +9,7 @@ from time import monotonic
 from typing import Any
 
 from ..usage import UsageError
-from .own import with_own
+from .plugins import with_own
 from .runner import Executor, lost
 from .work import Done, Job, perform
 

@@ -8,7 +8,7 @@ from rich.progress import MofNCompleteColumn
 
 from ..artifacts.presets import METHODS
 from ..terminal.progress import bar_of, duration
-from .own import with_own
+from .plugins import with_own
 from .plan import CLOSED, Trial, config_of, recordings, trials
 from .store import Store
 from .work import Done, Job, failed, pack, perform

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, make_dataclass, replace
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from ..artifacts.files import json_bytes
@@ -187,11 +188,22 @@ def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
         # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
         choose("command", words[0], COMMANDS)
     _refuse_empty(words)
+    if words[:1] and words[0] in COMMANDS:
+        from ..campaign.plugins import register_files, register_installed
+
+        register_installed()
+        register_files(_plugins(words))
     classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
     made, output = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
     command = with_files(made)
     asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
     return asked, output
+
+
+def _plugins(words: Sequence[str]) -> list[Path]:
+    """Return the files that --plugin names: what they register is known before anything else is read."""
+    pairs = [(word.partition("=")[0], word.partition("=")[2] or after) for word, after in zip(words, [*words[1:], ""], strict=True)]
+    return [Path(value) for option, value in pairs if option == "--plugin" and value]
 
 
 def _at_home(word: str) -> str:

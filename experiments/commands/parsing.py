@@ -65,10 +65,16 @@ def typed(command: type) -> type:
     """Return a command as it is typed: its readable class, with the options that every command has."""
     told = {"json": "Print what was found as JSON, and no words.", "quiet": "Print nothing but errors."}
     flag = cast(Any, tyro.conf.FlagCreatePairsOff)[bool]
-    common = [
+    common: list[tuple[str, Any, Any]] = [
         (name, Annotated[flag, tyro.conf.arg(help=words, help_behavior_hint="")], field(default=False))
         for name, words in told.items()
     ]
+    plugin = tyro.conf.arg(
+        help="A Python file with back ends, strategies or formats of your own (docs/howto/extend.md); may be given again.",
+        help_behavior_hint="",
+        metavar="FILE",
+    )
+    common.append(("plugin", Annotated[tyro.conf.UseAppendAction[tuple[Path, ...]], plugin], field(default=())))
     bases, own = (readable(command),), {"__doc__": command.__doc__}
     return make_dataclass(command.__name__, common, bases=bases, frozen=True, namespace=own)
 

@@ -17,6 +17,7 @@ from chainslam.slam.robot import Robot, RobotSpec
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..artifacts.settings import drawing_said, options_of
+from ..campaign.plugins import register_installed
 from ..commands.explore import Explore
 from ..commands.replay import Replay
 from ..replays.real_log import RealOptions
@@ -71,6 +72,7 @@ def explore(
     of --set: keys of config.json and their values. `watch` sees every step. Without `out` the files go with the
     returned object. Raises UsageError, in one line, for bad input.
     """
+    register_installed()
     own = None if isinstance(world, str | Path) else world
     name = str(world) if own is None else type(own).__name__
     spec = robot if isinstance(robot, RobotSpec) else None
@@ -138,6 +140,7 @@ def replay(
 
     Returns the run, or with several names the runs by name. Raises UsageError, in one line, for bad input.
     """
+    register_installed()
     names = (backend,) if isinstance(backend, str) else tuple(backend)
     path = file_in(log.folder if isinstance(log, Run) else Path(log), "log.npz")
     command = Replay(path, backend=names, association=association, set=tuple(_words(settings or {})))

@@ -1,0 +1,121 @@
+"""Back ends, strategies and readers of others: found where they are installed or in a file, and taken along to workers."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ..terminal.console import say
+from ..usage import UsageError
+
+if TYPE_CHECKING:
+    from chainslam.explore.strategies import StrategyEntry
+    from chainslam.sim.worlds import DrawingOptions
+    from chainslam.sim.worlds.drawing import Drawing
+    from chainslam.slam.backends import BackendEntry
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+GROUPS = {
+    "chainslam.backends": ("chainslam.slam.backends", "BACKENDS"),
+    "chainslam.strategies": ("chainslam.explore.strategies", "STRATEGIES"),
+    "chainslam.world_formats": ("chainslam.sim.worlds.registry", "READERS"),
+}
+"""Groups of entry points, by which a distribution says what it adds, and the registry of each: loaded where used."""
+_looked: list[bool] = []
+
+
+@dataclass(frozen=True)
+class OwnEntries:
+    """What is registered besides what comes along."""
+
+    backends: dict[str, BackendEntry]
+    strategies: dict[str, StrategyEntry]
+    readers: dict[str, Callable[[Path, DrawingOptions], Drawing]]
+
+
+def register_installed() -> None:
+    """Register what other distributions bring, once; tell what cannot be, and leave it out."""
+    if _looked:
+        return
+    _looked.append(True)
+    for group, place in GROUPS.items():
+        for point in entry_points(group=group):
+            known = _registry(*place)
+            try:
+                if point.name in known:
+                    raise ValueError(f"the name {point.name} is taken")
+                known[point.name] = point.load()
+            except Exception as error:  # whatever a stranger's module raises
+                whose = f" of {point.dist.name}" if point.dist else ""
+                say(f"chainslam: left out the plug-in {point.value}{whose}: {_named(error)}", stderr=True)
+
+
+def register_files(paths: Iterable[Path]) -> None:
+    """Run Python files that register something of their own; raises UsageError, in one line, where one cannot be."""
+    for path in paths:
+        name = f"chainslam_plugin_{path.stem}"
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None:
+            raise UsageError(f"expected a Python file (--plugin), found {path.name}: name one that ends in .py")
+        module, before = importlib.util.module_from_spec(spec), own_entries()
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:  # whatever a stranger's module raises
+            raise UsageError(
+                f"expected a plug-in that can be loaded, found {path.name}, which raises {_named(error)}: correct it"
+            ) from error
+        if own_entries() == before:
+            raise UsageError(
+                f"expected a plug-in that registers something, found {path.name}, which adds nothing to"
+                " chainslam.BACKENDS, STRATEGIES or READERS: see docs/howto/extend.md"
+            )
+        _take_along(module)
+
+
+def own_entries() -> OwnEntries:
+    """Return what is registered in this process beyond what comes along."""
+    return OwnEntries(
+        *(
+            {name: entry for name, entry in _registry(*place).items() if name not in _registry(place[0], "BUILT_IN")}
+            for place in GROUPS.values()
+        )
+    )
+
+
+def with_own(perform: Callable[[Task], Result]) -> Callable[[Task], Result]:
+    """Return what performs a task in another process as this one would, with all that is registered here."""
+    own = own_entries()
+    return perform if own == OwnEntries({}, {}, {}) else partial(_registered, own, perform)
+
+
+def _registered(own: OwnEntries, perform: Callable[[Task], Result], task: Task) -> Result:
+    for place, entries in zip(GROUPS.values(), (own.backends, own.strategies, own.readers), strict=True):
+        _registry(*place).update(entries)
+    return perform(task)
+
+
+def _take_along(module: ModuleType) -> None:
+    """Have a module sent to workers itself: they could not import it by its name."""
+    from joblib.externals import cloudpickle
+
+    cloudpickle.register_pickle_by_value(module)
+    if other := sys.modules.get("cloudpickle"):  # that of Dask, where it is in use
+        other.register_pickle_by_value(module)
+
+
+def _registry(module: str, name: str) -> Any:
+    return getattr(import_module(module), name)
+
+
+def _named(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
