@@ -89,5 +89,9 @@ class _Interface(ModuleType):
         if not (name in _PLACE_OF and isinstance(value, ModuleType)):
             super().__setattr__(name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another process gets this package: it imports it."""
+        return import_module, (self.__name__,)
+
 
 sys.modules[__name__].__class__ = _Interface

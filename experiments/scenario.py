@@ -1,13 +1,13 @@
 """From the names in a command to a world, a robot, a back end and a strategy."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import shapely
 from jaxtyping import Float
-from msgspec import Meta
+from msgspec import Meta, ValidationError, convert
 
 from chainslam.explore.limits import Limits
 from chainslam.explore.mission import MissionConfig
@@ -27,7 +27,7 @@ from chainslam.slam.odometry.matched_robot import MatchedRobot
 from chainslam.slam.odometry.scan_matching import ScanMatcher
 from chainslam.slam.robot import Robot, fitted
 
-from .usage import UsageError, choose, did_you_mean
+from .usage import OR_OWN, UsageError, choose, did_you_mean
 
 P0 = Literal["zero", "small", "large"]
 OdometrySource = Literal["wheels", "scans"]
@@ -150,12 +150,35 @@ def strategy_of(words: str) -> Strategy:
 
 
 def check(config: TrialConfig) -> None:
-    """Raise UsageError for names that are in no registry and numbers out of range, before anything is computed."""
-    if wrong := fault(config):
-        raise UsageError(f"expected settings of a trial, found {wrong}: docs/settings.md names all")
-    choose("back end", config.backend, BACKENDS)
+    """Raise UsageError for numbers out of range and names that are in no registry, before anything is computed."""
+    check_settings(config)
+    choose("back end", config.backend, BACKENDS, OR_OWN)
+    _check_own(config.backend_options)
     if config.strategy != STRATEGY_OF_REPLAYS:
         strategy_of(config.strategy)
+
+
+def _check_own(options: BackendOptions) -> None:
+    """Raise UsageError for options of back ends of others that are in none of these, or of another kind."""
+    kinds = {entry.options.__name__: entry.options for entry in BACKENDS.values() if entry.options}
+    for name, said in options.own.items():
+        key = f"backend_options.own.{name}"
+        kind = kinds.get(name)
+        if kind is None:
+            raise UsageError(f"expected the class of a back end's options, found {key}: {OR_OWN}")
+        known = [each.name for each in fields(kind)]
+        for each in said:
+            choose(f"key of {key}", each, known)
+        try:
+            convert(said, kind)
+        except ValidationError as error:
+            raise UsageError(f"expected options of {name}, found {key}: {error}") from error
+
+
+def check_settings(config: TrialConfig) -> None:
+    """Raise UsageError for what cannot be in any run, whatever its back end and strategy are."""
+    if wrong := fault(config):
+        raise UsageError(f"expected settings of a trial, found {wrong}: docs/settings.md names all")
     choose("start covariance (--p0)", config.p0, P0_SIGMAS)
     if config.seed > SEED_MAX:  # a schema's numbers have 63 bits
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+OR_OWN = "choose one of these, or name the file of your own with --plugin"
 LONGEST = 100
 """More letters than this are no typo."""
 
@@ -14,12 +15,12 @@ class UsageError(ValueError):
     """What the command ends in."""
 
 
-def choose(kind: str, name: str, known: Iterable[str]) -> str:
+def choose(kind: str, name: str, known: Iterable[str], remedy: str = "choose one of these") -> str:
     """Return `name` if it is known; raises UsageError otherwise."""
     names = list(known)
     if name not in names:
         near = did_you_mean(name, names)
-        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}{near}: choose one of these")
+        raise UsageError(f"expected a {kind} out of {', '.join(names)}, found {name!r}{near}: {remedy}")
     return name
 
 

@@ -13,8 +13,8 @@ from chainslam.slam.backends import BACKENDS
 from ..artifacts.presets import METHODS, backend_of, mapping_of
 from ..artifacts.settings import NAVIGATION, nested, trial_of
 from ..replays.replay import Association
-from ..scenario import P0, TrialConfig, check
-from ..usage import UsageError, choose
+from ..scenario import P0, TrialConfig, check_settings
+from ..usage import OR_OWN, UsageError, choose
 
 CLOSED, RECORDING = "closed", "recording"
 ARMS = (CLOSED, "replay-own", "replay-true")
@@ -195,11 +195,18 @@ def check_campaign(campaign: Campaign) -> None:
             f"expected at most {MOST_TRIALS:,} trials in a campaign, found {cells} cells of {campaign.trials:,}: run"
             " several with other --first-seed and put them together with --merge"
         )
-    choose("back end (--driver)", campaign.driver, BACKENDS)
     for world, strategy, backend in product(campaign.worlds, campaign.strategies, campaign.backends):
-        choose("strategy", strategy, STRATEGIES)
         for seed in (campaign.first_seed, campaign.seeds[-1]):
-            check(config_of(campaign, Trial(world, strategy, backend, CLOSED, seed)))
+            check_settings(config_of(campaign, Trial(world, strategy, backend, CLOSED, seed)))
+
+
+def check_parts(campaign: Campaign) -> None:
+    """Raise UsageError where a back end or strategy is not there: trials need it, what they left does not."""
+    choose("back end (--driver)", campaign.driver, BACKENDS, OR_OWN)
+    for backend in campaign.backends:
+        choose("back end", backend, BACKENDS, OR_OWN)
+    for strategy in campaign.strategies:
+        choose("strategy", strategy, STRATEGIES, OR_OWN)
 
 
 def world_digests(campaign: Campaign) -> dict[str, str]:

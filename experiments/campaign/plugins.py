@@ -1,4 +1,4 @@
-"""Back ends, strategies and readers of others: found where they are installed or in a file, and taken along to workers."""
+"""Back ends, strategies and readers of others: found where installed or in a file, and taken along to workers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..terminal.console import say
@@ -66,6 +65,8 @@ def register_files(paths: Iterable[Path]) -> None:
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None:
             raise UsageError(f"expected a Python file (--plugin), found {path.name}: name one that ends in .py")
+        if not path.is_file():
+            raise UsageError(f"expected a Python file (--plugin), found no {path.name}: name one that exists")
         module, before = importlib.util.module_from_spec(spec), own_entries()
         sys.modules[name] = module
         try:
@@ -79,7 +80,9 @@ def register_files(paths: Iterable[Path]) -> None:
                 f"expected a plug-in that registers something, found {path.name}, which adds nothing to"
                 " chainslam.BACKENDS, STRATEGIES or READERS: see docs/howto/extend.md"
             )
-        _take_along(module)
+        import cloudpickle
+
+        cloudpickle.register_pickle_by_value(module)  # no worker could import it by its name
 
 
 def own_entries() -> OwnEntries:
@@ -102,15 +105,6 @@ def _registered(own: OwnEntries, perform: Callable[[Task], Result], task: Task) 
     for place, entries in zip(GROUPS.values(), (own.backends, own.strategies, own.readers), strict=True):
         _registry(*place).update(entries)
     return perform(task)
-
-
-def _take_along(module: ModuleType) -> None:
-    """Have a module sent to workers itself: they could not import it by its name."""
-    from joblib.externals import cloudpickle
-
-    cloudpickle.register_pickle_by_value(module)
-    if other := sys.modules.get("cloudpickle"):  # that of Dask, where it is in use
-        other.register_pickle_by_value(module)
 
 
 def _registry(module: str, name: str) -> Any:

@@ -8,8 +8,8 @@ from rich.progress import MofNCompleteColumn
 
 from ..artifacts.presets import METHODS
 from ..terminal.progress import bar_of, duration
-from .plugins import with_own
 from .plan import CLOSED, Trial, config_of, recordings, trials
+from .plugins import with_own
 from .store import Store
 from .work import Done, Job, failed, pack, perform
 from .workers import on_workers

@@ -202,7 +202,10 @@ def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
 
 def _plugins(words: Sequence[str]) -> list[Path]:
     """Return the files that --plugin names: what they register is known before anything else is read."""
-    pairs = [(word.partition("=")[0], word.partition("=")[2] or after) for word, after in zip(words, [*words[1:], ""], strict=True)]
+    pairs = [
+        (word.partition("=")[0], word.partition("=")[2] or after)
+        for word, after in zip(words, [*words[1:], ""], strict=True)
+    ]
     return [Path(value) for option, value in pairs if option == "--plugin" and value]
 
 

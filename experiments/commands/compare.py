@@ -22,7 +22,18 @@ from ..campaign.contrast import contrast, read_contrast
 from ..campaign.merge import merge
 from ..campaign.pages.contrast_page import verdict
 from ..campaign.pages.film import record_campaign
-from ..campaign.plan import ARMS, CLOSED, DECIDED, MAX_STEPS, PRESETS, Campaign, check_campaign, drawing_of, trials
+from ..campaign.plan import (
+    ARMS,
+    CLOSED,
+    DECIDED,
+    MAX_STEPS,
+    PRESETS,
+    Campaign,
+    check_campaign,
+    check_parts,
+    drawing_of,
+    trials,
+)
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened
 from ..replays.replay import Association
@@ -142,6 +153,7 @@ class Compare:
             return self._of_others()
         campaign = self.campaign
         check_campaign(campaign)
+        check_parts(campaign)
         most = JOBS_A_CORE * len(os.sched_getaffinity(0))
         if self.jobs is not None and not 1 <= self.jobs <= most:
             raise UsageError(

@@ -32,7 +32,7 @@ NO_NUMBER = re.compile(
 BOX = " |│╭╮╰╯─+\n"
 """What tyro draws boxes with; where there are no letters for them, it draws lines of dashes."""
 HELP = "-h", "--help"
-COMMON = "--json", "--quiet"
+COMMON = "--json", "--quiet", "--plugin"
 MISSING = re.compile(r"Missing from [^:]*: (--\S+ \S+|\S+)|Missing value for argument '(\w+)'")
 """How tyro says that a word is not there."""
 
@@ -70,7 +70,7 @@ def typed(command: type) -> type:
         for name, words in told.items()
     ]
     plugin = tyro.conf.arg(
-        help="A Python file with back ends, strategies or formats of your own (docs/howto/extend.md); may be given again.",
+        help="Back ends, strategies or formats of your own: a Python file (docs/howto/extend.md); may be given again.",
         help_behavior_hint="",
         metavar="FILE",
     )

@@ -29,7 +29,7 @@ from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
 from ..terminal.measured_tables import print_references
 from ..terminal.progress import print_comparison, print_recorded, progress
 from ..trial import TrialResult
-from ..usage import UsageError, choose
+from ..usage import OR_OWN, UsageError, choose
 from ..views.timelines import TimelineOutput
 
 
@@ -90,7 +90,7 @@ class Replay:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         for name in self.backend:
-            choose("back end", name, BACKENDS)
+            choose("back end", name, BACKENDS, OR_OWN)
         references = read_references(self.relations, self.reference)
         source = self.source()
         check_references(references, *source.odometry)

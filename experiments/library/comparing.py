@@ -16,7 +16,8 @@ from ..artifacts.settings import drawing_said, options_of
 from ..campaign.cluster import on_dask
 from ..campaign.comparison.story import story_of
 from ..campaign.comparison.tables import write_tables
-from ..campaign.plan import check_campaign, drawing_of, trials
+from ..campaign.plan import check_campaign, check_parts, drawing_of, trials
+from ..campaign.plugins import register_installed
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened, read_campaigns
 from ..commands.compare import Compare
@@ -99,6 +100,7 @@ def compare(
     stopped.
     Raises UsageError, in one line, for bad input.
     """
+    register_installed()
     home: Home | None = None
     if out is None:
         home = Home()
@@ -116,6 +118,7 @@ def compare(
     )  # fmt: skip
     campaign = command.campaign
     check_campaign(campaign)
+    check_parts(campaign)
     for world in campaign.worlds:
         load_world(world, drawing=drawing_of(campaign))
     with opened(command.out, campaign) as store:

@@ -1,7 +1,7 @@
 """Pictures for papers from the folders that runs left.
 
-`python -m chainslam.experiments.views.pictures DIR ... --out PICTURES`: paths and NEES of several folders (replays of one log) come together; the map, the visibility graph, the model space and
-the traversals are of the first.
+`python -m chainslam.experiments.views.pictures DIR ... --out PICTURES`: paths and NEES of several folders (replays of
+one log) come together; the map, the visibility graph, the model space and the traversals are of the first.
 """
 
 import csv

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import convert
 
 from ..estimation.backend import Backend
 from .graph.config import GraphConfig
@@ -21,6 +22,13 @@ class BackendOptions:
     """Of every Kalman filter."""
     graph: GraphConfig = field(default_factory=GraphConfig)
     """Of both factor graphs."""
+    own: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Of back ends that do not come along: by the name of the class of their options, and the name of each option."""
+
+    def of(self, kind: type) -> Any:
+        """Return the options of a class; raises msgspec.ValidationError for values that are not of it."""
+        known = next((each for each in vars(self).values() if type(each) is kind), None)
+        return convert(self.own.get(kind.__name__, {}), kind) if known is None else known
 
 
 @dataclass(frozen=True)
@@ -31,7 +39,7 @@ class BackendEntry:
     """Makes one from the first pose, its covariance and, if it has some, its options."""
     description: str
     options: type | None = None
-    """Type of its options, one of those in `BackendOptions`."""
+    """A dataclass of its options: its maker takes one after the pose and its covariance (`BackendOptions`)."""
     covariance: Literal["exact", "blocks", "bound"] = "exact"
     """What its covariance is: that of its errors to first order; what is left of it where correlations are dropped; or
     a bound of it, whatever the correlations are."""
@@ -50,8 +58,7 @@ class BackendEntry:
         options: BackendOptions = BackendOptions(),
     ) -> Backend:
         """Return a back end at a pose with its covariance and an empty map."""
-        own = [each for each in vars(options).values() if type(each) is self.options]
-        return self.kind(pose_world, pose_cov, *own)
+        return self.kind(pose_world, pose_cov, *([] if self.options is None else [options.of(self.options)]))
 
 
 def _lazily(module: str, name: str) -> Callable[..., Backend]:

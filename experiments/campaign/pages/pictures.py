@@ -97,7 +97,7 @@ def coverage_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[Page
                 share = np.interp(metres, arrays["coverage_path_m"], arrays["coverage"])
                 shares.setdefault(strategy, []).append(share)
             curves = {strategy: (metres, np.mean(found, axis=0)) for strategy, found in shares.items()}
-            colours = {strategy: palette.of_rank(k) for k, strategy in enumerate(STRATEGIES)}
+            colours = {strategy: palette.of_rank(k) for k, strategy in enumerate(dict.fromkeys((*STRATEGIES, *curves)))}
             title = f"{world_key(world)}, {backend}: mean of {len(runs) // len(curves)} trials a strategy"
             caption = f"{world_key(world)}: share of the reachable contour mapped, against the way driven"
             pictures.append(PagePicture(png(draw_coverage(curves, colours, title)), caption))
