@@ -165,3 +165,32 @@ def test_every_verb_makes_a_belief_stale_but_those_that_do_nothing(make_walls):
             verb()
     assert backend.belief is belief
     belief.joint(ids[3:])
+
+
+def test_a_map_that_begins_in_the_blind_is_at_its_first_sight_what_whole_matrices_say(make_walls):
+    """It has a frame of its own, but what is told of it is in the world's."""
+    backend, plain, new = FullEkf(START, P0), Plain(EkfConfig()), make_walls().look(START, np.arange(3))
+    for each in (backend, plain):
+        each.predict(ODOMETRY)
+    ids = backend.grow(*new)
+    plain.grow(ids, *new)
+    belief = backend.belief
+    joint = belief.joint(ids)
+    np.testing.assert_allclose(joint.mean, plain.x, atol=1e-12)
+    np.testing.assert_allclose(joint.cov, plain.P, atol=1e-15)
+    np.testing.assert_allclose(joint.anchors, plain.anchors, atol=1e-12)
+    np.testing.assert_allclose(belief.pose_world, plain.x[:3], atol=1e-12)
+    np.testing.assert_allclose(belief.pose_cov, plain.P[:3, :3], atol=1e-15)
+    np.testing.assert_allclose(belief.anchors, plain.anchors, atol=1e-12)
+    np.testing.assert_allclose(belief.means.ravel(), plain.x[3:], atol=1e-12)
+
+
+def test_a_merge_takes_its_jacobian_where_the_filter_has_it_taken(make_walls):
+    backend, asked, given = FullEkf(START, P0), [], []
+    ids = backend.grow(*make_walls().look(START, np.arange(3)))
+    backend._align = lambda rows: asked.append(rows.tolist()) or 0.7
+    backend._condition = given.append
+    means, anchors = backend.belief.means, backend.belief.anchors
+    backend.merge(ids[2], ids[0])
+    assert asked == [[2, 0]]
+    np.testing.assert_array_equal(given[0].H, equality(means[[2, 0]], anchors[[2, 0]], 0.7)[0])
