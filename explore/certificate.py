@@ -99,7 +99,7 @@ def certify(
     """
     found = contours(step.map, step.chains)
     floor = floor_of(found)
-    kept = step.free_space.evidence.size > 0
+    kept = bool(step.free_space.evidence.size)
     return Certificate(
         outcome,
         found,
@@ -119,7 +119,7 @@ def contours(walls: StochasticMap, chains: tuple[Chain, ...]) -> tuple[ClosedCon
         if not chain.is_closed:
             continue
         # A slab of two walls has no area between its two corners, only between its four ends.
-        ends = walls.ends_world[walls.belief.rows(chain.walls)].reshape(-1, 2)
+        ends = np.concatenate(walls.ends_world[walls.belief.rows(chain.walls)])
         for ring in (chain.corners_world, ends):
             polygon = _valid(ring)
             if polygon is not None:
@@ -140,7 +140,7 @@ def _valid(ring: Float[np.ndarray, "n 2"]) -> shapely.Polygon | None:
         return None
     parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapely.Polygon(ring))))
     areas = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > LEAST_AREA_M2]
-    return orient(shapely.Polygon(max(areas, key=lambda part: part.area).exterior), 1.0) if areas else None
+    return orient(shapely.Polygon(max(areas, key=lambda part: part.area).exterior)) if areas else None
 
 
 def floor_of(found: tuple[ClosedContour, ...]) -> shapely.Polygon | shapely.MultiPolygon:

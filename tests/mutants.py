@@ -22,8 +22,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "results" / "mutants"
 ROOMS = ("slam", "explore", "sim", "viz", "experiments")
-BUDGET_S = 900.0
-"""What a module may take; what was not tried by then is counted as such, and the next run goes on with it."""
+READ = ("chainslam", "examples")
+"""What tests read beside: it is copied and never changed."""
 FAILED, ENDLESS, SURVIVED = {1, 3}, {24, 36, 152, 255, -24, -9, -11}, {0, 5, 33}
 """Exit codes that mutmut keeps: a test failed; none came to its end; none failed, or none comes by."""
 KILLED = FAILED | ENDLESS
@@ -31,6 +31,7 @@ CONFIG = """
 [tool.mutmut]
 source_paths = {rooms}
 only_mutate = ["{path}"]
+also_copy = {read}
 pytest_add_cli_args_test_selection = {tests}
 timeout_multiplier = 5.0
 timeout_constant = 10.0
@@ -89,13 +90,14 @@ def modules() -> dict[str, dict]:
     return found
 
 
-def run(module: str, group: str, tests: list[str]) -> Result:
-    """Try the mutants of one module that have no result yet."""
+def run(module: str, group: str, tests: list[str], budget_s: float) -> Result:
+    """Try the mutants of one module that have no result yet, for so long."""
     folder, path = RESULTS / module, f"{module.replace('.', '/')}.py"
     folder.mkdir(parents=True, exist_ok=True)
-    for room in (*ROOMS, "tests"):
+    for room in (*ROOMS, *READ, "tests"):
         copy(ROOT / room, folder / room)
-    (folder / "pyproject.toml").write_text(CONFIG.format(rooms=json.dumps(ROOMS), path=path, tests=json.dumps(tests)))
+    lists = {name: json.dumps(each) for name, each in (("rooms", ROOMS), ("read", READ), ("tests", tests))}
+    (folder / "pyproject.toml").write_text(CONFIG.format(path=path, **lists))
     forget_survivors(folder, path)
     began = time.monotonic()
     # Forked workers inherit what was imported, but no threads: BLAS must not have started any.
@@ -106,7 +108,7 @@ def run(module: str, group: str, tests: list[str]) -> Result:
             command, cwd=folder, env=environment, stdout=said, stderr=said, start_new_session=True
         )
         try:
-            status = process.wait(BUDGET_S)
+            status = process.wait(budget_s)
             if status:
                 raise SystemExit(f"mutmut ended with status {status}: see {folder / 'said.txt'}")
         except (subprocess.TimeoutExpired, KeyboardInterrupt) as stopped:
@@ -141,7 +143,7 @@ def copy(source: Path, target: Path) -> None:
 def forget_survivors(folder: Path, path: str) -> None:
     """Have those tried again that survived or did not end, where anything but times has changed since."""
     digest, seen = hashlib.sha256(), folder / "digest"
-    for file in sorted(file for room in (*ROOMS, "tests") for file in (folder / room).rglob("*.*")):
+    for file in sorted(file for room in (*ROOMS, *READ, "tests") for file in (folder / room).rglob("*.*")):
         digest.update(file.read_bytes())
     meta = folder / "mutants" / f"{path}.meta"
     if meta.exists() and (not seen.exists() or seen.read_text() != digest.hexdigest()):
@@ -193,6 +195,13 @@ def survivors(result: Result) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("modules", nargs="*", choices=[[], *modules()], metavar="MODULE", default=[])
+    parser.add_argument(
+        "--budget",
+        type=float,
+        default=900.0,
+        metavar="S",
+        help="seconds for a module; what was not tried by then is counted as such, and the next run goes on with it",
+    )
     parser.add_argument("--table", action="store_true", help="print the last results as a table")
     parser.add_argument("--survivors", action="store_true", help="print what was changed where no test failed")
     chosen = parser.parse_args()
@@ -205,7 +214,7 @@ def main() -> None:
     else:
         os.nice(15)
         for module in chosen.modules or modules():
-            print(told(run(module, **modules()[module])), flush=True)
+            print(told(run(module, **modules()[module], budget_s=chosen.budget)), flush=True)
 
 
 if __name__ == "__main__":

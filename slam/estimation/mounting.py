@@ -36,7 +36,7 @@ def scanner_poses(poses_world: Float[np.ndarray, "n 3"], scanner: ScannerSpec) -
     """Return where the scanner of a body at each of some poses is."""
     if scanner.is_at_axle:
         return poses_world
-    return np.array([compose(pose, scanner.pose_robot) for pose in poses_world]).reshape(-1, 3)
+    return np.array([compose(pose, scanner.pose_robot) for pose in poses_world]).reshape(poses_world.shape)
 
 
 def body_poses(poses_world: Float[np.ndarray, "n 3"], scanner: ScannerSpec) -> Float[np.ndarray, "n 3"]:
@@ -44,7 +44,7 @@ def body_poses(poses_world: Float[np.ndarray, "n 3"], scanner: ScannerSpec) -> F
     if scanner.is_at_axle:
         return poses_world
     offset = inverse(scanner.pose_robot)
-    return np.array([compose(pose, offset) for pose in poses_world]).reshape(-1, 3)
+    return np.array([compose(pose, offset) for pose in poses_world]).reshape(poses_world.shape)
 
 
 def odometry_of_scanner(odometry: Odometry, scanner: ScannerSpec) -> Odometry:

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from chainslam.sim.chance import Chance, Channel
-from chainslam.sim.drive import Slip, clamp, draw_slip, odometry, true_motion
-from chainslam.slam.geometry.poses import arc
-from chainslam.slam.robot import MotionCommand, RobotSpec
+from sim.chance import Chance, Channel
+from sim.drive import Slip, clamp, draw_slip, odometry, seconds, true_motion
+from slam.geometry.poses import arc
+from slam.robot import MotionCommand, RobotSpec
 
 ROBOT = RobotSpec()
 CONFIG = ROBOT.wheels
@@ -24,6 +26,21 @@ def test_without_slip_the_true_motion_is_the_commanded_arc(command):
     motion = true_motion(command, Slip(0.0, 0.0, 0.0), CONFIG, WHOLE)[0]
     np.testing.assert_allclose(motion, arc(command.forward_m, command.turn_rad), atol=1e-15)
     np.testing.assert_allclose(odometry(command, CONFIG).motion, motion, atol=1e-15)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_share_of_a_slipping_step_is_a_step_of_shares(command):
+    """Half of the way turns half as far: each part of command and slip is that share of it."""
+    slip, shares = Slip(0.011, -0.007, 0.005), np.array([0.25, 0.5, 1.0])
+    part = lambda of, share: type(of)(*(share * value for value in vars(of).values()))  # noqa: E731
+    expected = [true_motion(part(command, share), part(slip, share), CONFIG, WHOLE)[0] for share in shares]
+    np.testing.assert_allclose(true_motion(command, slip, CONFIG, shares), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(("way", "turn"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.5), (0.1, -0.2), (-0.1, -0.2)])
+def test_a_step_takes_as_long_as_its_faster_wheel_needs(way, turn):
+    farthest = abs(way) + 0.5 * CONFIG.base_m * abs(turn)
+    assert seconds(MotionCommand(way, turn), CONFIG, 0.25) == pytest.approx(4.0 * farthest)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -65,6 +82,18 @@ def test_clamping_keeps_the_arc_and_shortens_it(command):
     assert abs(short.turn_rad) <= ROBOT.turn_rad * (1 + 1e-12)
     assert short.forward_m * command.turn_rad == pytest.approx(command.forward_m * short.turn_rad)
     assert clamp(short, ROBOT).forward_m == pytest.approx(short.forward_m)
+
+
+def test_a_command_within_what_the_robot_can_do_stays_as_it_is():
+    for command in COMMANDS:
+        assert clamp(command, replace(ROBOT, can_reverse=True)) == command
+
+
+def test_a_robot_that_cannot_reverse_turns_on_the_spot_and_drives_ahead_as_any_other():
+    onward = replace(ROBOT, can_reverse=False)
+    assert clamp(MotionCommand(-0.05, 0.1), onward) == MotionCommand(0.0, 0.1)
+    assert clamp(MotionCommand(-99.0, 0.1), onward) == MotionCommand(0.0, 0.1)
+    assert clamp(MotionCommand(0.05, 0.1), onward) == MotionCommand(0.05, 0.1)
 
 
 def test_a_command_that_is_not_finite_is_refused():

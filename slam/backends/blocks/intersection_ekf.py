@@ -77,7 +77,6 @@ class IntersectionMap(BlockMap):
         P[0], P[1:, :2, :2] = self.pose_cov - self._fresh, self.covs[model.rows]
         H[0], H[1:, :, :2] = model.H[:, :POSE], model.H[:, POSE:].reshape(k, u, 2).swapaxes(0, 1)
         T[np.arange(u + 1), np.arange(u + 1)] = np.eye(POSE)
-        T[1:, :, 2, 2] = 0.0
         return P, H, T
 
 

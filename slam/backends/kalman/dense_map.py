@@ -27,9 +27,8 @@ class DenseMap:
         self._next_id = 0
         self._slots = np.zeros(0, dtype=np.int64)
         self._free: list[int] = []
-        self._x = np.array(pose_world, dtype=np.float64)
-        self._P = np.array(pose_cov, dtype=np.float64, order="F")
-        self._reserve(SPARE)
+        self._x, self._P = pose_world, pose_cov
+        self._reserve(SPARE)  # Has both in arrays of its own.
 
     @property
     def pose_world(self) -> Float[np.ndarray, "3"]:

@@ -1,6 +1,7 @@
 """Textbook, iterated, unscented and intersection filters against slow algebra, optimisers and sampling."""
 
 import runpy
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,17 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import chainslam
-from chainslam.slam.backends import BACKENDS, BackendOptions
-from chainslam.slam.backends.iterated_ekf import IteratedEkf
-from chainslam.slam.backends.kalman.config import EkfConfig
-from chainslam.slam.backends.oc_ekf import unseen
-from chainslam.slam.backends.textbook_ekf import TextbookEkf
-from chainslam.slam.backends.ukf import unscented
-from chainslam.slam.estimation.backend import Observations
-from chainslam.slam.estimation.models import innovations, lines_robot
-from chainslam.slam.geometry.poses import compose, wrap
-from chainslam.slam.robot import Odometry
+from slam.backends import BACKENDS, BackendOptions
+from slam.backends.full_ekf import FullEkf
+from slam.backends.iterated_ekf import IteratedEkf
+from slam.backends.kalman.config import EkfConfig
+from slam.backends.oc_ekf import unseen
+from slam.backends.textbook_ekf import TextbookEkf
+from slam.backends.ukf import unscented
+from slam.estimation.backend import Observations
+from slam.estimation.models import innovations, lines_robot
+from slam.geometry.poses import compose, wrap
+from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
@@ -124,6 +126,16 @@ def test_the_iterated_filters_update_is_the_least_squares_solution(seed, make_wa
     cov = np.linalg.inv(found.jac.T @ found.jac)
     sigma = np.sqrt(np.diag(cov))
     np.testing.assert_allclose((after.cov - cov) / np.outer(sigma, sigma), 0.0, atol=1e-4)
+
+
+def test_without_linearising_anew_the_iterated_filter_is_the_full_one(make_walls):
+    ends = []
+    for kind in (IteratedEkf, FullEkf):
+        once = partial(kind, config=EkfConfig(relinearise=False))
+        backend, seen, _ = lost(once, make_walls(8), np.random.default_rng(76))
+        backend.update(seen, seen)
+        ends.append(backend.belief.joint(seen.ids).mean)
+    np.testing.assert_allclose(*ends, atol=1e-12)
 
 
 def transformed(function, mean, cov):

@@ -10,6 +10,7 @@ from chainslam.slam.estimation.mounting import (
     belief_of_body,
     body_poses,
     carried,
+    odometry_of_body,
     odometry_of_scanner,
     scanner_poses,
     start_of_scanner,
@@ -29,11 +30,12 @@ def derivative(f, x, h=1e-6):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_scanner_is_carried_with_the_body_and_tells_where_that_is(seed):
-    pose = np.random.default_rng(seed).normal(0.0, 1.0, 3)
+    pose, other = np.random.default_rng(seed).normal(0.0, 1.0, (2, 3))
     moved, G = carried(pose, SCANNER.pose_robot)
     np.testing.assert_allclose(moved[:2], to_world(SCANNER.pose_robot[:2], pose))
     np.testing.assert_allclose(G, derivative(lambda p: carried(p, SCANNER.pose_robot)[0], pose), atol=1e-8)
-    np.testing.assert_allclose(body_poses(scanner_poses(pose[None], SCANNER), SCANNER)[0], pose, atol=1e-12)
+    for poses in (np.array([pose, other]), np.zeros((0, 3))):
+        np.testing.assert_allclose(body_poses(scanner_poses(poses, SCANNER), SCANNER), poses, atol=1e-12)
 
 
 @pytest.mark.parametrize("motion", [[0.15, 0.01, 0.1], [0.0, 0.0, -0.17], [-0.1, 0.0, 0.0]])
@@ -54,6 +56,9 @@ def test_odometry_is_that_of_the_scanner_with_what_its_covariance_says_of_it(mot
     A = derivative(of_scanner, motion)
     np.testing.assert_allclose(found.cov, A @ cov @ A.T, atol=1e-10)
     assert found.touched
+    back = odometry_of_body(found, SCANNER)
+    np.testing.assert_allclose(back.motion, motion, atol=1e-12)
+    np.testing.assert_allclose(back.cov, cov, atol=1e-15)
 
 
 @pytest.mark.parametrize("backend", ["full-ekf", "block-ekf", "graph"])
@@ -72,6 +77,7 @@ def test_a_belief_of_the_body_has_the_pose_and_the_covariances_of_the_body(backe
     np.testing.assert_allclose(joint.cov[:3, :3], belief.pose_cov, atol=1e-12)
     np.testing.assert_allclose(joint.cov, joint.cov.T, atol=1e-15)
     np.testing.assert_array_equal(joint.cov[3:, 3:], own.cov[3:, 3:])
+    np.testing.assert_array_equal(joint.anchors, own.anchors)
     G = derivative(lambda p: body_poses(p[None], SCANNER)[0], own.mean[:3])
     np.testing.assert_allclose(joint.cov[:3, 3:], G @ own.cov[:3, 3:], atol=1e-9)
 

@@ -6,15 +6,17 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from chainslam.experiments.replays.corridor import Loop, drive
-from chainslam.experiments.replays.observations import ride
-from chainslam.experiments.scenario import KNOWN, drawn_start, sigmas_of
-from chainslam.slam.backends import BACKENDS
-from chainslam.slam.backends.full_ekf import FullEkf
-from chainslam.slam.estimation.backend import Observations
-from chainslam.slam.evaluation.consistency import nees, pose_covariances, pose_errors
-from chainslam.slam.evaluation.from_start import Start, as_it_is, from_start
-from chainslam.slam.robot import Odometry, ScannerSpec
+from experiments.replays.corridor import Loop, drive
+from experiments.replays.observations import ride
+from experiments.scenario import KNOWN, drawn_start, sigmas_of
+from slam.association.ranges.calibrated_backend import CalibratedBackend
+from slam.association.ranges.errors import RangeErrors
+from slam.backends import BACKENDS
+from slam.backends.full_ekf import FullEkf
+from slam.estimation.backend import Observations
+from slam.evaluation.consistency import nees, pose_covariances, pose_errors
+from slam.evaluation.from_start import Start, as_it_is, from_start
+from slam.robot import Odometry, ScannerSpec
 from studies.results.teeth import TeethStudy, rejected, rejected_in_words, round_a_room, scores
 
 ONLINE = [name for name in BACKENDS if name != "graph-batch"]
@@ -144,6 +146,26 @@ class Shaken(FullEkf):
     def update(self, first, second):
         super().update(first, second)
         self.predict(Odometry(np.array([0.01, 0.0, 0.0]), 1e-4 * np.eye(3)))
+
+
+def test_a_second_back_end_takes_out_of_ranges_what_the_first_does_and_states_what_is_unknown_of_it():
+    def make(pose, cov):
+        return CalibratedBackend(FullEkf(pose, cov))
+
+    start = Start(np.array([1.0, -2.0, 0.5]), 1e-4 * np.eye(3), np.array([1.01, -2.0, 0.49]))
+    known = start.known(np.array([1e-4, 1e-4, 1e-5]))
+    np.testing.assert_array_equal(known.true_world, start.true_world)
+    first, alone = make(start.estimate_world, start.cov), make(known.estimate_world, known.cov)
+    tells = from_start(first, False, start, known, make, ScannerSpec())
+    errors = RangeErrors(bias_m=0.02, bias_sigma_m=0.003, scale=1.01, scale_sigma=0.002)
+    first.taken.errors = alone.taken.errors = errors
+    for _ in range(5):
+        for backend in (first, alone):
+            backend.predict(Odometry(np.array([0.5, 0.0, 0.3]), 1e-6 * np.eye(3)))
+    pose, cov = tells(first.belief)
+    np.testing.assert_array_equal(pose, alone.belief.pose_world)
+    np.testing.assert_array_equal(cov, alone.unsure(alone.belief).pose_cov)
+    assert cov[0, 0] > alone.belief.pose_cov[0, 0] + 1e-7
 
 
 def test_what_a_verb_calls_of_its_own_is_not_told_again():

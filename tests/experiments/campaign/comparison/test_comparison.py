@@ -92,6 +92,7 @@ def test_counts_are_compared_by_their_differences(said):
     spread = math.sqrt(sum((x - sum(off) / 6) ** 2 for x in off) / 5)
     assert told["effect_size"] == pytest.approx(sum(off) / 6 / spread)
     assert min(off) < told["low"] < told["value"] < told["high"] < max(off)
+    assert told["p"] == statistics.estimate(dict(zip(product("ab", SEEDS), off, strict=True))).p
 
 
 def test_a_strategy_is_compared_with_the_nearest_end(said):
@@ -118,6 +119,21 @@ def test_the_interaction_is_what_a_strategy_does_to_a_back_end_over_what_it_does
         gains.append(gain["block-ekf"] - gain["full-ekf"])
     assert told["value"] == pytest.approx(sum(gains) / 6)
     assert len(said["interaction"]) == len(ARMS) * 2 * len(MEASURES)
+
+
+def test_the_interaction_counts_the_runs_of_its_own_arm_in_which_it_has_no_value():
+    rows = [r for r in ROWS if (arm_of(r), r["seed"]) != ("replay-true", 3)]
+    broken = [("closed", "a", 1), ("closed", "b", 2)]
+    rows = [
+        r | {"status": "failed"} if r["backend"] == "graph" and (arm_of(r), r["world"], r["seed"]) in broken else r
+        for r in rows
+    ]
+    told = [r for r in compare(CAMPAIGN, rows, [], BANDS)["interaction"] if r["measure"] == "ate_m"]
+    without = {(r["arm"], r["backend"]): (r["runs"], r["pairs_without_value"]) for r in told}
+    assert without == {
+        ("closed", "block-ekf"): (6, 0), ("closed", "graph"): (4, 2),
+        ("replay-true", "block-ekf"): (4, 0), ("replay-true", "graph"): (4, 0),
+    }  # fmt: skip
 
 
 def test_without_a_baseline_nothing_is_compared():
@@ -254,8 +270,8 @@ def test_a_cell_adds_up_what_all_sound_runs_did_and_averages_the_complete_ones()
     stopped = row(seed=2, status="stopped", **{key: 10 * x for key, x in numbers.items()},
                   **{key: 2.0 * x for key, x in shares.items()}, distances=500, pose_nees_in_band=0.2,
                   trace_least=0.4, bound_margin=-0.3, bound_first_m=4.0, bound_worst_m=9.0)  # fmt: skip
-    other = row(seed=4, **{key: None for key in numbers}, trace_least=None, pose_nees_in_band=0.6, distances=None,
-                bound_margin=-0.1, bound_first_m=2.0, bound_worst_m=3.0)  # fmt: skip
+    other = row(seed=4, **{key: None for key in (*numbers, "map_anees", "trace_least", "distances")},
+                pose_nees_in_band=0.6, bound_margin=-0.1, bound_first_m=2.0, bound_worst_m=3.0)  # fmt: skip
     failed = row(seed=3, status="failed", **numbers, **shares, distances=50, trace_least=0.0, bound_margin=-9.0,
                  bound_first_m=0.1)  # fmt: skip
     told = cell_scores([complete, stopped, other, failed])
@@ -270,6 +286,7 @@ def test_a_cell_adds_up_what_all_sound_runs_did_and_averages_the_complete_ones()
     assert told["bound_runs_below"] == 2
     assert (told["bound_margin_median"], told["bound_first_m_median"]) == (pytest.approx(-0.2), 3.0)
     assert told["bound_worst_m_median"] == 6.0
+    assert (told["without"]["map_anees"], told["without"]["wall_rmse_m"]) == (1, 0)
     assert told["ate_m"]["mean"] == pytest.approx(
         np.mean([value("a", "nearest-robot", "full-ekf", "closed", s) for s in (1, 4)])
     )

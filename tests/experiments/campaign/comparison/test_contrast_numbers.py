@@ -126,11 +126,25 @@ def test_versions_and_commits_that_differ_are_told(tmp_path):
     one, two = (made(tmp_path / name, SAME) for name in ("one", "two"))
     config = json.loads((two / "config.json").read_text())
     config["commit"], config["versions"]["numpy"], config["versions"]["new"] = "another", "9.9", "1.0"
+    gone = config["versions"].pop("scipy")
     (two / "config.json").write_text(json.dumps(config))
     contrast(one, two, tmp_path / "out")
     settings = read_contrast(tmp_path / "out")["settings"]
-    assert list(settings) == ["commit", "new", "numpy"]
+    assert list(settings) == ["commit", "new", "numpy", "scipy"]
+    assert settings["scipy"] == [gone, None]
     assert (settings["commit"][1], settings["new"], settings["numpy"][1]) == ("another", [None, "1.0"], "9.9")
+
+
+def test_a_world_that_only_one_of_them_has_is_no_world_that_differs(tmp_path):
+    (tmp_path / "plan.json").write_text(
+        json.dumps({"walls": [[0, 0, 5, 0], [5, 0, 5, 5], [5, 5, 0, 0]], "start": [4, 1]})
+    )
+    wider = replace(CAMPAIGN, worlds=("paper-fig4", str(tmp_path / "plan.json")))
+    folders = made(tmp_path / "one", SAME), made(tmp_path / "two", SAME, wider)
+    for sides, count in ((folders, "only_second"), (folders[::-1], "only_first")):
+        contrast(*sides, tmp_path / count)
+        trials_ = read_contrast(tmp_path / count)["trials"]
+        assert (trials_["shared"], trials_[count]) == (12, 12)
 
 
 def test_campaigns_that_share_no_trial_or_whose_worlds_differ_are_refused(tmp_path):

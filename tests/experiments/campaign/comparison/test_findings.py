@@ -2,11 +2,12 @@
 
 import pytest
 
-from chainslam.experiments.campaign.comparison.findings import findings
-from chainslam.experiments.campaign.comparison.tables import GATE, doubles
-from chainslam.experiments.campaign.pages.finding_words import finding_table
-from chainslam.experiments.campaign.plan import Campaign
-from chainslam.experiments.campaign.runner import Tally
+from experiments.campaign.comparison.findings import findings
+from experiments.campaign.comparison.tables import GATE, doubles
+from experiments.campaign.pages.finding_words import finding_table
+from experiments.campaign.plan import Campaign
+from experiments.campaign.runner import Tally
+from experiments.scoring.statistics import FEW_RUNS
 
 BACKENDS = ("block-ekf", "full-ekf", "graph")
 ARMS = ("closed", "replay-true")
@@ -83,6 +84,14 @@ def test_an_interval_partly_within_the_aim_leaves_the_claim_undecided(ends):
     table = finding_table(Campaign(("w",), ("graph",), ("s",), 20, arms=ARMS), {"findings": findings(pooled, 0.99)})
     (cell,) = [cells[2] for cells in table.rows if "pose ANEES" in cells[0]]
     assert cell.endswith("; 3 complete runs have none")
+
+
+@pytest.mark.parametrize(
+    ("runs", "low", "holds"), [(FEW_RUNS, 0.95, True), (FEW_RUNS - 1, 0.95, None), (20, None, None)]
+)
+def test_an_interval_of_few_runs_or_none_leaves_the_claim_undecided(runs, low, holds):
+    estimate = {"mean": 1.0, "low": low, "high": 1.05, "runs": runs}
+    assert judged([row("graph", pose_anees_from_start=estimate)])["anees", "graph", "closed"] is holds
 
 
 def test_a_back_end_without_a_complete_run_is_judged_by_nothing():

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from chainslam.experiments.campaign.scores.innovation import InnovationEar, stacked
-from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
-from chainslam.slam.estimation.backend import Joint
-from chainslam.slam.estimation.models import innovations
-from chainslam.slam.extraction.segments import Segments
-from chainslam.slam.map.reliability import ReliabilityConfig
+from experiments.campaign.scores.innovation import InnovationEar, stacked
+from slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
+from slam.estimation.backend import Joint
+from slam.estimation.models import innovations
+from slam.extraction.segments import Segments
+from slam.extraction.straightness import StraightnessConfig, cov_of_faces
+from slam.map.reliability import ReliabilityConfig
 
 IDS = np.array([3, 8, 9])
 WALLS = KnownWalls(IDS, np.tile([-1.0, 1.0], (3, 1)))
@@ -74,6 +75,24 @@ def test_the_nis_of_a_scan_is_that_of_all_its_lines_together_and_each_call_is_he
         expected.append(e @ np.linalg.solve(S, e))
     assert ear.values == pytest.approx(expected)
     assert ear.dofs == [4, 2]
+
+
+def test_what_a_short_face_lacks_of_its_covariance_is_added_by_the_ear_s_own_rule():
+    for straightness in (StraightnessConfig(), StraightnessConfig(edge_m=0.05)):
+        ear = InnovationEar(ReliabilityConfig(heading_rad=3.0, straightness=straightness))
+        short = replace(seen(LINES[[0]] + 0.03), ends=np.array([[[2.0, -0.05], [2.0, 0.05]]]))
+        hear(ear, [(short, [3])])
+        more = cov_of_faces(short, straightness)
+        assert more.max() > 1e-6
+        e, S = stacked(JOINT, np.array([0]), LINES[[0]] + 0.03, COV[None] + more)
+        assert ear.values == pytest.approx([e @ np.linalg.solve(S, e)])
+
+
+def test_the_mean_is_over_all_degrees_of_freedom_together():
+    ear = InnovationEar(ReliabilityConfig())
+    assert ear.mean() is None
+    ear.values, ear.dofs = [1.0, 8.0], [2, 4]
+    assert ear.mean() == pytest.approx(1.5)
 
 
 def test_the_share_in_the_band_counts_scans_whose_nis_is_neither_too_large_nor_too_small():

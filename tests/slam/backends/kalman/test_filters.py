@@ -29,7 +29,7 @@ class Slow:
     """The same Gaussian as a plain matrix, rebuilt by every operation."""
 
     def __init__(self, cov):
-        self.P, self.x = cov.copy(), START.copy()
+        self.P, self.x, self.anchors = cov.copy(), START.copy(), np.zeros((0, 2))
 
     def apply(self, A, noise):
         self.P = A @ self.P @ A.T + noise
@@ -62,19 +62,21 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
                 np.tile(1e-4 * np.eye(2), (m, 1, 1)),
                 rng.uniform(-1, 1, (m, 2)),
             )
-            new = fast.append(Initialisation(rng.uniform(-1, 1, (m, 2)), means, G, np.zeros((m, 2, 2))), R)
+            anchors = rng.uniform(-1, 1, (m, 2))
+            new = fast.append(Initialisation(anchors, means, G, np.zeros((m, 2, 2))), R)
             assert new.tolist() == list(range(ids, ids + m))
             ids += m
             A, noise = np.zeros((size + 2 * m, size)), np.zeros((size + 2 * m, size + 2 * m))
             A[:size], A[size:, :3] = np.eye(size), G.reshape(-1, 3)
             noise[size:, size:] = 1e-4 * np.eye(2 * m)
             slow.apply(A, noise)
-            slow.x = np.concatenate([slow.x, means.ravel()])
+            slow.x, slow.anchors = np.concatenate([slow.x, means.ravel()]), np.concatenate([slow.anchors, anchors])
         elif n and verb == "drop":
             rows = rng.choice(n, int(rng.integers(1, n + 1)), replace=False)
             fast.drop(rows)
             kept = slow.columns(np.setdiff1d(np.arange(n), rows))
             slow.P, slow.x = slow.P[np.ix_(kept, kept)], slow.x[kept]
+            slow.anchors = np.delete(slow.anchors, rows, axis=0)
         elif n and verb == "condition":
             rows = rng.permutation(n)[: rng.integers(1, min(n, 5) + 1)]
             H, k = np.zeros((4, size)), slow.columns(rows)
@@ -95,6 +97,7 @@ def test_the_map_in_one_triangle_is_the_dense_gaussian(seed):
             fast.follow(moves, common)
             slow.apply(np.eye(size) + moves @ common.T, 0.0)
         joint = fast.joint(np.arange(len(fast.ids)))
+        np.testing.assert_array_equal(joint.anchors, slow.anchors)
         np.testing.assert_array_equal(fast.variances, np.diag(joint.cov))
         np.testing.assert_allclose(joint.cov, slow.P, atol=1e-9 * np.abs(slow.P).max())
         np.testing.assert_allclose(np.sin(joint.mean - slow.x), 0.0, atol=1e-9)

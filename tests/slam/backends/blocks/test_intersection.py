@@ -6,8 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from chainslam.slam.backends.blocks.intersection_ekf import IntersectionMap
-from chainslam.slam.estimation.models import Initialisation, Linear, Motion
+from slam.backends.blocks.intersection_ekf import (
+    LEAST_WEIGHT,
+    LONGEST,
+    IntersectionEkf,
+    IntersectionMap,
+    _extrapolated,
+    _shares,
+)
+from slam.estimation.backend import Observations
+from slam.estimation.models import Initialisation, Linear, Motion
+from slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)
@@ -109,3 +118,58 @@ def test_walls_in_several_pieces_leave_an_update_that_can_be_solved():
             R[2 * k : 2 * k + 2] = 10.0 ** rng.uniform([-6.0, -6.3], [-0.7, -4.0])
         map_.condition(Linear(np.arange(lines), H.reshape(-1, 3 + 2 * lines), np.full(2 * len(seen), 1e-3), np.diag(R)))
         assert np.linalg.eigvalsh(map_.joint(np.arange(lines)).cov)[0] > 0.0
+
+
+def test_what_the_wheels_add_is_independent_until_anything_comes_to_share_it():
+    rng = np.random.default_rng(5)
+    map_ = IntersectionMap(np.zeros(3), np.eye(3))
+    F, Q = rng.standard_normal((2, 3, 3)), np.stack([np.diag(rng.uniform(0.1, 1.0, 3)) for _ in range(2)])
+    for one, noise in zip(F, Q, strict=True):
+        map_.move(Motion(np.zeros(3), one, np.eye(3)), noise)
+    np.testing.assert_allclose(map_._fresh, F[1] @ Q[0] @ F[1].T + Q[1])
+    map_.append(unrelated(1), np.eye(2)[None])
+    np.testing.assert_array_equal(map_._fresh, np.zeros((3, 3)))
+
+
+def test_weights_add_up_to_one_and_none_is_zero():
+    shares = _shares(np.array([[0.0, 0.0, 0.0], [1.0, 3.0, 4.0], [0.0, 2.0, 2.0]]))
+    np.testing.assert_allclose(shares[:2], [[1 / 3, 1 / 3, 1 / 3], [0.125, 0.375, 0.5]])
+    assert shares[2, 0] == pytest.approx(LEAST_WEIGHT)
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, rtol=1e-15)
+
+
+def test_weights_are_led_on_row_by_row_to_where_their_rounds_lead():
+    """Steps that shrink by a share lead to where they end, but for the longest; those at rest, or to and fro, stay."""
+    goal = np.log([0.7, 0.2, 0.1])
+    start, sure = np.array([0.5, -0.3, 0.2]), np.log([1.0, 1e-9, 1e-11])
+    rows = [[goal + start, goal + 0.6 * start, goal + 0.36 * start]]
+    rows += [[sure, sure, sure], [goal, goal + start, goal]]
+    rows += [[40.0 * start, 36.0 * start, 32.4 * start], [goal, goal + 0.01 * start, goal + 0.0199 * start]]
+    first, second, third = (np.exp(np.array(each)) for each in zip(*rows, strict=True))
+    ends = np.array([goal, sure, goal, 0.0 * start, goal + (0.2 - LONGEST**2 * 1e-4) * start])
+    found = np.log(_extrapolated(first, second, third))
+    np.testing.assert_allclose(found - found[:, :1], ends - ends[:, :1], atol=1e-6)
+    np.testing.assert_allclose(np.exp(found).sum(axis=1), 1.0)
+
+
+def test_an_update_is_the_same_in_whichever_order_lines_are_seen_and_leaves_all_others_alone(make_walls):
+    walls, ends = make_walls(7), []
+    rows = np.array([5, 1, 3, 1, 6])
+    for order in ([0, 1, 2, 3, 4], [4, 1, 2, 3, 0], [1, 3, 0, 4, 2]):
+        rng = np.random.default_rng(6)
+        backend = IntersectionEkf(np.array([0.2, -1.0, 0.3]), np.diag([0.02, 0.02, 0.01]) ** 2)
+        ids = backend.grow(*walls.look(np.array([0.2, -1.0, 0.3]), np.arange(7), rng))
+        backend.predict(Odometry(np.zeros(3), np.diag([0.02, 0.02, 0.02]) ** 2))
+        before = backend.belief.joint(ids)
+        lines, cov, _ = walls.look(np.array([0.21, -1.01, 0.31]), rows, rng)
+        seen = Observations(ids[rows[order]], lines[order], cov[order])
+        backend.update(seen, seen)
+        ends.append(backend.belief.joint(ids))
+        np.testing.assert_array_equal(ends[-1].mean, ends[0].mean)
+        np.testing.assert_array_equal(ends[-1].cov, ends[0].cov)
+    moved = ends[0].mean != before.mean
+    assert moved[:3].all()
+    assert moved[3::2].tolist() == moved[4::2].tolist() == [row in rows for row in range(7)]
+    sigmas = np.sqrt(np.diag(before.cov))
+    assert np.all(np.diag(ends[0].cov) <= np.diag(before.cov) * (1 + 1e-9))
+    assert np.abs((ends[0].mean - before.mean) / sigmas).max() < 3.0
