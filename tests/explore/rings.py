@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from slam.estimation.backend import Belief
-from slam.geometry.lines import normals, through
-from slam.map.chains import Chain
-from slam.map.stochastic_map import StochasticMap
+from chainslam.slam.estimation.backend import Belief
+from chainslam.slam.geometry.lines import normals, through
+from chainslam.slam.map.chains import Chain
+from chainslam.slam.map.stochastic_map import StochasticMap
 
 
 def closed_map(ring):

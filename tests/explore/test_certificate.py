@@ -8,19 +8,19 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from explore.certificate import certify, contours, floor_of, unseen_area
-from explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from explore.goal import GivenUp, LeftPlace, SetAside
-from explore.limits import Limits, limited
-from explore.mission import MissionConfig, explore_mission
-from explore.outcome import Outcome
-from explore.planning.passable import PathConfig
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.map.chains import HEAD, TAIL, Chain, OpenEnd
-from slam.mapper import Mapper
+from chainslam.explore.certificate import certify, contours, floor_of, unseen_area
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.goal import GivenUp, LeftPlace, SetAside
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import MissionConfig, explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.map.chains import HEAD, TAIL, Chain, OpenEnd
+from chainslam.slam.mapper import Mapper
 from tests.explore.rings import closed_map
 
 ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.chance import Chance, Channel
-from sim.drive import Slip, clamp, draw_slip, odometry, seconds, true_motion
-from slam.geometry.poses import arc
-from slam.robot import MotionCommand, RobotSpec
+from chainslam.sim.chance import Chance, Channel
+from chainslam.sim.drive import Slip, clamp, draw_slip, odometry, seconds, true_motion
+from chainslam.slam.geometry.poses import arc
+from chainslam.slam.robot import MotionCommand, RobotSpec
 
 ROBOT = RobotSpec()
 CONFIG = ROBOT.wheels

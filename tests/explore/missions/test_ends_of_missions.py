@@ -7,25 +7,25 @@ import numpy as np
 import pytest
 import shapely
 
-from explore.certificate import certify
-from explore.floor.free_space import FreeSpace
-from explore.following.wall_following import Surroundings
-from explore.goal import GivenUp, LeftPlace
-from explore.goals.explorer import Explorer
-from explore.goals.explorer_config import ExplorerConfig
-from explore.goals.homing import Homing, HomingConfig
-from explore.limits import Limits, limited
-from explore.mission import MissionConfig, explore_mission
-from explore.outcome import Outcome
-from explore.planning.passable import PathConfig
-from explore.strategies import STRATEGIES
-from sim.robot import SimulatedRobot
-from sim.worlds import World
-from slam.backends import BACKENDS
-from slam.geometry.lines import distance_to_segments
-from slam.map.chains import connect
-from slam.mapper import Mapper
-from slam.robot import Scan
+from chainslam.explore.certificate import certify
+from chainslam.explore.floor.free_space import FreeSpace
+from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.goal import GivenUp, LeftPlace
+from chainslam.explore.goals.explorer import Explorer
+from chainslam.explore.goals.explorer_config import ExplorerConfig
+from chainslam.explore.goals.homing import Homing, HomingConfig
+from chainslam.explore.limits import Limits, limited
+from chainslam.explore.mission import MissionConfig, explore_mission
+from chainslam.explore.outcome import Outcome
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import World
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.geometry.lines import distance_to_segments
+from chainslam.slam.map.chains import connect
+from chainslam.slam.mapper import Mapper
+from chainslam.slam.robot import Scan
 from tests.explore.rings import closed_map
 
 ROOM = shapely.orient_polygons(shapely.box(0, 0, 4, 4).difference(shapely.box(1.7, 1.6, 2.4, 2.3)))

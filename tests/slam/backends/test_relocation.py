@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from slam.backends.relocation_ekf import RelocationEkf
-from slam.estimation.backend import Observations
-from slam.estimation.models import innovations
-from slam.geometry.poses import wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.relocation_ekf import RelocationEkf
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import innovations
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Odometry
 
 START, P0 = np.array([0.2, -1.0, 3.1]), np.diag([0.02, 0.02, 0.01]) ** 2
 NONE = Observations(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)))

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import chainslam
-from slam.backends import BACKENDS, BackendOptions
-from slam.backends.full_ekf import FullEkf
-from slam.backends.iterated_ekf import IteratedEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.backends.oc_ekf import unseen
-from slam.backends.textbook_ekf import TextbookEkf
-from slam.backends.ukf import unscented
-from slam.estimation.backend import Observations
-from slam.estimation.models import innovations, lines_robot
-from slam.geometry.poses import compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS, BackendOptions
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.iterated_ekf import IteratedEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.backends.oc_ekf import unseen
+from chainslam.slam.backends.textbook_ekf import TextbookEkf
+from chainslam.slam.backends.ukf import unscented
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import innovations, lines_robot
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

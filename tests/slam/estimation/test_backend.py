@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from slam.estimation.backend import Belief, Joint, Observations, columns_of
+from chainslam.slam.estimation.backend import Belief, Joint, Observations, columns_of
 
 IDS = np.array([2, 3, 7, 11])
 MEAN = np.arange(11.0)

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import chainslam
-from slam.backends import BACKENDS
-from slam.backends.blocks.block_ekf import BlockEkf
-from slam.backends.full_ekf import FullEkf
-from slam.backends.textbook_ekf import TextbookEkf
-from slam.estimation.models import Motion
-from slam.evaluation.axioms.answers import an_observation_that_says_nothing_changes_next_to_nothing
-from slam.evaluation.axioms.broken import BrokenError
-from slam.evaluation.axioms.check import axioms_of, check_backend
-from slam.geometry.poses import wrap
-from slam.robot import Odometry
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.blocks.block_ekf import BlockEkf
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.textbook_ekf import TextbookEkf
+from chainslam.slam.estimation.models import Motion
+from chainslam.slam.evaluation.axioms.answers import an_observation_that_says_nothing_changes_next_to_nothing
+from chainslam.slam.evaluation.axioms.broken import BrokenError
+from chainslam.slam.evaluation.axioms.check import axioms_of, check_backend
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Odometry
 
 OWED = [
     (name, axiom, holds)

@@ -6,17 +6,17 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from experiments.replays.corridor import Loop, drive
-from experiments.replays.observations import ride
-from experiments.scenario import KNOWN, drawn_start, sigmas_of
-from slam.association.ranges.calibrated_backend import CalibratedBackend
-from slam.association.ranges.errors import RangeErrors
-from slam.backends import BACKENDS
-from slam.backends.full_ekf import FullEkf
-from slam.estimation.backend import Observations
-from slam.evaluation.consistency import nees, pose_covariances, pose_errors
-from slam.evaluation.from_start import Start, as_it_is, from_start
-from slam.robot import Odometry, ScannerSpec
+from chainslam.experiments.replays.corridor import Loop, drive
+from chainslam.experiments.replays.observations import ride
+from chainslam.experiments.scenario import KNOWN, drawn_start, sigmas_of
+from chainslam.slam.association.ranges.calibrated_backend import CalibratedBackend
+from chainslam.slam.association.ranges.errors import RangeErrors
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.evaluation.consistency import nees, pose_covariances, pose_errors
+from chainslam.slam.evaluation.from_start import Start, as_it_is, from_start
+from chainslam.slam.robot import Odometry, ScannerSpec
 from studies.results.teeth import TeethStudy, rejected, rejected_in_words, round_a_room, scores
 
 ONLINE = [name for name in BACKENDS if name != "graph-batch"]

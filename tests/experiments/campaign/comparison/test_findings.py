@@ -2,12 +2,12 @@
 
 import pytest
 
-from experiments.campaign.comparison.findings import findings
-from experiments.campaign.comparison.tables import GATE, doubles
-from experiments.campaign.pages.finding_words import finding_table
-from experiments.campaign.plan import Campaign
-from experiments.campaign.runner import Tally
-from experiments.scoring.statistics import FEW_RUNS
+from chainslam.experiments.campaign.comparison.findings import findings
+from chainslam.experiments.campaign.comparison.tables import GATE, doubles
+from chainslam.experiments.campaign.pages.finding_words import finding_table
+from chainslam.experiments.campaign.plan import Campaign
+from chainslam.experiments.campaign.runner import Tally
+from chainslam.experiments.scoring.statistics import FEW_RUNS
 
 BACKENDS = ("block-ekf", "full-ekf", "graph")
 ARMS = ("closed", "replay-true")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from experiments.campaign.scores.innovation import InnovationEar, stacked
-from slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
-from slam.estimation.backend import Joint
-from slam.estimation.models import innovations
-from slam.extraction.segments import Segments
-from slam.extraction.straightness import StraightnessConfig, cov_of_faces
-from slam.map.reliability import ReliabilityConfig
+from chainslam.experiments.campaign.scores.innovation import InnovationEar, stacked
+from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
+from chainslam.slam.estimation.backend import Joint
+from chainslam.slam.estimation.models import innovations
+from chainslam.slam.extraction.segments import Segments
+from chainslam.slam.extraction.straightness import StraightnessConfig, cov_of_faces
+from chainslam.slam.map.reliability import ReliabilityConfig
 
 IDS = np.array([3, 8, 9])
 WALLS = KnownWalls(IDS, np.tile([-1.0, 1.0], (3, 1)))

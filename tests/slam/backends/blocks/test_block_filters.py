@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends.blocks.block_ekf import BlockEkf
-from slam.backends.blocks.block_map import BlockMap
-from slam.backends.kalman.config import EkfConfig
-from slam.estimation.backend import Observations
-from slam.estimation.models import Initialisation, Linear, Motion, innovations
-from slam.geometry.poses import wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.blocks.block_ekf import BlockEkf
+from chainslam.slam.backends.blocks.block_map import BlockMap
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import Initialisation, Linear, Motion, innovations
+from chainslam.slam.geometry.poses import wrap
+from chainslam.slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 START, P0 = np.array([0.2, -1.0, 3.1]), np.diag([0.02, 0.02, 0.01]) ** 2

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from slam.backends.blocks.intersection_ekf import (
+from chainslam.slam.backends.blocks.intersection_ekf import (
     LEAST_WEIGHT,
     LONGEST,
     IntersectionEkf,
@@ -14,9 +14,9 @@ from slam.backends.blocks.intersection_ekf import (
     _extrapolated,
     _shares,
 )
-from slam.estimation.backend import Observations
-from slam.estimation.models import Initialisation, Linear, Motion
-from slam.robot import Odometry
+from chainslam.slam.estimation.backend import Observations
+from chainslam.slam.estimation.models import Initialisation, Linear, Motion
+from chainslam.slam.robot import Odometry
 
 few = settings(max_examples=15, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32)

@@ -5,8 +5,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from slam.backends.kalman.dense_map import SPARE, DenseMap, cholesky
-from slam.estimation.models import Initialisation, Linear, Motion
+from chainslam.slam.backends.kalman.dense_map import SPARE, DenseMap, cholesky
+from chainslam.slam.estimation.models import Initialisation, Linear, Motion
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 

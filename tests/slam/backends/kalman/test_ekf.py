@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.backends.full_ekf import FullEkf
-from slam.backends.kalman.config import EkfConfig
-from slam.backends.kalman.linear import equality
-from slam.estimation.backend import Observations, StaleBeliefError
-from slam.estimation.models import initialise, innovations, move
-from slam.geometry.poses import compose, wrap
-from slam.robot import Odometry
+from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.backends.kalman.config import EkfConfig
+from chainslam.slam.backends.kalman.linear import equality
+from chainslam.slam.estimation.backend import Observations, StaleBeliefError
+from chainslam.slam.estimation.models import initialise, innovations, move
+from chainslam.slam.geometry.poses import compose, wrap
+from chainslam.slam.robot import Odometry
 
 START, P0 = np.array([0.2, -1.0, 3.1]), np.diag([0.02, 0.02, 0.01]) ** 2
 ODOMETRY = Odometry(np.array([0.2, 0.02, 0.15]), np.diag([0.03, 0.02, 0.05]) ** 2)

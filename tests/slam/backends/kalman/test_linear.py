@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slam.backends.kalman.linear import equality
-from slam.geometry.poses import wrap
+from chainslam.slam.backends.kalman.linear import equality
+from chainslam.slam.geometry.poses import wrap
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
