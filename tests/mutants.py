@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "results" / "mutants"
 ROOMS = ("slam", "explore", "sim", "viz", "experiments")
-READ = ("chainslam", "examples")
+PACKAGE, READ = "chainslam", ("examples",)
 """What tests read beside: it is copied and never changed."""
 FAILED, ENDLESS, SURVIVED = {1, 3}, {24, 36, 152, 255, -24, -9, -11}, {0, 5, 33}
 """Exit codes that mutmut keeps: a test failed; none came to its end; none failed, or none comes by."""
@@ -94,9 +94,11 @@ def run(module: str, group: str, tests: list[str], budget_s: float) -> Result:
     """Try the mutants of one module that have no result yet, for so long."""
     folder, path = RESULTS / module, f"{module.replace('.', '/')}.py"
     folder.mkdir(parents=True, exist_ok=True)
-    for room in (*ROOMS, *READ, "tests"):
-        copy(ROOT / room, folder / room)
-    lists = {name: json.dumps(each) for name, each in (("rooms", ROOMS), ("read", READ), ("tests", tests))}
+    for part in (PACKAGE, *READ, "tests"):
+        copy(ROOT / part, folder / part)
+    for room in ROOMS:  # in a checkout, these are links from the package
+        copy(ROOT / room, folder / PACKAGE / room)
+    lists = {name: json.dumps(each) for name, each in (("rooms", [PACKAGE]), ("read", READ), ("tests", tests))}
     (folder / "pyproject.toml").write_text(CONFIG.format(path=path, **lists))
     forget_survivors(folder, path)
     began = time.monotonic()
@@ -143,7 +145,7 @@ def copy(source: Path, target: Path) -> None:
 def forget_survivors(folder: Path, path: str) -> None:
     """Have those tried again that survived or did not end, where anything but times has changed since."""
     digest, seen = hashlib.sha256(), folder / "digest"
-    for file in sorted(file for room in (*ROOMS, *READ, "tests") for file in (folder / room).rglob("*.*")):
+    for file in sorted(file for room in (PACKAGE, *READ, "tests") for file in (folder / room).rglob("*.*")):
         digest.update(file.read_bytes())
     meta = folder / "mutants" / f"{path}.meta"
     if meta.exists() and (not seen.exists() or seen.read_text() != digest.hexdigest()):
