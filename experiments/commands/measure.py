@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..artifacts.maps.mapped import MappedCorners, read_corners
 from ..artifacts.saved import read_config
-from ..scoring.measurements import Measured
+from ..scoring.maps.measurements import Measured
 from ..terminal.answers import found
 from ..terminal.console import plain_console
 from ..usage import UsageError

@@ -9,7 +9,6 @@ from chainslam.explore.step import Step
 from chainslam.slam.association.second_looks.closures import Drive
 from chainslam.slam.association.second_looks.refuted import Rays
 from chainslam.slam.association.second_looks.second_looks import Survey, second_looks
-from chainslam.slam.evaluation.doubles import doubles
 from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.poses import to_world
@@ -20,6 +19,7 @@ from chainslam.slam.robot import Scan
 from ..scenario import TrialConfig
 from ..scoring.records import Log
 from ..scoring.without_truth.certificate import certificate_record
+from ..scoring.without_truth.doubles import doubles
 from ..scoring.without_truth.smoothing import Smoothed
 from ..trial import TrialResult
 

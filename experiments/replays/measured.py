@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from chainslam.slam.estimation.backend import PathKeeper
-from chainslam.slam.evaluation.relations import SAME_TIME_S, interpolated, paired_poses
 
 from ..artifacts.trajectories import path_of, smoothed_path
 from ..scoring.records import Log
 from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalised_relations, pair_covs_of
 from ..scoring.without_truth.references import References, scored_by
+from ..scoring.without_truth.relations import SAME_TIME_S, interpolated, paired_poses
 from ..scoring.without_truth.smoothing import rows_of_steps
 from ..trial import TrialResult
 from ..usage import UsageError

@@ -15,7 +15,6 @@ from chainslam.slam.estimation.backend import POSE, Backend, Joint, Observations
 from chainslam.slam.estimation.mounting import odometry_of_scanner, scanner_poses
 from chainslam.slam.evaluation.consistency import nees, pose_covariances, pose_errors
 from chainslam.slam.evaluation.from_start import FromStart, as_it_is
-from chainslam.slam.evaluation.own_gauge import own_gauge
 from chainslam.slam.extraction.extract import extract
 from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.extraction.visible_extent import sure_pieces
@@ -24,6 +23,7 @@ from chainslam.slam.map_keeper import seen_centres
 from chainslam.slam.robot import Odometry
 
 from ..scenario import load_world
+from ..scoring.own_gauge import own_gauge
 from ..scoring.truth import truth_of
 from .oracles import PerfectExtraction, Witness, begins_a_line, of_true_lines
 from .replay import RecordedRun

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from chainslam.viz.figures.panels import paint_intervals, panels
 
-from ..scoring.measurements import Z_95
+from ..scoring.maps.measurements import Z_95
 from .reproduction import Numbers, Reproduction, Said, Value
 from .runs.drives import BESIDE, PAPER, drive_by_walls, driven, replayed
 

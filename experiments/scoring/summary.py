@@ -11,14 +11,14 @@ from chainslam.explore.outcome import Outcome
 from chainslam.explore.step import Step
 from chainslam.slam.estimation.backend import POSE, Joint
 from chainslam.slam.evaluation.consistency import anees, joint_error, nees, pose_covariances, pose_errors, share_in_band
-from chainslam.slam.evaluation.own_gauge import OwnGauge, own_gauge
 from chainslam.slam.extraction.curved_share import SCANS
 from chainslam.slam.geometry.poses import compose, to_world, wrap
 
 from ..scenario import Scenario
 from .association import Votes, duplicate_lines
-from .corners import corners, label_distances
-from .coverage import (
+from .innovations import innovation_scores
+from .maps.corners import corners, label_distances
+from .maps.coverage import (
     NEAR_M,
     NEAR_NOISY_M,
     alignment,
@@ -29,9 +29,9 @@ from .coverage import (
     own_alignment,
     sample,
 )
-from .innovations import innovation_scores
+from .maps.swept import swept
+from .own_gauge import OwnGauge, own_gauge
 from .records import Log, Sketch
-from .swept import swept
 
 EXIT_STATUS = {Outcome.FAILED: 1, Outcome.INTERRUPTED: 130}
 """What the command ends in; 0 for every other outcome."""

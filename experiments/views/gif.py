@@ -14,7 +14,7 @@ from chainslam.viz.figures.animation import Frame, animated, shown_steps
 from ..artifacts.results import LOG
 from ..replays.replay import read_options, read_run, replay
 from ..scenario import load_world
-from ..scoring.coverage import alignment
+from ..scoring.maps.coverage import alignment
 from ..terminal.progress import progress
 from ..usage import UsageError
 

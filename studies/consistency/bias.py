@@ -20,12 +20,12 @@ from chainslam.experiments.replays.observations import DriveObservations, observ
 from chainslam.experiments.replays.recordings import record
 from chainslam.experiments.replays.replay import Association, RecordedRun, ReplayOptions, replay
 from chainslam.experiments.scenario import TrialConfig, strategy_of
-from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.maps.coverage import alignment
+from chainslam.experiments.scoring.trajectories import ate
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.usage import choose
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.evaluation.consistency import anees
-from chainslam.slam.evaluation.trajectories import ate
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import to_world
 

@@ -15,8 +15,8 @@ from jaxtyping import Float, Int
 from rich.table import Table
 
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.scoring.corners import Corner, corners
-from chainslam.experiments.scoring.measurements import Z_95, corner_points, distances
+from chainslam.experiments.scoring.maps.corners import Corner, corners
+from chainslam.experiments.scoring.maps.measurements import Z_95, corner_points, distances
 from chainslam.experiments.scoring.truth import Truth
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.trial import TrialResult, run_trial

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from chainslam.experiments.scenario import Scenario, TrialConfig, build
-from chainslam.experiments.scoring.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
+from chainslam.experiments.scoring.maps.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
+from chainslam.experiments.scoring.maps.swept import Floor, visible_floor
 from chainslam.experiments.scoring.records import Log
 from chainslam.experiments.scoring.statistics import estimate, paired
-from chainslam.experiments.scoring.swept import Floor, visible_floor
 from chainslam.experiments.scoring.truth import truth_of
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.trial import default_mission, run_scenario

@@ -24,12 +24,12 @@ from chainslam.experiments.replays.recordings import recorded
 from chainslam.experiments.scenario import TrialConfig, check, load_world
 from chainslam.experiments.scoring.without_truth.normalised import normalised_path, normalised_relations
 from chainslam.experiments.scoring.without_truth.references import References
+from chainslam.experiments.scoring.without_truth.relations import Relations, between
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.trial import run_trial
 from chainslam.sim.worlds import World
 from chainslam.slam.association.second_looks.second_looks import Survey
 from chainslam.slam.association.second_looks.walls import inverse_at
-from chainslam.slam.evaluation.relations import Relations, between
 from chainslam.slam.geometry.poses import rotation
 
 from ..runner.command import run_study

@@ -23,7 +23,7 @@ from chainslam.experiments.replays.observations import DriveObservations, Ridden
 from chainslam.experiments.replays.recordings import record
 from chainslam.experiments.scenario import KNOWN, P0, P0_SIGMAS, TrialConfig, drawn_start, sigmas_of
 from chainslam.experiments.scoring.innovations import share_in_own_band
-from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.usage import UsageError, choose
 from chainslam.slam.backends import BACKENDS

@@ -8,7 +8,7 @@ from scipy.linalg import logm
 
 from chainslam.experiments.scenario import Scenario, TrialConfig, build
 from chainslam.experiments.scoring.association import Votes
-from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.maps.coverage import alignment
 from chainslam.experiments.scoring.records import Log, Sketch
 from chainslam.experiments.scoring.summary import Ending, summarise
 from chainslam.experiments.scoring.truth import truth_of

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.scoring.corners import corners
-from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.scoring.maps.corners import corners
+from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.trial import run_trial
 from studies.consistency import interval_causes, intervals
 

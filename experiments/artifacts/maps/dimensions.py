@@ -5,7 +5,7 @@ import shapely
 
 from chainslam.viz.floor_plan import Dimension
 
-from ...scoring.measurements import Measured
+from ...scoring.maps.measurements import Measured
 from .mapped import MappedCorners, Room
 
 

@@ -12,7 +12,7 @@ from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from ...scoring.corners import Corner, corners
+from ...scoring.maps.corners import Corner, corners
 from ...scoring.records import Log
 from ...scoring.without_truth.certificate import contour_record, frontier_record, obstacle_record, open_end_record
 from ..files import stamp

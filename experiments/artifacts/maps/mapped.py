@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ...scoring.measurements import CornerPoints, Measured, area, corner_jacobian, corner_points, distance, perimeter
+from ...scoring.maps.measurements import (
+    CornerPoints,
+    Measured,
+    area,
+    corner_jacobian,
+    corner_points,
+    distance,
+    perimeter,
+)
 from ...usage import UsageError
 from .map_files import read_features, read_map
 

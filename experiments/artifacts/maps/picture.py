@@ -19,8 +19,8 @@ from chainslam.viz.figures.maps import Picture, draw_map, png
 from chainslam.viz.figures.visibility import GraphPicture, draw_graph
 
 from ...scenario import STRATEGY_OF_REPLAYS, TrialConfig
-from ...scoring.corners import corners
-from ...scoring.coverage import own_alignment
+from ...scoring.maps.corners import corners
+from ...scoring.maps.coverage import own_alignment
 from ...scoring.records import Log, Route
 from ...scoring.summary import odometry_poses
 from ...trial import TrialResult

@@ -18,7 +18,7 @@ from chainslam.slam.evaluation.consistency import chi2_band, pooled_band
 from ...artifacts.files import csv_bytes, json_bytes, stamp, write
 from ...artifacts.reading import told
 from ...artifacts.schema import UnfitError
-from ...scoring.measurements import Z_95
+from ...scoring.maps.measurements import Z_95
 from ..plan import Campaign, Trial, gate_of, is_errorless
 from ..scores.score import END, TrialScores
 from .comparison import compare

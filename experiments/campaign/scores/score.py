@@ -9,18 +9,18 @@ from jaxtyping import Float
 
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.evaluation.consistency import bound_margins
-from chainslam.slam.evaluation.trajectories import ate, position_errors, rpe
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import J, to_world, wrap
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scoring.association import Votes, duplicate_lines
-from ...scoring.corners import corners
-from ...scoring.coverage import NEAR_NOISY_M, Samples, alignment, coverage, sample
-from ...scoring.measurements import corner_points, distances
+from ...scoring.maps.corners import corners
+from ...scoring.maps.coverage import NEAR_NOISY_M, Samples, alignment, coverage, sample
+from ...scoring.maps.measurements import corner_points, distances
 from ...scoring.records import Log
 from ...scoring.summary import joint_anees, map_error, pose_nees, pose_nees_from_start
+from ...scoring.trajectories import ate, position_errors, rpe
 from ...trial import TrialResult
 from .innovation import InnovationEar
 from .observer import Moment, Observer, association_counts

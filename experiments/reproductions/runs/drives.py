@@ -19,7 +19,7 @@ from ...artifacts.settings import trial_of
 from ...replays.recordings import recorded
 from ...replays.replay import replay
 from ...scenario import TrialConfig
-from ...scoring.coverage import alignment
+from ...scoring.maps.coverage import alignment
 from ...scoring.records import Log
 from ...trial import TrialResult, run_trial
 from ...views.timelines import true_rings

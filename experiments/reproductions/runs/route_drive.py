@@ -15,7 +15,7 @@ from chainslam.slam.geometry.poses import to_world
 from chainslam.slam.map.stochastic_map import StochasticMap
 
 from ...scenario import Scenario, TrialConfig
-from ...scoring.coverage import alignment
+from ...scoring.maps.coverage import alignment
 from ...trial import TrialResult, default_mission, run_trial
 
 ARRIVED_M = 1.0

@@ -9,7 +9,12 @@ from chainslam.slam.estimation.backend import PathKeeper
 from chainslam.slam.estimation.gates import gate_level
 from chainslam.slam.estimation.mounting import body_poses
 from chainslam.slam.evaluation.consistency import anees, nees, share_in_band
-from chainslam.slam.evaluation.relation_noise import (
+from chainslam.slam.geometry.poses import inverse
+from chainslam.slam.robot import ScannerSpec
+
+from ..trajectories import rms
+from .references import References
+from .relation_noise import (
     Sigmas,
     adjoint_of_inverse,
     body_covs,
@@ -18,12 +23,7 @@ from chainslam.slam.evaluation.relation_noise import (
     sigmas_of_path,
     sigmas_of_relations,
 )
-from chainslam.slam.evaluation.relations import Relations, between, nearest_rows
-from chainslam.slam.evaluation.trajectories import rms
-from chainslam.slam.geometry.poses import inverse
-from chainslam.slam.robot import ScannerSpec
-
-from .references import References
+from .relations import Relations, between, nearest_rows
 from .smoothing import PairCovs
 
 DOF = 3

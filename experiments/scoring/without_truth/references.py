@@ -9,16 +9,16 @@ from jaxtyping import Float
 
 from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M
-from chainslam.slam.evaluation.relations import (
+from chainslam.slam.geometry.poses import wrap
+
+from ...usage import UsageError
+from ..trajectories import ate
+from .relations import (
     Relations,
     errors_at_scans,
     errors_between_scans,
     paired_poses,
 )
-from chainslam.slam.evaluation.trajectories import ate
-from chainslam.slam.geometry.poses import wrap
-
-from ...usage import UsageError
 
 MOST_BYTES = 2**28
 RELATION, TUM, PLANAR = 8, 8, 4

@@ -10,7 +10,6 @@ from jaxtyping import Int
 from chainslam.explore.step import Step
 from chainslam.sim.robot import TrueRecord
 from chainslam.sim.worlds import Contour, World
-from chainslam.slam.evaluation.doubles import doubles
 
 from ...scenario import Scenario
 from ..association import Votes
@@ -18,6 +17,7 @@ from ..innovations import innovation_scores
 from ..records import Log
 from ..summary import Ending, range_scores, run_keys, spread_ms
 from ..truth import Truth
+from .doubles import doubles
 
 WITNESSED = (
     "path_length_true_m coverage coverage_own_frame coverage_curve contours_closed contours_reachable swept"

@@ -4,7 +4,7 @@ import numpy as np
 
 from chainslam.experiments.artifacts.maps.dimensions import dimensions
 from chainslam.experiments.artifacts.maps.mapped import MappedCorners, Room
-from chainslam.experiments.scoring.measurements import CornerPoints
+from chainslam.experiments.scoring.maps.measurements import CornerPoints
 
 
 def test_a_closed_chain_of_two_walls_has_sides_and_no_area():

@@ -8,7 +8,7 @@ import pytest
 from chainslam.experiments.replays.recordings import recorded
 from chainslam.experiments.replays.replay import ReplayOptions, replay
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.scoring.swept import visible_floor
+from chainslam.experiments.scoring.maps.swept import visible_floor
 from chainslam.experiments.trial import run_trial
 from chainslam.explore.floor.accumulated_returns import returns
 from chainslam.sim.faults import FaultsConfig

@@ -3,8 +3,8 @@ import pytest
 import shapely
 
 from chainslam.experiments.scoring.association import Votes, duplicate_lines
-from chainslam.experiments.scoring.corners import corners, label_distances
-from chainslam.experiments.scoring.coverage import (
+from chainslam.experiments.scoring.maps.corners import corners, label_distances
+from chainslam.experiments.scoring.maps.coverage import (
     NEAR_M,
     alignment,
     began,
@@ -13,7 +13,7 @@ from chainslam.experiments.scoring.coverage import (
     own_alignment,
     sample,
 )
-from chainslam.experiments.scoring.swept import swept, visible_floor
+from chainslam.experiments.scoring.maps.swept import swept, visible_floor
 from chainslam.experiments.scoring.truth import collinear, truth_of
 from chainslam.sim.robot import RobotConfig
 from chainslam.sim.worlds import World

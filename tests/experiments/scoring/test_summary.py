@@ -8,7 +8,7 @@ import shapely
 from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
-from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.maps.coverage import alignment
 from chainslam.experiments.scoring.records import Sketch
 from chainslam.experiments.scoring.summary import Ending, nees_of_poses, pose_nees_from_start
 from chainslam.explore.goal import GivenUp, SetAside

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.experiments.replays.oracles import as_stated
+from chainslam.experiments.scoring.own_gauge import own_gauge
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.backends.kalman.config import EkfConfig
 from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.estimation.models import innovations
-from chainslam.slam.evaluation.own_gauge import own_gauge
 from chainslam.slam.geometry.lines import directions, normals
 from tests.slam.backends.conftest import Walls
 

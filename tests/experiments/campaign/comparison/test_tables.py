@@ -26,7 +26,7 @@ from chainslam.experiments.campaign.comparison.tables import (
 )
 from chainslam.experiments.campaign.plan import Campaign, Trial
 from chainslam.experiments.campaign.scores.score import TrialScores
-from chainslam.experiments.scoring.measurements import Z_95
+from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.usage import UsageError
 
 NAMES = {

@@ -10,7 +10,7 @@ from chainslam.experiments.campaign.scores.innovation import InnovationEar
 from chainslam.experiments.campaign.scores.observer import Fate, Moment
 from chainslam.experiments.campaign.scores.score import offsets, record_of, wall_errors
 from chainslam.experiments.scoring.association import Votes
-from chainslam.experiments.scoring.coverage import alignment
+from chainslam.experiments.scoring.maps.coverage import alignment
 from chainslam.experiments.scoring.summary import nees_of_poses
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.geometry.poses import inverse, to_world

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from chainslam.experiments.scoring.without_truth.relation_noise import relation_covs
+from chainslam.experiments.scoring.without_truth.relations import between
 from chainslam.slam.backends.graph.batch import GraphBatch
 from chainslam.slam.backends.graph.config import GraphConfig
 from chainslam.slam.backends.graph.graph import Graph
-from chainslam.slam.evaluation.relation_noise import relation_covs
-from chainslam.slam.evaluation.relations import between
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import compose, rotation, to_world, wrap
 from chainslam.slam.robot import Odometry

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chainslam.experiments.scoring.corners import LABEL_REACH_M, Corner, corners, label_distances
+from chainslam.experiments.scoring.maps.corners import LABEL_REACH_M, Corner, corners, label_distances
 from chainslam.slam.geometry.poses import inverse, to_world
 from chainslam.slam.map.chains import Chain, OpenEnd
 

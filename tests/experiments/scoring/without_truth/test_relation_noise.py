@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from chainslam.slam.evaluation.relation_noise import (
+from chainslam.experiments.scoring.without_truth.relation_noise import (
     adjoint_of_inverse,
     body_covs,
     relation_covs,
@@ -13,7 +13,7 @@ from chainslam.slam.evaluation.relation_noise import (
     sigmas_of_relations,
     triangles,
 )
-from chainslam.slam.evaluation.relations import Relations, between
+from chainslam.experiments.scoring.without_truth.relations import Relations, between
 from chainslam.slam.geometry.poses import compose, inverse
 
 STEP = 1e-6

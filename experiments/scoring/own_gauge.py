@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.lines import normals
-from ..geometry.poses import J, to_robot, wrap
-from .consistency import pose_errors
+from chainslam.slam.evaluation.consistency import pose_errors
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.poses import J, to_robot, wrap
 
 DAMPING_MAX = 1e6
 """With so much damping, in units of the squared columns, no step is long enough to make the error less: it is least."""

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.lines import directions, normals, through
-from ..geometry.numerics import TINY
-from ..geometry.poses import wrap
+from chainslam.slam.geometry.lines import directions, normals, through
+from chainslam.slam.geometry.numerics import TINY
+from chainslam.slam.geometry.poses import wrap
 
 TURN_RAD = float(np.deg2rad(5.0))
 """Lines that differ by more in direction are two walls."""

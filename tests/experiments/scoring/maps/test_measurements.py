@@ -7,8 +7,8 @@ from chainslam.experiments.artifacts.maps.mapped import read_corners
 from chainslam.experiments.artifacts.results import write_results
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.scoring.corners import corners
-from chainslam.experiments.scoring.measurements import (
+from chainslam.experiments.scoring.maps.corners import corners
+from chainslam.experiments.scoring.maps.measurements import (
     area,
     corner_jacobian,
     corner_points,

@@ -7,16 +7,16 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
 
-from chainslam.slam.evaluation.trajectories import alignment_of_paths
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.geometry.poses import compose, inverse, to_world
 from chainslam.slam.geometry.segment_kernels import lie_beside
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from .association import Votes
-from .records import Sketch
-from .truth import Truth
+from ..association import Votes
+from ..records import Sketch
+from ..trajectories import alignment_of_paths
+from ..truth import Truth
 
 NEAR_M, NEAR_NOISY_M = 0.1, 0.3
 """A point of the contour is covered by a wall this near; the second is for runs with noise, after alignment."""

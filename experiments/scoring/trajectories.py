@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..geometry.poses import rotation, to_world, wrap
+from chainslam.slam.geometry.poses import rotation, to_world, wrap
 
 
 def position_errors(

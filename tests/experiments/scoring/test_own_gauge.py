@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from chainslam.slam.evaluation.own_gauge import own_gauge
+from chainslam.experiments.scoring.own_gauge import own_gauge
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import J, rotation
 

@@ -5,7 +5,8 @@ import pytest
 from evo.core import metrics, sync
 from evo.core.trajectory import PoseTrajectory3D
 
-from chainslam.slam.evaluation.relations import (
+from chainslam.experiments.scoring.trajectories import ate
+from chainslam.experiments.scoring.without_truth.relations import (
     Relations,
     errors_at_scans,
     errors_between_scans,
@@ -14,7 +15,6 @@ from chainslam.slam.evaluation.relations import (
     paired_poses,
     relation_errors,
 )
-from chainslam.slam.evaluation.trajectories import ate
 
 
 def matrix(pose):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chainslam.slam.evaluation.doubles import doubles
+from chainslam.experiments.scoring.without_truth.doubles import doubles
 
 
 def turned(ends, angle):

@@ -5,9 +5,9 @@ import pytest
 
 from chainslam.experiments.scoring.without_truth.normalised import normalised_path, normalised_relations, pair_covs_of
 from chainslam.experiments.scoring.without_truth.references import References
+from chainslam.experiments.scoring.without_truth.relations import Relations, between
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.evaluation.axioms.room import Room, see
-from chainslam.slam.evaluation.relations import Relations, between
 from chainslam.slam.geometry.poses import compose, inverse
 from chainslam.slam.robot import Odometry, ScannerSpec
 

@@ -8,7 +8,7 @@ import shapely
 from scipy.optimize import minimize
 
 from chainslam.experiments.scoring.association import Votes
-from chainslam.experiments.scoring.coverage import (
+from chainslam.experiments.scoring.maps.coverage import (
     CLOSED_SHARE,
     NEAR_M,
     NEAR_NOISY_M,

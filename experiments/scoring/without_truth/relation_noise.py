@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 
-from ..estimation.gates import gate_level
-from ..geometry.poses import J, turned
-from .consistency import nees
+from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.evaluation.consistency import nees
+from chainslam.slam.geometry.poses import J, turned
+
 from .relations import Relations, between
 
 LEAST = 1e-4

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from chainslam.experiments.scoring.swept import CELL_M, Floor, swept, visible_floor
+from chainslam.experiments.scoring.maps.swept import CELL_M, Floor, swept, visible_floor
 from chainslam.sim.faults import FaultsConfig
 from chainslam.sim.lidar import RangeFinder
 from chainslam.sim.robot import RobotConfig

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ..geometry.poses import wrap
+from chainslam.slam.geometry.poses import wrap
 
 SAME_TIME_S = 0.01
 """Times that differ by less are of one scan."""

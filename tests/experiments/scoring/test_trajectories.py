@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from evo.core import metrics, sync, trajectory
 
-from chainslam.slam.evaluation.trajectories import aligned, ate, position_errors, rpe
+from chainslam.experiments.scoring.trajectories import aligned, ate, position_errors, rpe
 from chainslam.slam.geometry.poses import compose
 
 

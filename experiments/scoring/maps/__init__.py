@@ -1,0 +1,1 @@
+"""How good a map is beside the true walls: what of them it covers, and its corners."""
