@@ -19,7 +19,7 @@ from ..geometry.quantities import Angle, Distance, Factor, Probability
 from .kernels.candidate_kernels import Candidates, Known, Limits, Seen
 from .kernels.matching_kernels import matched, refused
 
-MatchingMethod = Literal["joint", "paper", "assignment"]
+MatchingMethod = Literal["joint", "paper"]
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,7 @@ class MatchingConfig:
 
     shared: SharedConfig = of_shared()
     method: MatchingMethod = "joint"
-    """All segments of a scan together, or each alone by `gate` and `shared.within_m`, as in the paper, or assigned
-    by the weights of hypotheses (`methods`)."""
+    """All segments of a scan together, or each alone by `gate` and `shared.within_m`, as in the paper (`methods`)."""
     gate: Probability = 0.99
     """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to
     be clear."""

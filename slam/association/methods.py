@@ -10,9 +10,8 @@ from jaxtyping import Int
 from ..estimation.backend import Joint, Observations
 from ..extraction.segments import Segments
 from .joint_compatibility import relocate
-from .matchers.joint_assignment import assign
-from .matchers.paper_matching import match_alone, relocate_robot
 from .matching import KnownWalls, Matches, MatchingConfig, MatchingMethod, match
+from .paper_matching import match_alone, relocate_robot
 
 
 @runtime_checkable
@@ -41,7 +40,6 @@ class Method:
 
 METHODS: dict[MatchingMethod, Method] = {
     "joint": Method(match, relocate, True),
-    "assignment": Method(assign, relocate, True),
     "paper": Method(match_alone, relocate_robot, False),
 }
 """By the name in `MatchingConfig.method`."""

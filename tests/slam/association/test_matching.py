@@ -7,7 +7,6 @@ import shapely
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.association.joint_compatibility import relocate
 from chainslam.slam.association.matching import KnownWalls, MatchingConfig, match
-from chainslam.slam.association.methods import METHODS
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.estimation.models import lines_robot
@@ -260,15 +259,14 @@ TWO = KnownWalls(np.array([4, 7]), np.array([[-1.0, 1.0], [-1.0, 1.0]]))
         pytest.param([[2.05, -0.5], [1.95, 0.5]], False, [], id="turned by 5.7 degrees"),
     ],
 )
-@pytest.mark.parametrize("method", ["joint", "assignment"])
-def test_a_wall_along_which_an_unmatched_segment_lies_may_be_what_it_shows(piece, few_beams, may_be, method):
+def test_a_wall_along_which_an_unmatched_segment_lies_may_be_what_it_shows(piece, few_beams, may_be):
     """The segment is known to 3 cm and 2.3 degrees: it fits both walls, and is matched with neither."""
     mean = np.array([0.0, 0.0, 0.0, 0.0, -0.03, 0.0, 0.03])
     joint = Joint(mean, np.diag([1e-3] * 7) ** 2, np.array([[2.0, 0.0], [2.0, 0.0]]))
     segments = straight_pieces([piece])
     segments.cov[:] *= 100.0
     segments.is_tentative[:] = few_beams
-    found = METHODS[method].matcher(segments, TWO, joint, MatchingConfig())
+    found = match(segments, TWO, joint)
     assert found.unmatched.tolist() == [0]
     assert found.ambiguous.tolist() == may_be
     sure = match(straight_pieces([[[2.03, -0.5], [2.03, 0.5]]]), TWO, joint)

@@ -6,9 +6,9 @@ import shapely
 from scipy.stats import chi2
 
 from chainslam.slam.association.joint_compatibility import relocate
-from chainslam.slam.association.matchers.paper_matching import match_alone, relocate_robot
 from chainslam.slam.association.matching import NO_MATCHES, KnownWalls, MatchingConfig
 from chainslam.slam.association.methods import METHODS, Method
+from chainslam.slam.association.paper_matching import match_alone, relocate_robot
 from chainslam.slam.association.view import View
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.config import MapperConfig

@@ -10,15 +10,15 @@ takes the best. No segment is in doubt: one that nothing passes is a new wall.
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ...estimation.backend import POSE, Joint, Observations
-from ...estimation.gates import gate_level
-from ...estimation.models import innovations
-from ...extraction.segments import Segments
-from ...geometry.lines import directions, normals, segment_distances
-from ...geometry.poses import to_world
-from ..joint_compatibility import relocate
-from ..kernels.joint_kernels import pair_distances
-from ..matching import KnownWalls, Matches, MatchingConfig
+from ..estimation.backend import POSE, Joint, Observations
+from ..estimation.gates import gate_level
+from ..estimation.models import innovations
+from ..extraction.segments import Segments
+from ..geometry.lines import directions, normals, segment_distances
+from ..geometry.poses import to_world
+from .joint_compatibility import relocate
+from .kernels.joint_kernels import pair_distances
+from .matching import KnownWalls, Matches, MatchingConfig
 
 
 def match_alone(
