@@ -33,7 +33,7 @@ from .trajectories import smoothed_path, trajectory, tum, wheels_alone
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
-RUNNING = "log.arrow"
+RUNNING = "log.running"
 """The log while the run goes on: it is there until all results are."""
 RECORDING = "run.rrd"
 RUN_FILES = (

@@ -1,18 +1,23 @@
-"""A run's log while the run goes on: one batch a step at the end of one Arrow stream.
+"""A run's log while the run goes on: one record a step at the end of one file.
 
-Whatever ends the run, the steps up to then are there: `--resume` holds the new drive against them. A batch that was
-cut short is left out. Once all results are written the stream is removed: `log.npz` holds all of it.
+Whatever ends the run, the steps up to then are there: `--resume` holds the new drive against them. A record that was
+cut short is left out. Once all results are written the file is removed: `log.npz` holds all of it.
+
+A record is its length, a checksum of what follows, and that: first the format and the config as JSON, then for each
+step the time, the wheels' motion and its covariance, and the ranges, as 64-bit numbers.
 """
 
+import json
 import os
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
-import pyarrow as pa
 from jaxtyping import Float
 
 from chainslam.explore.step import Step
@@ -23,49 +28,49 @@ from .files import json_bytes, write
 from .results import RUNNING
 from .run_folder import FolderGoneError, unwritable
 
-_COLUMNS = ("time_s", "ranges_m", "odometry", "odometry_cov")
-_FIELDS = [(name, pa.list_(pa.float64())) for name in _COLUMNS]
+_NUMBER = "<f8"
+_BEFORE = 1 + 3 + 9
+"""Numbers of a step before its ranges."""
+_HEAD = struct.Struct("<II")
 
 
 @dataclass(frozen=True)
 class Kept:
-    """What the stream of a run holds; s steps, k beams."""
+    """What the file of a run holds; s steps, k beams."""
 
     config: bytes
     """What `config.json` is to hold."""
-    batches: bytes
-    """The whole batches as they stand in the file."""
+    records: bytes
+    """The whole records of steps as they stand in the file."""
     time_s: Float[np.ndarray, " s"]
     ranges_m: Float[np.ndarray, "s k"]
     odometry: Float[np.ndarray, "s 3"]
 
 
 class RunningLog:
-    """Appends each step to the stream in a folder; a disk that is full ends the stream and not the run."""
+    """Appends each step to a file in a folder; a disk that is full ends the file and not the run."""
 
     def __init__(self, folder: Path, config: Mapping[str, Any], kept: Kept | None = None) -> None:
-        """Begin the stream, or go on behind the steps that were kept of it; raises UsageError."""
+        """Begin the file, or go on behind the steps that were kept of it; raises UsageError."""
         self._folder, self._path = folder, folder / RUNNING
         self._steps = 0 if kept is None else len(kept.time_s)
-        metadata = {"format": str(FORMAT), "config": json_bytes(config).decode()}
-        self._schema = pa.schema(_FIELDS, metadata=metadata)
-        batches = b"" if kept is None else kept.batches
+        begin = json.dumps({"format": FORMAT, "config": json_bytes(config).decode()})
         try:
-            write(self._path, self._schema.serialize().to_pybytes() + batches)
+            write(self._path, _record(begin.encode()) + (b"" if kept is None else kept.records))
             self._file: int | None = os.open(self._path, os.O_WRONLY | os.O_APPEND)
         except OSError as error:
             raise unwritable(folder, error) from error
 
     def add(self, step: Step) -> None:
-        """Append a step unless it is there already; raises FolderGoneError where the stream was taken away."""
+        """Append a step unless it is there already; raises FolderGoneError where the file was taken away."""
         if self._file is None:
             return
         self.check()
         if step.index < self._steps:
             return
         wheels = step.odometry.reported
-        rows = ([step.time_s], step.scan.ranges_m, wheels.motion, wheels.cov)
-        message = _batch(self._schema, rows)
+        numbers = np.concatenate([[step.time_s], wheels.motion, wheels.cov.ravel(), step.scan.ranges_m])
+        message = _record(numbers.astype(_NUMBER).tobytes())
         before = os.fstat(self._file).st_size
         try:
             whole = os.write(self._file, message) == len(message)
@@ -78,7 +83,7 @@ class RunningLog:
         self._steps += 1
 
     def check(self) -> None:
-        """Raise FolderGoneError where the stream is no longer the one in the folder."""
+        """Raise FolderGoneError where the file is no longer the one in the folder."""
         if self._file is None:
             return
         try:
@@ -95,71 +100,54 @@ class RunningLog:
             self._file = None
 
     def remove(self) -> None:
-        """Remove the stream: what it holds is kept elsewhere, or was kept before."""
+        """Remove the file: what it holds is kept elsewhere, or was kept before."""
         self.close()
         with suppress(OSError):
             self._path.unlink()
 
 
-def _batch(schema: pa.Schema, rows: tuple[Any, ...]) -> bytes:
-    """Return one step as the bytes of a batch."""
-    arrays = []
-    for row in rows:
-        values = np.ascontiguousarray(row, dtype=np.float64).ravel()
-        # From buffers: any other way from numpy to Arrow imports pandas first, which takes 0.3 s.
-        inner = pa.Array.from_buffers(pa.float64(), len(values), [None, pa.py_buffer(values)])
-        offsets = pa.py_buffer(np.array([0, len(values)], dtype=np.int32))
-        arrays.append(pa.Array.from_buffers(pa.list_(pa.float64()), 1, [None, offsets], children=[inner]))
-    return pa.RecordBatch.from_arrays(arrays, schema=schema).serialize().to_pybytes()
+def _record(held: bytes) -> bytes:
+    return _HEAD.pack(len(held), crc32(held)) + held
+
+
+def _records(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield where each whole record ends, and what it holds; what follows one that is not whole is left out."""
+    at = 0
+    while at + _HEAD.size <= len(content):
+        length, checksum = _HEAD.unpack_from(content, at)
+        at += _HEAD.size + length
+        held = content[at - length : at]
+        if len(held) < length or crc32(held) != checksum:
+            return
+        yield at, held
 
 
 def read_running(folder: Path) -> Kept | None:
-    """Return what the stream in a folder holds, None where there is none; raises UsageError for a file that is none."""
+    """Return what the file in a folder holds, None where there is none; raises UsageError for a file that is none."""
     path = folder / RUNNING
     try:
-        source = pa.BufferReader(path.read_bytes())
+        content = path.read_bytes()
     except FileNotFoundError:
         return None
     except OSError as error:
         raise _none(path, error.strerror or "unreadable") from error
+    records = _records(content)
+    began, begin = next(records, (0, b""))
     try:
-        reader = pa.ipc.open_stream(source)
-        said = {key.decode(): value.decode() for key, value in (reader.schema.metadata or {}).items()}
+        said = json.loads(begin)
         config = said["config"].encode()
-    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise _none(path, "none of ours") from error
-    if said.get("format") != str(FORMAT) or not reader.schema.equals(pa.schema(_FIELDS)):
+    if said.get("format") != FORMAT:
         raise _none(path, f"format {said.get('format')}")
-    began = end = source.tell()
-    steps: list[list[Any]] = []
-    while (step := _next(reader)) is not None and _fits(step, steps):
-        steps.append(step)
-        end = source.tell()
-    source.seek(began)
-    columns = [np.array([step[k] for step in steps]) for k in range(len(_COLUMNS))]
-    if not steps:
-        columns = [np.empty((0, 1)), np.empty((0, 0)), np.empty((0, 3))]
-    return Kept(config, source.read(end - began), columns[0][:, 0], columns[1], columns[2])
-
-
-def _next(reader: Any) -> list[Any] | None:
-    """Return the next step of a stream, None at its end and where it was cut short."""
-    try:
-        batch = reader.read_next_batch()
-        batch.validate(full=True)
-    except (StopIteration, pa.ArrowException, OSError):
-        return None
-    if batch.num_rows != 1 or any(column.null_count for column in batch.columns):
-        return None
-    # Through values without a copy; they have no nulls of their own, or they are none of ours.
-    inner = [column.flatten() for column in batch.columns]
-    return None if any(values.null_count for values in inner) else [values.to_numpy() for values in inner]
-
-
-def _fits(step: list[Any], steps: list[list[Any]]) -> bool:
-    """Return whether a step has the sizes of a step, and those of the first one."""
-    sizes = [len(values) for values in step]
-    return sizes == ([1, sizes[1], 3, 9] if not steps else [len(values) for values in steps[0]])
+    end, steps = began, []
+    for after, held in records:
+        if len(held) < 8 * _BEFORE or len(held) % 8 or (steps and len(held) != 8 * len(steps[0])):
+            break
+        steps.append(np.frombuffer(held, _NUMBER))
+        end = after
+    numbers = np.array(steps) if steps else np.empty((0, _BEFORE))
+    return Kept(config, content[began:end], numbers[:, 0], numbers[:, _BEFORE:], numbers[:, 1:4])
 
 
 def _none(path: Path, found: str) -> UsageError:

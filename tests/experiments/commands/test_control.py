@@ -252,7 +252,7 @@ def test_ctrl_c_ends_in_130_and_what_is_written_is_whole(times, tmp_path):
     with subprocess.Popen(
         command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        log = out / "log.arrow"
+        log = out / "log.running"
         # Some steps are done: after a fixed time a loaded machine might not have begun.
         while not log.exists() or log.stat().st_size < 20_000:
             assert process.poll() is None
