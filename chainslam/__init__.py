@@ -70,7 +70,10 @@ def __getattr__(name: str) -> Any:
     """Return a name of the interface, from where it lives."""
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'chainslam' has no attribute {name!r}")
-    value = getattr(import_module(_PLACE_OF[name]), name)
+    try:
+        value = getattr(import_module(_PLACE_OF[name]), name)
+    except ImportError as error:
+        raise import_module("chainslam.experiments.usage").missing(error) from error
     if name in ("BACKENDS", "STRATEGIES", "READERS"):
         import_module("chainslam.experiments.campaign.plugins").register_installed()
     globals()[name] = value

@@ -1,6 +1,7 @@
 """From the names in a command to a world, a robot, a back end and a strategy."""
 
 from dataclasses import dataclass, field, fields, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
@@ -40,7 +41,8 @@ P0_SIGMAS: dict[str, tuple[float, float]] = {
 KNOWN: P0 = "zero"
 """The start is known as well as numbers allow."""
 
-DRIVER = "graph"
+HAS_GTSAM = find_spec("gtsam") is not None
+DRIVER = "graph" if HAS_GTSAM else "invariant-ekf"
 """The back end that explores unless another is named: it loses the fewest maps of schools (`make schools`)."""
 STRATEGY_OF_REPLAYS = "none"
 """Nobody decides where a recorded robot goes."""

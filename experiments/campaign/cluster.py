@@ -8,7 +8,7 @@ from itertools import islice
 from time import monotonic
 from typing import Any
 
-from ..usage import UsageError
+from ..usage import UsageError, missing
 from .plugins import with_own
 from .runner import Executor, lost
 from .work import Done, Job, perform
@@ -33,7 +33,7 @@ def on_dask(address: str) -> Executor:
     try:
         import distributed
     except ImportError as error:
-        raise UsageError("expected the package distributed, found none: pip install chainslam[dask]") from error
+        raise missing(error) from error
     for name in ("distributed", *(name for name in logging.root.manager.loggerDict if name.startswith("distributed"))):
         # What they tell of a lost connection is told here in a line.
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)

@@ -14,7 +14,7 @@ from ..artifacts.presets import METHODS, backend_of, mapping_of
 from ..artifacts.settings import NAVIGATION, nested, trial_of
 from ..replays.replay import Association
 from ..scenario import P0, TrialConfig, check_settings
-from ..usage import OR_OWN, UsageError, choose
+from ..usage import OR_OWN, UsageError, choose, need
 
 CLOSED, RECORDING = "closed", "recording"
 ARMS = (CLOSED, "replay-own", "replay-true")
@@ -202,6 +202,7 @@ def check_campaign(campaign: Campaign) -> None:
 
 def check_parts(campaign: Campaign) -> None:
     """Raise UsageError where a back end or strategy is not there: trials need it, what they left does not."""
+    need("pyarrow")
     choose("back end (--driver)", campaign.driver, BACKENDS, OR_OWN)
     for backend in campaign.backends:
         choose("back end", backend, BACKENDS, OR_OWN)

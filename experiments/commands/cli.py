@@ -14,7 +14,7 @@ from ..terminal.answers import Output, answering
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks, too_late
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
 from ..terminal.word_order import with_files
-from ..usage import UsageError, choose
+from ..usage import UsageError, choose, missing
 from .parsing import parsed
 
 FAILED, BAD_USAGE = 1, 2
@@ -164,7 +164,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         # What interrupts a compiled module while it loads comes out of it as this.
         if isinstance(error.__cause__, KeyboardInterrupt):
             return _interrupted()
-        raise
+        told = missing(error)
+        if told is error:
+            raise
+        _tell(told)
+        return BAD_USAGE
 
 
 def _interrupted() -> int:

@@ -35,7 +35,7 @@ from ..artifacts.settings import (
     read_settings,
     trial_of,
 )
-from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.answers import found
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
@@ -242,6 +242,8 @@ class Explore:
         scenario = build(trial, world)
         echo_world(world)
         say(run_line(world, trial))
+        if not HAS_GTSAM and trial.backend == DRIVER and not self._is_given("backend"):
+            say(f"note: the package gtsam is not installed, so that {DRIVER} explores in place of graph")
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
         log = RunningLog(folder, config, saved.kept if saved is not None else None)

@@ -18,6 +18,7 @@ from ..artifacts.files import probe, write_anywhere
 from ..replays.replay import RecordedRun, ReplayOptions, replay
 from ..scenario import load_world
 from ..scoring.summary import nees_of_poses
+from ..usage import need
 
 if TYPE_CHECKING:
     from chainslam.viz.timeline import Timeline
@@ -43,6 +44,7 @@ class TimelineOutput:
         self._problem = ""
         self._timeline: Timeline | None = None
         if rrd is not None or view:
+            need("rerun")
             self._try(lambda: self._begin(title, backends, world, errorless, view))
 
     def watch(

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from jaxtyping import Float
 
 from chainslam.sim.logs.archive import regular
@@ -147,6 +145,9 @@ def step_rows(records: Sequence[TrialScores]) -> list[Row]:
 
 def parquet_bytes(rows: Sequence[Row], header: Sequence[str]) -> bytes:
     """Return a table as Parquet, the same bytes for the same rows."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     buffer = BytesIO()
     columns = {name: pa.array([row.get(name) for row in rows]) for name in header}
     pq.write_table(pa.table(columns), buffer)
@@ -167,6 +168,9 @@ def write_table(path: Path, rows: Sequence[Row], first: Sequence[str] = ()) -> N
 
 def read_rows(path: Path, columns: Sequence[str] = ()) -> list[Row]:
     """Return the rows of a table that stands as Parquet; raises UsageError where it is none or lacks `columns`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     with told(path, "run the same `compare` to its end"):
         try:
             table = pq.read_table(regular(path), partitioning=None)

@@ -68,7 +68,7 @@ def test_options_of_ones_own_decide_a_run_and_stand_in_its_config(shy, tmp_path)
     ("said", "words"),
     [
         ("backend_options.own.ShyConfig.time=1", "did you mean times"),
-        ("backend_options.own.ShyConfig.times='x'", "Expected `float`"),
+        ('backend_options.own.ShyConfig.times="x"', "Expected `float`"),
         ("backend_options.own.BoldConfig.times=1", "own.BoldConfig"),
     ],
 )
