@@ -15,7 +15,7 @@ setup: .venv/tools
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps -e .
-	$(BIN)/python -m chainslam.experiments.library.compile_kernels && touch $@
+	$(BIN)/python -m chainslam.experiments.commands.compile_kernels && touch $@
 
 .venv/tools: .venv/made requirements-dev.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements-dev.lock && touch $@

@@ -140,7 +140,7 @@ def read_running(folder: Path) -> Kept | None:
         raise _none(path, "none of ours") from error
     if said.get("format") != FORMAT:
         raise _none(path, f"format {said.get('format')}")
-    end, steps = began, []
+    end, steps = began, list[np.ndarray]()
     for after, held in records:
         if len(held) < 8 * _BEFORE or len(held) % 8 or (steps and len(held) != 8 * len(steps[0])):
             break

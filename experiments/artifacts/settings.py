@@ -4,7 +4,7 @@ Keys are those of `config.json`, with a dot between an object and what it holds:
 """
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
@@ -56,12 +56,21 @@ def parse_setting(text: str) -> Record:
         return some_settings(nested([(key, _value(words))]))
 
 
-def asked(file: Path | None, sets: Sequence[str], settled: Collection[str]) -> Record:
-    """Return what --config and --set ask for, --set on top, of a command that settles some keys itself.
+def parse_settings(texts: Iterable[str]) -> Record:
+    """Return several of `KEY=VALUE` as a nested record, the last one on top; raises UsageError."""
+    return over({}, *map(parse_setting, texts))
 
-    Those are left aside in a file. Raises UsageError, also where --set names one of them.
+
+def settings_of(said: Mapping[str, Any]) -> Record:
+    """Return settings by their dotted keys as a nested record; raises UsageError for what no trial can have."""
+    return parse_settings(f"{key}={json.dumps(value)}" for key, value in said.items())
+
+
+def asked(file: Path | None, named: Record, settled: Collection[str]) -> Record:
+    """Return what a file (--config) and settings by name (--set) ask for of a command that settles some keys itself.
+
+    The latter go before. What is settled is left aside in a file; raises UsageError where it is named.
     """
-    named = over({}, *map(parse_setting, sets))
     for key in named.keys() & set(settled):
         raise UsageError(f"expected --set of what this command leaves open, found {key!r}: it is settled otherwise")
     base = {} if file is None else read_settings(file)

@@ -12,8 +12,7 @@ from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
-from ..artifacts.presets import against_methods, robot_of
-from ..artifacts.settings import FOLLOWING, NAVIGATION, asked, differing, drawing_settings, nested, over, trial_of
+from ..artifacts.settings import drawing_settings, parse_settings
 from ..campaign.cluster import ClusterError, on_dask
 from ..campaign.comparison.story import decisive_arm, story_of
 from ..campaign.comparison.tables import write_tables
@@ -23,11 +22,6 @@ from ..campaign.merge import merge
 from ..campaign.pages.contrast_page import verdict
 from ..campaign.pages.film import record_campaign
 from ..campaign.plan import (
-    ARMS,
-    CLOSED,
-    DECIDED,
-    MAX_STEPS,
-    PRESETS,
     Campaign,
     check_campaign,
     check_parts,
@@ -36,6 +30,7 @@ from ..campaign.plan import (
 )
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened
+from ..library.asked import CampaignName, asked_campaign
 from ..replays.replay import Association
 from ..scenario import P0, load_world
 from ..terminal.answers import found
@@ -59,7 +54,7 @@ class Compare:
 
     out: Path
     """Folder for the results."""
-    preset: Literal["smoke", "paper", "paper-method", "full"] | None = None
+    preset: CampaignName | None = None
     """A campaign by name; options named beside it go before. paper-method holds the paper's method against today's
     mapper with three back ends."""
     worlds: tuple[str, ...] | None = None
@@ -118,34 +113,24 @@ class Compare:
     @property
     def campaign(self) -> Campaign:
         """The campaign that the options describe; raises UsageError where they leave something open."""
-        given = {"worlds": self.worlds, "backends": self.backends, "strategies": self.strategies, "trials": self.trials}
-        preset = dict(PRESETS[self.preset]) if self.preset else {}
-        settings = over(nested(preset.pop("settings", ())), robot_of(self.robot), asked(self.config, self.set, DECIDED))
-        if "navigation" in self.given or self.navigation != Compare.navigation:
-            settings = over(settings, nested([(NAVIGATION, self.navigation)]))
-        if "following" in self.given or self.following != Compare.following:
-            settings = over(settings, nested([(FOLLOWING, self.following)]))
-        settings = over(settings, nested(drawing_settings(self.drawing, self.given).items()))
-        if self.errorless:
-            settings = over(settings, {"errorless": True})
-        ruled = {name: settings.pop(name) for name in ("p0", "max_steps") if name in settings}
-        ruled |= {"p0": self.p0} if "p0" in self.given or self.p0 != Compare.p0 else {}
-        named = {name: value for name, value in (given | {"max_steps": self.max_steps}).items() if value is not None}
-        named = ruled | named
-        chosen = {"max_steps": MAX_STEPS} | preset | named
-        missing = [f"--{name}" for name in given if name not in chosen]
-        if missing:
-            raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
-        arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in self.modes]
-        arms += [f"replay-{name}" for name in ("own", "true") if "replay" in self.modes and name in self.association]
-        changed = differing(trial_of(settings)) + against_methods(chosen["backends"], settings)
-        return Campaign(
-            **chosen,
-            arms=tuple(arms),
+        cells = ("worlds", "backends", "strategies", "trials")
+        said = ("navigation", "following", "errorless", "p0", "max_steps")
+        return asked_campaign(
+            {name: getattr(self, name) for name in cells},
+            {name: getattr(self, name) for name in said if self._is_given(name)},
+            drawing_settings(self.drawing, self.given),
+            self.preset,
+            self.robot,
+            self.config,
+            parse_settings(self.set),
+            modes=self.modes,
+            association=self.association,
             driver=self.driver,
             first_seed=self.first_seed,
-            settings=tuple(sorted(dict(changed).items())),
         )
+
+    def _is_given(self, name: str) -> bool:
+        return name in self.given or getattr(self, name) != getattr(Compare, name)
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

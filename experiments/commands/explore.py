@@ -11,8 +11,7 @@ from chainslam.explore.planning.navigators import Navigation
 from chainslam.explore.step import Step
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions, World
 
-from ..artifacts.fences import fence_of
-from ..artifacts.presets import PresetName, preset_of, robot_of
+from ..artifacts.presets import PresetName
 from ..artifacts.results import config_record, write_results
 from ..artifacts.run_folder import (
     clear_leftovers,
@@ -27,14 +26,10 @@ from ..artifacts.running_log import RunningLog
 from ..artifacts.saved import SavedRun, read_saved
 from ..artifacts.settings import (
     DRAWING,
-    FOLLOWING,
-    NAVIGATION,
     drawing_settings,
-    nested,
     parse_setting,
-    read_settings,
-    trial_of,
 )
+from ..library.asked import KEYS, asked_trial
 from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, TrialConfig, build, check, load_world
 from ..terminal.answers import found
 from ..terminal.console import say
@@ -46,17 +41,6 @@ from ..views.timelines import TimelineOutput
 from .echo import echo_world, expected_steps, run_line
 
 MAX_STEPS = TrialConfig.max_steps
-KEYS = {
-    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
-    "odometry": "odometry",
-    "max_path": "max_path_m",
-    "time_limit": "time_limit_s",
-    "sweep": "mission.explorer.sweep",
-    "return_to_start": "mission.return_to_start",
-    "navigation": NAVIGATION,
-    "following": FOLLOWING,
-}
-"""Options that decide a run, and their keys in `config.json`."""
 SETTLED = (
     "world",
     "backend",
@@ -151,24 +135,16 @@ class Explore:
 
     @property
     def trial(self) -> TrialConfig:
-        """What decides the run, without where its results go; raises UsageError where no world is named.
-
-        An option wins over --set, that over --config, that over the robot's file and the preset, those over the
-        defaults.
-        """
-        given = {key: getattr(self, name) for name, key in KEYS.items() if self._is_given(name)}
-        given |= drawing_settings(self.drawing, self.given)
-        if self.fence is not None:
-            given["mission.free_space.fence"] = fence_of(self.fence)
-        options = nested((key, list(value) if isinstance(value, tuple) else value) for key, value in given.items())
-        base = {} if self.config is None else read_settings(self.config)
-        default = {"backend": DRIVER}
-        trial = trial_of(
-            default, preset_of(self.preset), robot_of(self.robot), base, *map(parse_setting, self.set), options
+        """What decides the run, without where its results go; raises UsageError where no world is named."""
+        return asked_trial(
+            {name: getattr(self, name) for name in KEYS if self._is_given(name)},
+            drawing_settings(self.drawing, self.given),
+            self.fence,
+            self.preset,
+            self.robot,
+            self.config,
+            map(parse_setting, self.set),
         )
-        if not trial.world:
-            raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
-        return trial
 
     def _is_given(self, name: str) -> bool:
         said, default = (self.drawing, AS_DRAWN) if name in DRAWING else (self, Explore)

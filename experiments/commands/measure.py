@@ -33,7 +33,7 @@ class Measure:
         if not self.corners:
             _list(mapped, self.folder)
             return 0
-        first, second = (_corner(name, mapped, self.folder) for name in self.corners)
+        first, second = (mapped.named(name, self.folder) for name in self.corners)
         measured = mapped.distance(first, second)
         low, high = measured.interval
         found(distance_m=measured.value, sigma_m=measured.sigma, interval_m=[low, high])
@@ -42,16 +42,6 @@ class Measure:
             f" (sigma {1e3 * measured.sigma:.1f} mm{_estimator(self.folder)})"
         )
         return 0
-
-
-def _corner(name: str, mapped: MappedCorners, folder: Path) -> int:
-    corners = {str(k): k for k in range(len(mapped))}
-    if name not in corners:
-        known = f"0 to {len(mapped) - 1}" if corners else "none"
-        raise UsageError(f"expected a corner out of {known}, found {name!r}: see `chainslam measure {folder}`")
-    if not mapped.sharp[corners[name]]:
-        raise UsageError(f"expected walls that cross, found those of corner {name} on one line: take another")
-    return corners[name]
 
 
 def _list(mapped: MappedCorners, folder: Path) -> None:

@@ -10,18 +10,17 @@ import tyro
 
 from chainslam.explore.outcome import Outcome
 from chainslam.explore.step import Step
-from chainslam.sim.logs.recorded_log import is_own_log
-from chainslam.sim.logs.recorded_robot import knows_truth
 from chainslam.slam.backends import BACKENDS
 
-from ..artifacts.presets import robot_of, stated
 from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
+from ..artifacts.settings import parse_settings
+from ..library.asked import asked_source
 from ..replays.measured import check_references, held_against
-from ..replays.real_log import RealOptions, read_own_run, read_real_run
-from ..replays.replay import Association, ReplayOptions, read_run, retuned
+from ..replays.real_log import RealOptions
+from ..replays.replay import Association, ReplayOptions
 from ..replays.sources import OwnLog, RealLog
-from ..scenario import OdometrySource, load_world
+from ..scenario import OdometrySource
 from ..scoring.without_truth.references import read_references
 from ..terminal.answers import found
 from ..terminal.console import say
@@ -134,36 +133,10 @@ class Replay:
 
     def source(self) -> OwnLog | RealLog:
         """Return the log, read; raises UsageError where it is none."""
-        robot = stated(robot_of(self.robot))
-        is_own = is_own_log(self.log)
-        if is_own and self.every != 1:
-            raise UsageError(f"expected --every with a real robot's log, found {self.log.name}: leave it out")
-        if is_own and (self.scan_topic or self.odom_topic):
-            raise UsageError(
-                f"expected a ROS bag for --scan-topic and --odom-topic, found {self.log.name}: leave them out"
-            )
-        if is_own and knows_truth(self.log):
-            if self.range_noise is not None:
-                raise UsageError(
-                    f"expected --range-noise with a log that states none, found {self.log.name}: leave it out"
-                )
-            run = retuned(read_run(self.log), self.config, self.set, robot)
-            options = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry, self.odometry)
-            return OwnLog(run, options, load_world(run.trial.world, run.trial.start, run.trial.drawing))
-        if self.association != "own" or self.perfect_extraction or self.perfect_odometry:
-            raise UsageError(
-                "expected a log that knows the truth for --association true, --perfect-extraction and"
-                f" --perfect-odometry, found {self.log.name}: leave them out"
-            )
-        read = read_own_run if is_own else read_real_run
+        own = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry, self.odometry)
         topics = self.scan_topic, self.odom_topic
-        told = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise, *topics)
-        real = RealLog(read(self.log, told, self.config, self.set, robot))
-        log, name = real.run.log, self.log.resolve().name
-        cut = f"{log.trouble}: {len(log.scan_time_s)} scans before it are used" if log.trouble else ""
-        for words in filter(None, (*log.notes, log.left_out.words(len(log.scan_time_s)), cut)):
-            say(f"chainslam: {name}: {words}", stderr=True)
-        return real
+        real = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise, *topics)
+        return asked_source(self.log, own, real, self.robot, self.config, parse_settings(self.set))
 
     def _kind(self, source: OwnLog | RealLog) -> str:
         return self.association if isinstance(source, OwnLog) else source.title.partition(".")[0]

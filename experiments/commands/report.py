@@ -6,18 +6,14 @@ from typing import Annotated
 
 import tyro
 
-from chainslam.viz.reports.report import Page, html, latex
+from chainslam.viz.reports.report import latex
 
 from ..artifacts.files import replacing, write
-from ..campaign.contrast import CONTRAST
-from ..campaign.pages.contrast_page import contrast_page
-from ..campaign.pages.page import page_of
+from ..library.pages import REPORT, report_at
 from ..terminal.answers import found
-from ..usage import UsageError
 from ..views.gif import gif_of
-from ..views.run_page import is_run, run_page
 
-REPORT, TABLES, GIF = "report.html", "tables.tex", "run.gif"
+TABLES, GIF = "tables.tex", "run.gif"
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class Report:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
         replaced = replacing(self.folder / REPORT)
-        page = self.write()
+        page, _ = report_at(self.folder)
         found(report=str(self.folder / REPORT))
         print(f"report in {self.folder / REPORT}{replaced}")
         if self.latex:
@@ -49,18 +45,3 @@ class Report:
             found(animation=str(self.folder / GIF))
             print(f"animation in {self.folder / GIF}{replaced}")
         return 0
-
-    def write(self) -> Page:
-        """Write the page and return what stands on it; raises UsageError for a folder without results."""
-        page = _page(self.folder)
-        write(self.folder / REPORT, html(page))
-        return page
-
-
-def _page(folder: Path) -> Page:
-    if not folder.is_dir():
-        raise UsageError(f"expected a folder of results, found no folder {folder}: name what a command left")
-    if (folder / CONTRAST).is_file():
-        return contrast_page(folder)
-    # A campaign keeps no summary.json; its recordings lie two folders further down.
-    return run_page(folder) if is_run(folder) else page_of(folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
 
 from ..artifacts.reading import read_json
-from ..artifacts.settings import drawing_said, options_of
+from ..artifacts.settings import drawing_said, drawing_settings, settings_of
 from ..campaign.cluster import on_dask
 from ..campaign.comparison.story import story_of
 from ..campaign.comparison.tables import write_tables
@@ -20,9 +21,10 @@ from ..campaign.plan import check_campaign, check_parts, drawing_of, trials
 from ..campaign.plugins import register_installed
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened, read_campaigns
-from ..commands.compare import Compare
 from ..replays.replay import Association
 from ..scenario import P0, load_world
+from .asked import CampaignName, asked_campaign
+from .pages import report_at
 from .runs import Home, Run, run_at, table_at
 
 if TYPE_CHECKING:
@@ -57,10 +59,7 @@ class Comparison:
 
     def report(self) -> Path:
         """Write the page that `chainslam report` writes, and return its place."""
-        from ..commands.report import REPORT, Report
-
-        Report(self.folder).write()
-        return self.folder / REPORT
+        return report_at(self.folder)[1]
 
     def __repr__(self) -> str:
         return f"Comparison({self.folder})"
@@ -68,15 +67,17 @@ class Comparison:
 
 def compare(
     *,
-    worlds: Sequence[str | Path],
-    backends: Sequence[str],
-    strategies: Sequence[str] = ("nearest-robot",),
-    trials: int = 10,
+    preset: CampaignName | None = None,
+    worlds: Sequence[str | Path] | None = None,
+    backends: Sequence[str] | None = None,
+    strategies: Sequence[str] | None = None,
+    trials: int | None = None,
     first_seed: int = 1,
     modes: Sequence[Literal["closed", "replay"]] = ("closed", "replay"),
     association: Sequence[Association] = ("own", "true"),
     driver: str = "full-ekf",
     p0: P0 = "small",
+    errorless: bool = False,
     max_steps: int | None = None,
     navigation: Navigation = "floor",
     following: Following = "viewpoints",
@@ -88,6 +89,7 @@ def compare(
     threshold: float | None = None,
     negate: bool = False,
     robot: str | Path | None = None,
+    config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     jobs: int | None = None,
     dask: str | None = None,
@@ -95,7 +97,8 @@ def compare(
 ) -> Comparison:
     """Run many trials and return their comparison; `chainslam compare` as a function.
 
-    `scale` to `negate` say what the worlds' files leave open. `jobs` processes run them, one a core by default, or
+    Without a `preset`, worlds and back ends are named, and it is ten trials by the strategy nearest-robot unless others
+    are. `scale` to `negate` say what the worlds' files leave open. `jobs` processes run them, one a core by default, or
     the workers of the Dask scheduler at the address `dask`. The same call with the same `out` goes on where it was
     stopped.
     Raises UsageError, in one line, for bad input.
@@ -105,29 +108,42 @@ def compare(
     if out is None:
         home = Home()
         out = home.folder / "campaign"
-    command = Compare(
-        out=Path(out), worlds=tuple(map(str, worlds)), backends=tuple(backends), strategies=tuple(strategies),
-        trials=trials, first_seed=first_seed, modes=tuple(modes), association=tuple(association), driver=driver, p0=p0,
-        max_steps=max_steps, navigation=navigation, following=following,
-        drawing=drawing_said(
-            scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
-            threshold=threshold, negate=negate,
-        ),
-        robot=None if robot is None else str(robot),
-        set=tuple(options_of((settings or {}).items())[1::2]), jobs=jobs,
+    if preset is None:
+        strategies, trials = strategies or ("nearest-robot",), 10 if trials is None else trials
+    said: dict[str, Any] = {
+        "navigation": navigation, "following": following, "errorless": errorless, "p0": p0, "max_steps": max_steps,
+    }  # fmt: skip
+    cells: dict[str, Any] = {"worlds": worlds and tuple(map(str, worlds)), "backends": backends and tuple(backends)}
+    cells |= {"strategies": strategies and tuple(strategies), "trials": trials}
+    drawing = drawing_said(
+        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level, threshold=threshold,
+        negate=negate,
     )  # fmt: skip
-    campaign = command.campaign
+    campaign = asked_campaign(
+        cells,
+        {name: value for name, value in said.items() if value != DEFAULTS[name]},
+        drawing_settings(drawing),
+        preset,
+        None if robot is None else str(robot),
+        None if config is None else Path(config),
+        settings_of(settings or {}),
+        modes=tuple(modes),
+        association=tuple(association),
+        driver=driver,
+        first_seed=first_seed,
+    )
     check_campaign(campaign)
     check_parts(campaign)
     for world in campaign.worlds:
         load_world(world, drawing=drawing_of(campaign))
-    with opened(command.out, campaign) as store:
+    with opened(Path(out), campaign) as store:
         run_campaign(store, on_cores(jobs) if dask is None else on_dask(dask))
-        write_tables(command.out, campaign, _trials(campaign), store.record)
-    return Comparison(command.out, home)
+        write_tables(Path(out), campaign, _trials(campaign), store.record)
+    return Comparison(Path(out), home)
 
 
 _trials = trials
+DEFAULTS = {name: each.default for name, each in signature(compare).parameters.items()}
 
 
 def load(folder: str | Path) -> Run | Comparison:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
+from inspect import signature
 from pathlib import Path
 from typing import Any, overload
 
@@ -14,20 +15,22 @@ from chainslam.explore.step import Step
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.robot import Robot, RobotSpec
 
+from ..artifacts.presets import PresetName
 from ..artifacts.results import REPLAY, config_record, write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
-from ..artifacts.settings import drawing_said, options_of
+from ..artifacts.settings import drawing_said, drawing_settings, settings_of
 from ..campaign.plugins import register_installed
-from ..commands.explore import Explore
-from ..commands.replay import Replay
+from ..replays.measured import check_references, held_against
 from ..replays.real_log import RealOptions
-from ..replays.replay import Association
-from ..replays.sources import RECORDED
+from ..replays.replay import Association, ReplayOptions
+from ..replays.sources import RECORDED, OwnLog, RealLog
 from ..replays.unwitnessed import run_unwitnessed, unwitnessed
 from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..scoring.without_truth.references import References, read_references
 from ..terminal.word_order import file_in
 from ..trial import TrialResult, default_mission, run_scenario
-from ..usage import UsageError, choose
+from ..usage import OR_OWN, UsageError, choose
+from .asked import asked_source, asked_trial
 from .runs import Home, Run
 
 Watch = Callable[[Step], None]
@@ -58,7 +61,9 @@ def explore(
     threshold: float | None = None,
     negate: bool = False,
     fence: str | None = None,
+    preset: PresetName | None = None,
     robot: str | Path | RobotSpec | None = None,
+    config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -68,27 +73,32 @@ def explore(
 
     `world` is a bundled name, a file, or a `Robot`. Of a robot of one's own nobody knows the truth: its scores are
     None, and the map's frame is its first pose. `robot` is what it states of itself: a bundled name, a YAML file or a
-    `RobotSpec`. `scale` to `negate` say what a file leaves open, as the options of the command. `settings` are those
-    of --set: keys of config.json and their values. `watch` sees every step. Without `out` the files go with the
-    returned object. Raises UsageError, in one line, for bad input.
+    `RobotSpec`. `scale` to `negate` say what a file leaves open, as the options of the command. `preset`, `config` and
+    `settings` are --preset, --config and --set, the last as keys of config.json with their values. `watch` sees every
+    step. Without `out` the files go with the returned object. Raises UsageError, in one line, for bad input.
     """
     register_installed()
     own = None if isinstance(world, str | Path) else world
     name = str(world) if own is None else type(own).__name__
     spec = robot if isinstance(robot, RobotSpec) else None
-    options = Explore(
-        world=name, backend=backend, strategy=strategy, seed=seed, p0=p0, errorless=errorless, navigation=navigation,
-        following=following, sweep=sweep, odometry=odometry, max_steps=max_steps, max_path=max_path,
-        time_limit=time_limit, return_to_start=return_to_start, start=start,
-        drawing=drawing_said(
-            scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level,
-            threshold=threshold, negate=negate,
-        ),
-        fence=fence,
-        robot=None if robot is None or spec is not None else str(robot),
-        set=tuple(_words(settings or {})),
+    said: dict[str, Any] = {
+        "backend": backend, "strategy": strategy, "seed": seed, "p0": p0, "errorless": errorless, "sweep": sweep,
+        "navigation": navigation, "following": following, "odometry": odometry, "max_steps": max_steps,
+        "max_path": max_path, "time_limit": time_limit, "return_to_start": return_to_start, "start": start,
+    }  # fmt: skip
+    drawing = drawing_said(
+        scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level, threshold=threshold,
+        negate=negate,
     )  # fmt: skip
-    trial = options.trial
+    trial = asked_trial(
+        {"world": name} | {key: value for key, value in said.items() if value is not None and value != DEFAULTS[key]},
+        drawing_settings(drawing),
+        fence,
+        preset,
+        None if robot is None or spec is not None else str(robot),
+        None if config is None else Path(config),
+        [settings_of(settings or {})],
+    )
     if spec is not None:
         trial = replace(trial, robot=trial.robot.stating(spec))
     check(trial)
@@ -100,12 +110,22 @@ def explore(
     return _kept(*_folder(out), said, force, lambda: run_unwitnessed(scenario, watch, default_mission))
 
 
+DEFAULTS = {name: each.default for name, each in signature(explore).parameters.items()}
+"""What is not said, where it is the same: a preset or a file of settings may say it."""
+
+
 @overload
 def replay(
     log: str | Path | Run,
     *,
     backend: str = "full-ekf",
     association: Association = "own",
+    odometry: OdometrySource | None = None,
+    second_looks: bool = False,
+    relations: str | Path | None = None,
+    reference: str | Path | None = None,
+    robot: str | Path | None = None,
+    config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -119,6 +139,12 @@ def replay(
     *,
     backend: list[str] | tuple[str, ...],
     association: Association = "own",
+    odometry: OdometrySource | None = None,
+    second_looks: bool = False,
+    relations: str | Path | None = None,
+    reference: str | Path | None = None,
+    robot: str | Path | None = None,
+    config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -131,6 +157,12 @@ def replay(
     *,
     backend: str | list[str] | tuple[str, ...] = "full-ekf",
     association: Association = "own",
+    odometry: OdometrySource | None = None,
+    second_looks: bool = False,
+    relations: str | Path | None = None,
+    reference: str | Path | None = None,
+    robot: str | Path | None = None,
+    config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -138,27 +170,36 @@ def replay(
 ) -> Run | dict[str, Run]:
     """Send a log, or the log of a run, through one back end or several; `chainslam replay` as a function.
 
-    Returns the run, or with several names the runs by name. Raises UsageError, in one line, for bad input.
+    Returns the run, or with several names the runs by name. `relations` and `reference` are files of what others
+    measured, and `second_looks` smooths a real robot's log once it has ended, as the options of the command do. Raises
+    UsageError, in one line, for bad input.
     """
     register_installed()
     names = (backend,) if isinstance(backend, str) else tuple(backend)
     path = file_in(log.folder if isinstance(log, Run) else Path(log), "log.npz")
-    command = Replay(path, backend=names, association=association, set=tuple(_words(settings or {})))
     for name in names:
-        choose("back end", name, BACKENDS)
-    source = command.source()
+        choose("back end", name, BACKENDS, OR_OWN)
+    references = read_references(*(None if each is None else Path(each) for each in (relations, reference)))
+    source = asked_source(
+        path,
+        ReplayOptions(association, odometry=odometry),
+        RealOptions(odometry=odometry, second_looks=second_looks),
+        None if robot is None else str(robot),
+        None if config is None else Path(config),
+        settings_of(settings or {}),
+    )
+    check_references(references, *source.odometry)
     runs: dict[str, Run] = {}
     folder, home = _folder(out)
     for name in names:
         own = folder / name if len(names) > 1 else folder
-        config = source.config(name)
-        runs[name] = _kept(own, home, config, force, partial(source.go, name, watch))
+        said = source.config(name)
+        runs[name] = _kept(own, home, said, force, partial(_replayed, source, name, watch, references))
     return runs[backend] if isinstance(backend, str) else runs
 
 
-def _words(settings: Mapping[str, Any]) -> list[str]:
-    """Return settings as --set takes them."""
-    return options_of(settings.items())[1::2]
+def _replayed(source: OwnLog | RealLog, name: str, watch: Watch, references: References) -> TrialResult:
+    return held_against(source.go(name, watch), references)
 
 
 def _folder(out: str | Path | None) -> tuple[Path, Home | None]:

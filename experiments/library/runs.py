@@ -18,10 +18,12 @@ from chainslam.sim.logs.archive import regular
 from chainslam.slam.geometry.lines import directions, normals
 
 from ..artifacts.maps.map_files import read_map
+from ..artifacts.maps.mapped import MappedCorners, read_corners
 from ..artifacts.reading import read_json, told
 from ..artifacts.results import SUMMARY
 from ..artifacts.saved import Ended
 from ..artifacts.schema import UnfitError
+from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 
 if TYPE_CHECKING:
@@ -98,10 +100,19 @@ class Run:
 
     def report(self) -> Path:
         """Write the page that `chainslam report` writes, and return its place."""
-        from ..commands.report import REPORT, Report
+        from .pages import report_at
 
-        Report(self.folder).write()
-        return self.folder / REPORT
+        return report_at(self.folder)[1]
+
+    def measure(self, first: int | None = None, second: int | None = None) -> Measured | MappedCorners:
+        """Return the distance between two corners with its error, by their ids in `map.geojson`; without, all corners.
+
+        Raises UsageError for what is no corner, or where one's walls lie on one line.
+        """
+        mapped = read_corners(self.folder)
+        if first is None or second is None:
+            return mapped
+        return mapped.distance(*(mapped.named(str(corner), self.folder) for corner in (first, second)))
 
     def __repr__(self) -> str:
         said = self.summary

@@ -1,6 +1,6 @@
 """A real robot's log through a back end: no truth is known, so what is scored is what the map and the log tell."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -82,7 +82,7 @@ class RealRun:
 
 
 def read_real_run(
-    path: Path, options: RealOptions, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any]
+    path: Path, options: RealOptions, config: Path | None, named: Mapping[str, Any], robot: Mapping[str, Any]
 ) -> RealRun:
     """Read a log of a real robot; raises UsageError, in one line, where not one scan of it can be used.
 
@@ -99,7 +99,7 @@ def read_real_run(
     plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
-    trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, sets, settled))
+    trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, dict(named), settled))
     return RealRun(path.resolve().name, log, trial, options, log.trouble)
 
 
@@ -114,7 +114,7 @@ def _keyframes(options: RealOptions) -> KeyframesConfig:
 
 
 def read_own_run(
-    path: Path, options: RealOptions, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any]
+    path: Path, options: RealOptions, config: Path | None, named: Mapping[str, Any], robot: Mapping[str, Any]
 ) -> RealRun:
     """Read the `log.npz` of a robot of one's own and the `config.json` beside it; raises UsageError.
 
@@ -129,7 +129,7 @@ def read_own_run(
     trial = replace(read_trial(path.with_name("config.json")), strategy=STRATEGY_OF_REPLAYS)
     options = replace(options, odometry=options.odometry or trial.odometry)
     settled = record_of(trial).keys() - set(OPEN_TO_REPLAYS)
-    trial = trial_of(record_of(trial), robot, asked(config, sets, settled))
+    trial = trial_of(record_of(trial), robot, asked(config, dict(named), settled))
     return RealRun(trial.world, every_scan(recording), trial, options, cut_short(path.parent))
 
 

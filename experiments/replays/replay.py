@@ -1,6 +1,6 @@
 """A run's own log through a back end: identical scans, the back end alone; truth and oracles from the same log."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -150,14 +150,14 @@ class ReplayedRobot(RecordedRobot):
 
 
 def retuned(
-    run: RecordedRun, config: Path | None, sets: Sequence[str], robot: Mapping[str, Any] | None = None
+    run: RecordedRun, config: Path | None, named: Mapping[str, Any], robot: Mapping[str, Any] | None = None
 ) -> RecordedRun:
-    """Return a run to be replayed with the settings of a file and of `KEY=VALUE` over its own; raises UsageError.
+    """Return a run to be replayed with the settings of a file and some by name over its own; raises UsageError.
 
     `robot` holds settings of what the robot states, over the run's own.
     """
     settled = record_of(run.trial).keys() - set(OPEN_TO_REPLAYS)
-    return replace(run, trial=trial_of(record_of(run.trial), robot or {}, asked(config, sets, settled)))
+    return replace(run, trial=trial_of(record_of(run.trial), robot or {}, asked(config, dict(named), settled)))
 
 
 def replayed(run: RecordedRun, backend: str) -> TrialConfig:

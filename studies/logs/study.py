@@ -68,7 +68,7 @@ def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
     relations, path = study.logs / f"{name}.relations", study.logs / f"{name}.ref_gmapping.txt"
     references = read_references(*(file if file.is_file() else None for file in (relations, path)))
     options = RealOptions(study.every, study.odometry, study.second_looks)
-    run = read_real_run(study.logs / f"{name}.log.gz", options, None, (), {})
+    run = read_real_run(study.logs / f"{name}.log.gz", options, None, {}, {})
     began = time.process_time()
     result = held_against(replay_real(run, backend), references)
     ms = 1e3 * (time.process_time() - began) / max(len(run.log.recording), 1)

@@ -31,7 +31,7 @@ def clocks(rng: Rng, folder: Path) -> Case:
     notes = {0: "expected a transform", 2: "that say 0: the time of their recording"}
     read = RealOptions(odometry="wheels")
     return Case(
-        lambda: read_real_run(path, read, None, (), {}),
+        lambda: read_real_run(path, read, None, {}, {}),
         holds(SCANS, 0, notes.get(how, "")),
         "expected scans and odometry by one clock" if how == 1 else "",
     )

@@ -63,7 +63,7 @@ def read(folder: Path, lines: list[str], odometry: str = "wheels") -> Callable[[
     """Write a log and return what reads it."""
     path = folder / "a.log"
     path.write_text("\n".join(lines) + "\n")
-    return lambda: read_real_run(path, RealOptions(odometry=odometry), None, (), {})  # type: ignore[arg-type]
+    return lambda: read_real_run(path, RealOptions(odometry=odometry), None, {}, {})  # type: ignore[arg-type]
 
 
 def holds(scans: int, left_out: int = 0, note: str = "", cut: bool = False) -> Callable[[RealRun], str]:
@@ -220,7 +220,7 @@ def breezyslam(rng: Rng, folder: Path) -> Case:
             off = np.nanmax(np.where(np.isinf(expected) & np.isinf(near), 0.0, np.abs(near - expected)))
         return wrong or ("" if off < 1e-3 else f"ranges {off:g} m off")
 
-    return Case(lambda: read_real_run(path, RealOptions(), None, (), {}), check)
+    return Case(lambda: read_real_run(path, RealOptions(), None, {}, {}), check)
 
 
 def broken_lines(rng: Rng, folder: Path) -> Case:
@@ -265,6 +265,6 @@ def packed(rng: Rng, folder: Path) -> Case:
     path.write_bytes(ways[name])
 
     def load() -> RealRun:
-        return read_real_run(path, RealOptions(odometry="wheels"), None, (), {})
+        return read_real_run(path, RealOptions(odometry="wheels"), None, {}, {})
 
     return Case(load, refused=f"{name}: unpack it") if name else Case(load, holds(SCANS))

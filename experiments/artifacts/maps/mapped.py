@@ -48,6 +48,16 @@ class MappedCorners:
     def __len__(self) -> int:
         return len(self.walls)
 
+    def named(self, name: str, folder: Path) -> int:
+        """Return a corner by its name; raises UsageError for one that is none, or whose walls lie on one line."""
+        corners = {str(k): k for k in range(len(self))}
+        if name not in corners:
+            known = f"0 to {len(self) - 1}" if corners else "none"
+            raise UsageError(f"expected a corner out of {known}, found {name!r}: see `chainslam measure {folder}`")
+        if not self.sharp[corners[name]]:
+            raise UsageError(f"expected walls that cross, found those of corner {name} on one line: take another")
+        return corners[name]
+
     def distance(self, first: int, second: int) -> Measured:
         """Return the distance between two corners."""
         return distance(self.points, first, second)

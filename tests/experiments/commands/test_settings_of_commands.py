@@ -9,7 +9,7 @@ import pytest
 from chainslam.experiments.artifacts.files import json_bytes
 from chainslam.experiments.artifacts.results import config_record
 from chainslam.experiments.artifacts.saved import read_trial
-from chainslam.experiments.artifacts.settings import asked
+from chainslam.experiments.artifacts.settings import asked, parse_settings
 from chainslam.experiments.campaign.comparison.tables import doubles
 from chainslam.experiments.campaign.comparison.words import command_of
 from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of, gate_of
@@ -124,7 +124,7 @@ def test_a_replay_has_the_settings_of_its_run_until_others_are_asked_for(run, tm
     mine = replayed("mine", "--config", str(path), "--set", f"{GATE}=0.8", "--set", "backend_options.ekf.at_wall=false")
     assert (mine.mission.mapper.matching.gate, mine.backend_options.ekf.at_wall) == (0.8, False)
     page = _parse(shlex.split(run_page(tmp_path / "mine").command)[1:])[0]
-    assert asked(page.config, page.set, ()) == {
+    assert asked(page.config, parse_settings(page.set), ()) == {
         "mission": {"mapper": {"matching": {"gate": 0.8}}}, "backend_options": {"ekf": {"at_wall": False}},
     }  # fmt: skip
 

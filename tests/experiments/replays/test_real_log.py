@@ -8,6 +8,7 @@ import yaml
 from PIL import Image
 from rerun.chunk import RrdReader
 
+from chainslam.experiments.artifacts.settings import parse_settings
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.replays import real_log
 from chainslam.experiments.replays.real_log import RealOptions, read_real_run
@@ -202,7 +203,7 @@ def test_the_same_command_leaves_the_same_bytes_and_another_is_refused_in_its_fo
 def test_walls_of_a_real_log_bow_and_whoever_knows_better_says_so(tmp_path):
     log, options = write_log(tmp_path / "room.log", scans=2), RealOptions()
     for sets, bow_rad in (((), np.deg2rad(0.5)), ((f"{STRAIGHTNESS}.bow_rad=0.0",), 0.0)):
-        trial = read_real_run(log, options, None, sets, {}).trial
+        trial = read_real_run(log, options, None, parse_settings(sets), {}).trial
         straightness = trial.mission.mapper.walls.reliability.straightness
         assert straightness.bow_rad == pytest.approx(bow_rad)
         assert straightness.bow_m == 0.02

@@ -1,6 +1,6 @@
 """Compile the loops that steps run ahead of the first run: `make setup` does so.
 
-`python -m chainslam.experiments.library.compile_kernels` drives two runs and replays one with scan
+`python -m chainslam.experiments.commands.compile_kernels` drives two runs and replays one with scan
 matching, and keeps none.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from chainslam.explore.floor.carrying_kernels import carried
 from chainslam.slam.association.place_search import Window, place_on
 
-from ..commands.cli import main
+from .cli import main
 
 RUNS = ("paper-fig9", "rooms --seed 2 --backend invariant-ekf", "hall")
 """To their ends: walls meet, close and are merged; in the second some turn out to be none, in hall one is split."""

@@ -1,0 +1,134 @@
+"""What a command or a call asks for, as what runs: one way in for both."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from chainslam.sim.logs.recorded_log import is_own_log
+from chainslam.sim.logs.recorded_robot import knows_truth
+
+from ..artifacts.fences import fence_of
+from ..artifacts.presets import PresetName, against_methods, preset_of, robot_of, stated
+from ..artifacts.settings import (
+    FOLLOWING,
+    NAVIGATION,
+    Record,
+    asked,
+    differing,
+    nested,
+    over,
+    read_settings,
+    trial_of,
+)
+from ..campaign.plan import ARMS, CLOSED, DECIDED, MAX_STEPS, PRESETS, Campaign
+from ..replays.real_log import RealOptions, read_own_run, read_real_run
+from ..replays.replay import ReplayOptions, read_run, retuned
+from ..replays.sources import OwnLog, RealLog
+from ..scenario import DRIVER, TrialConfig, load_world
+from ..terminal.console import say
+from ..usage import UsageError
+
+CampaignName = Literal["smoke", "paper", "paper-method", "full"]
+KEYS = {
+    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
+    "odometry": "odometry",
+    "max_path": "max_path_m",
+    "time_limit": "time_limit_s",
+    "sweep": "mission.explorer.sweep",
+    "return_to_start": "mission.return_to_start",
+    "navigation": NAVIGATION,
+    "following": FOLLOWING,
+}
+"""Options that decide a run, and their keys in `config.json`."""
+
+
+def asked_trial(
+    said: Mapping[str, Any],
+    drawing: Record,
+    fence: str | None,
+    preset: PresetName | None,
+    robot: str | None,
+    config: Path | None,
+    settings: Iterable[Record],
+) -> TrialConfig:
+    """Return what decides a run: options win over settings, these over a file of some, over the robot and the preset.
+
+    `said` are the options that are said (`KEYS`), `drawing` those of the world's file by their dotted keys. Raises
+    UsageError where no world is named, or where anything cannot be.
+    """
+    given = {KEYS[name]: list(value) if isinstance(value, tuple) else value for name, value in said.items()} | drawing
+    if fence is not None:
+        given["mission.free_space.fence"] = fence_of(fence)
+    base = {} if config is None else read_settings(config)
+    trial = trial_of({"backend": DRIVER}, preset_of(preset), robot_of(robot), base, *settings, nested(given.items()))
+    if not trial.world:
+        raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
+    return trial
+
+
+def asked_source(
+    path: Path, own: ReplayOptions, real: RealOptions, robot: str | None, config: Path | None, settings: Record
+) -> OwnLog | RealLog:
+    """Return a log, read, to be replayed as asked for; raises UsageError where it is none, or cannot be so."""
+    spec = stated(robot_of(robot))
+    is_own = is_own_log(path)
+    if is_own and real.every != 1:
+        raise UsageError(f"expected --every with a real robot's log, found {path.name}: leave it out")
+    if is_own and (real.scan_topic or real.odom_topic):
+        raise UsageError(f"expected a ROS bag for --scan-topic and --odom-topic, found {path.name}: leave them out")
+    if is_own and knows_truth(path):
+        if real.range_noise is not None:
+            raise UsageError(f"expected --range-noise with a log that states none, found {path.name}: leave it out")
+        run = retuned(read_run(path), config, settings, spec)
+        return OwnLog(run, own, load_world(run.trial.world, run.trial.start, run.trial.drawing))
+    if own.association != "own" or own.perfect_extraction or own.perfect_odometry:
+        raise UsageError(
+            "expected a log that knows the truth for --association true, --perfect-extraction and"
+            f" --perfect-odometry, found {path.name}: leave them out"
+        )
+    read = read_own_run if is_own else read_real_run
+    source = RealLog(read(path, real, config, settings, spec))
+    log, name = source.run.log, path.resolve().name
+    cut = f"{log.trouble}: {len(log.scan_time_s)} scans before it are used" if log.trouble else ""
+    for words in filter(None, (*log.notes, log.left_out.words(len(log.scan_time_s)), cut)):
+        say(f"chainslam: {name}: {words}", stderr=True)
+    return source
+
+
+def asked_campaign(
+    cells: Mapping[str, Any],
+    said: Mapping[str, Any],
+    drawing: Record,
+    preset: CampaignName | None,
+    robot: str | None,
+    config: Path | None,
+    settings: Record,
+    *,
+    modes: Sequence[str],
+    association: Sequence[str],
+    driver: str,
+    first_seed: int,
+) -> Campaign:
+    """Return a campaign; raises UsageError where it leaves something open.
+
+    `cells` are worlds, back ends, strategies and trials, None for one that the preset names; `said` are the options
+    that are said of navigation, following, errorless, p0 and max_steps.
+    """
+    begin = dict(PRESETS[preset]) if preset else {}
+    ruling = over(nested(begin.pop("settings", ())), robot_of(robot), asked(config, settings, DECIDED))
+    keys = {"navigation": NAVIGATION, "following": FOLLOWING, "errorless": "errorless"}
+    ruling = over(ruling, nested((keys[name], value) for name, value in said.items() if name in keys))
+    ruling = over(ruling, nested(drawing.items()))
+    named: Record = {name: ruling.pop(name) for name in ("p0", "max_steps") if name in ruling}
+    named |= {name: value for name, value in said.items() if name not in keys}
+    named |= {name: value for name, value in cells.items() if value is not None}
+    chosen = {"max_steps": MAX_STEPS} | begin | named
+    missing = [f"--{name}" for name in cells if name not in chosen]
+    if missing:
+        raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
+    arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in modes]
+    arms += [f"replay-{name}" for name in ("own", "true") if "replay" in modes and name in association]
+    changed = differing(trial_of(ruling)) + against_methods(chosen["backends"], ruling)
+    return Campaign(
+        **chosen, arms=tuple(arms), driver=driver, first_seed=first_seed, settings=tuple(sorted(dict(changed).items()))
+    )

@@ -1,0 +1,31 @@
+"""What a folder holds as one page: a run, a campaign, or two campaigns held against each other."""
+
+from pathlib import Path
+
+from chainslam.viz.reports.report import Page, html
+
+from ..artifacts.files import write
+from ..usage import UsageError
+
+REPORT = "report.html"
+
+
+def report_at(folder: Path) -> tuple[Page, Path]:
+    """Write the page of a folder into it, and return what stands on it and its place; raises UsageError."""
+    page, place = _page(folder), folder / REPORT
+    write(place, html(page))
+    return page, place
+
+
+def _page(folder: Path) -> Page:
+    from ..campaign.contrast import CONTRAST
+    from ..campaign.pages.contrast_page import contrast_page
+    from ..campaign.pages.page import page_of
+    from ..views.run_page import is_run, run_page
+
+    if not folder.is_dir():
+        raise UsageError(f"expected a folder of results, found no folder {folder}: name what a command left")
+    if (folder / CONTRAST).is_file():
+        return contrast_page(folder)
+    # A campaign keeps no summary.json; its recordings lie two folders further down.
+    return run_page(folder) if is_run(folder) else page_of(folder)
