@@ -205,7 +205,7 @@ def check_parts(campaign: Campaign) -> None:
     need("pyarrow")
     choose("back end (--driver)", campaign.driver, BACKENDS, OR_OWN)
     for backend in campaign.backends:
-        choose("back end", backend, BACKENDS, OR_OWN)
+        choose("back end", backend_of(backend), BACKENDS, OR_OWN)
     for strategy in campaign.strategies:
         choose("strategy", strategy, STRATEGIES, OR_OWN)
 

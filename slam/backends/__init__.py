@@ -22,7 +22,7 @@ class BackendOptions:
     """Of every Kalman filter."""
     graph: GraphConfig = field(default_factory=GraphConfig)
     """Of both factor graphs."""
-    own: dict[str, dict[str, Any]] = field(default_factory=dict)
+    own: dict[str, dict[str, Any]] = field(default_factory=dict, hash=False)
     """Of back ends that do not come along: by the name of the class of their options, and the name of each option."""
 
     def of(self, kind: type) -> Any:

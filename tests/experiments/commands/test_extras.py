@@ -1,11 +1,14 @@
 """What not everybody needs may be missing: all else runs, and what cannot is told with the extra that it takes."""
 
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[3]
 MISSING = ("gtsam", "rerun", "pyarrow", "distributed", "rosbags")
 CODE = """
 import sys
@@ -18,7 +21,10 @@ sys.exit(main(sys.argv[1:]))
 def without(*words, cwd):
     """Run a command where the packages are not there."""
     code = CODE.format(missing=MISSING)
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=cwd, check=False)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=cwd, env=environment, check=False
+    )
     return done.returncode, done.stdout, done.stderr
 
 
