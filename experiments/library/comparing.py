@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,7 +63,13 @@ class Comparison:
         return report_at(self.folder)[1]
 
     def __repr__(self) -> str:
-        return f"Comparison({self.folder})"
+        campaign = read_campaigns(self.folder)[0]
+        cells = f"{', '.join(campaign.worlds)} by {', '.join(campaign.backends)}"
+        return f"Comparison({cells}, {campaign.trials} trials each, in {self.folder})"
+
+    def _repr_html_(self) -> str:
+        """Return what the campaign found, which a notebook shows."""
+        return "".join(f"<p>{escape(line)}</p>" for line in (repr(self), *self.verdict))
 
 
 def compare(

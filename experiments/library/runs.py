@@ -61,6 +61,10 @@ class Map:
     def __len__(self) -> int:
         return len(self.ids)
 
+    def __repr__(self) -> str:
+        metres = np.linalg.norm(self.ends_world[:, 1] - self.ends_world[:, 0], axis=1).sum()
+        return f"Map({len(self)} walls of {metres:.1f} m in all, {np.count_nonzero(self.tentative)} of them tentative)"
+
 
 @dataclass(frozen=True)
 class Run:

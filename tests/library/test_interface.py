@@ -1,6 +1,7 @@
 """`import chainslam`: light to import, complete, and the same results as the command line."""
 
 import builtins
+import json
 import subprocess
 import sys
 
@@ -46,6 +47,55 @@ def test_settings_are_those_of_the_command(tmp_path):
     words = ["--set", f"{key}=0.95", "--robot", "turtlebot", "--max-steps", "3"]
     assert main(["explore", "paper-fig4", *words, "--out", str(tmp_path)]) == 0
     assert (tmp_path / "config.json").read_bytes() == (run.folder / "config.json").read_bytes()
+
+
+def test_a_preset_and_a_file_of_settings_are_those_of_the_command(tmp_path):
+    file = tmp_path / "mine.json"
+    file.write_text('{"seed": 5, "p0": "large"}')
+    run = chainslam.explore("paper-fig4", preset="paper-method", config=file, max_steps=3)
+    words = ["--preset", "paper-method", "--config", str(file), "--max-steps", "3", "--out", str(tmp_path / "run")]
+    assert main(["explore", "paper-fig4", *words]) == 0
+    assert (tmp_path / "run" / "config.json").read_bytes() == (run.folder / "config.json").read_bytes()
+    assert run.summary["seed"] == 5
+
+
+def test_a_replay_is_held_against_what_others_measured(run, tmp_path):
+    reference = run.folder / "trajectory_true.tum"
+    replayed = chainslam.replay(run, reference=reference, settings={"mission.mapper.matching.gate": 0.95})
+    words = [
+        "--reference",
+        str(reference),
+        "--set",
+        "mission.mapper.matching.gate=0.95",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(["replay", str(run.folder), *words]) == 0
+    told = chainslam.load(tmp_path / "out").summary
+    assert {key for key in told if told[key] != replayed.summary[key]} <= {"step_ms", "planning_ms", "processor_s"}
+    assert told["reference"]["poses"] > 0
+
+
+def test_distances_are_those_of_the_command(run, capsys):
+    mapped = run.measure()
+    first, second = [k for k, sharp in enumerate(mapped.sharp) if sharp][:2]
+    capsys.readouterr()
+    assert main(["measure", str(run.folder), str(first), str(second), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert run.measure(first, second).value == pytest.approx(told["distance_m"])
+    with pytest.raises(chainslam.UsageError, match="expected a corner out of"):
+        run.measure(0, 999)
+
+
+def test_what_a_notebook_shows_says_what_it_is(run, tmp_path):
+    assert repr(run.map).startswith(f"Map({len(run.map)} walls of ")
+    assert "<svg" in run._repr_html_()
+    found = chainslam.compare(
+        worlds=["paper-fig4"], backends=["full-ekf"], trials=2, max_steps=3, modes=["closed"], errorless=True, jobs=1
+    )
+    assert repr(found).startswith("Comparison(paper-fig4 by full-ekf, 2 trials each")
+    assert found._repr_html_().count("<p>") > 1
+    assert set(found.trials["pose_anees"].isna()) == {True}
 
 
 def test_the_map_has_ends_lines_and_covariance_of_its_walls(run):
