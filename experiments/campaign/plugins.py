@@ -46,8 +46,9 @@ def register_installed() -> None:
     if _looked:
         return
     _looked.append(True)
+    there = entry_points()  # which reads every distribution: once, not for each group
     for group, place in GROUPS.items():
-        for point in entry_points(group=group):
+        for point in there.select(group=group):
             known = _registry(*place)
             try:
                 if point.name in known:
