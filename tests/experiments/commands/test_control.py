@@ -221,7 +221,7 @@ def test_a_second_ctrl_c_at_any_line_of_a_commands_end_changes_no_status(monkeyp
 
     def trace(frame, event, _):
         nonlocal lines
-        ours = frame.f_code.co_filename.startswith(str(ROOT / "experiments"))
+        ours = frame.f_code.co_filename.startswith(str(ROOT / "chainslam" / "experiments"))
         if stopped and ours and event == "line":
             lines += 1
             if lines == at:
