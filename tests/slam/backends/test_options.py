@@ -13,11 +13,10 @@ START, P0 = np.zeros(3), 1e-4 * np.eye(3)
 
 @pytest.mark.parametrize("name", list(BACKENDS))
 def test_each_back_end_takes_the_options_of_its_type(name):
-    types = [type(getattr(BackendOptions(), each.name)) for each in fields(BackendOptions)]
+    known = {each.name: getattr(BackendOptions(), each.name) for each in fields(BackendOptions) if each.name != "own"}
+    types = [type(each) for each in known.values()]
     assert types.count(BACKENDS[name].options) == (BACKENDS[name].options is not None)
-    options = BackendOptions(
-        **{each.name: replace(getattr(BackendOptions(), each.name)) for each in fields(BackendOptions)}
-    )
+    options = BackendOptions(**{name: replace(each) for name, each in known.items()})
     backend = BACKENDS[name].make(START, P0, options)
     assert any(backend._config is own for own in vars(options).values()) == (BACKENDS[name].options is not None)
 
