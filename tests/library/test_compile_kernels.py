@@ -22,7 +22,7 @@ def test_once_compiled_no_run_compiles_again_and_every_file_of_kernels_was_calle
     assert run("chainslam.experiments.commands.compile_kernels").count("compiling loops") == 1
     kept = {folder.name.rpartition("-")[0] for folder in (tmp_path / "cache").iterdir()}
     files = [path for room in ("slam", "explore", "sim") for path in (ROOT / room).rglob("*kernels.py")]
-    every = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files}
+    every = {".".join(("chainslam", *path.relative_to(ROOT).with_suffix("").parts)) for path in files}
     # Only logs of real robots are looked at again.
     assert {name for name in every if "second_looks" not in name} == kept
     out = tmp_path / "run"
