@@ -56,8 +56,8 @@ WITHOUT_PACKAGE = """
 import sys
 class Blind:
     def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] == "experiments":
-            raise ModuleNotFoundError("No module named 'experiments'")
+        if name.split(".")[0] == "chainslam":
+            raise ModuleNotFoundError("No module named 'chainslam'")
 sys.meta_path.insert(0, Blind())
 """
 
@@ -115,7 +115,7 @@ def test_a_worker_without_this_package_is_told(started, tmp_path, capsys):
     (tmp_path / "blind" / "sitecustomize.py").write_text(WITHOUT_PACKAGE)
     worker(PYTHONPATH=str(tmp_path / "blind"))
     assert compared(address, tmp_path / "out") == 1
-    told_in_one_line(capsys, "No module named 'experiments'")
+    told_in_one_line(capsys, "No module named 'chainslam'")
 
 
 @pytest.mark.long
