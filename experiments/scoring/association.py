@@ -9,7 +9,7 @@ from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.geometry.lines import directions
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from .beam_votes import UNLABELLED, vote
+from .beam_votes import ONE_FACE_SHARE, UNLABELLED, vote
 from .truth import Truth
 
 OVERLAP_M = 0.2
@@ -30,7 +30,7 @@ class Votes:
     """The same of segments of few beams: they move the estimate, but say of no line which wall it is."""
     merges: int = 0
     false_merges: int = 0
-    """Of these, lines labelled with two different walls."""
+    """Of these, pairs of lines each of which has `ONE_FACE_SHARE` of its beams from a wall of its own."""
 
     def add(
         self,
@@ -55,7 +55,7 @@ class Votes:
 
     def merge(self, keep: int, drop: int) -> None:
         """Count the beams of two lines as one line's from now on, under both ids: the map has made them one."""
-        kept, dropped = (self.walls_of(np.array([line]))[0] for line in (keep, drop))
+        kept, dropped = self._clear_wall_of(keep), self._clear_wall_of(drop)
         self.merges += 1
         self.false_merges += bool(UNLABELLED not in (kept, dropped) and kept != dropped)
         theirs, none = self.beams.get(drop), np.zeros(len(self.truth.faces), dtype=np.int64)
@@ -81,6 +81,14 @@ class Votes:
         """Return the true wall of each line, -1 where no beam tells."""
         faces = self.faces_of(ids)
         return np.where(faces >= 0, self.truth.walls[faces], UNLABELLED)
+
+    def _clear_wall_of(self, line_id: int) -> int:
+        """Return the wall that a line is of by the rule for segments, or `UNLABELLED`."""
+        beams = self.beams.get(line_id)
+        if beams is None or not beams.any():
+            return UNLABELLED
+        per_wall = np.bincount(self.truth.walls, weights=beams)
+        return int(per_wall.argmax()) if per_wall.max() >= ONE_FACE_SHARE * per_wall.sum() else UNLABELLED
 
     def false_matches(self) -> int:
         """Return how many segments seen on one wall were fused into a line labelled with another."""
