@@ -1,11 +1,11 @@
-"""Mapping unknown buildings by walls: the public interface.
+"""Map unknown buildings with line segments: the public interface.
 
     import chainslam
 
     run = chainslam.explore("paper-fig4", seed=2)
     run.summary["status"]
 
-Every name here is one of the rooms' own; what it loads (GTSAM, Rerun, matplotlib) it loads when it is used.
+Every name is imported from its own subpackage when it is first used, and with it GTSAM, Rerun or matplotlib.
 """
 
 import sys
@@ -53,7 +53,7 @@ _PLACES = {
     ),
     "chainslam.slam.robot.streaming": ("SteppedRobot", "StreamingRobot", "TimedScan", "Twist"),
 }
-"""Where each name comes from."""
+"""The module of each name."""
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __version__ = version("chainslam")
@@ -67,7 +67,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Return a name of the interface, from where it lives."""
+    """Import and return a public name."""
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'chainslam' has no attribute {name!r}")
     try:
@@ -85,15 +85,15 @@ def __dir__() -> list[str]:
 
 
 class _Interface(ModuleType):
-    """A package whose `explore` is a function, though a room has that name, too."""
+    """The package itself: its `explore` is a function, although a subpackage has the same name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Bind a name, but for a room of the name of a function: importing it would hide that."""
+        """Bind a name, but do not let the import of a subpackage hide the function of the same name."""
         if not (name in _PLACE_OF and isinstance(value, ModuleType)):
             super().__setattr__(name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how another process gets this package: it imports it."""
+        """Return how to unpickle this package in another process: import it."""
         return import_module, (self.__name__,)
 
 

@@ -1,4 +1,4 @@
-"""Messages of ROS in and out, without ROS: what a node needs besides its subscriptions (docs/howto/ros.md)."""
+"""Conversion from and to ROS messages without ROS: what a node needs besides its subscriptions (docs/howto/ros.md)."""
 
 from chainslam.experiments.artifacts.maps.occupancy import OccupancyGrid, occupancy_grid
 from chainslam.slam.robot.ros.laser_scan import timed_scan

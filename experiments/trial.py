@@ -1,4 +1,4 @@
-"""One trial: a robot explores a world once, and truth meets estimate in the scores."""
+"""One trial: a robot explores a world once, and the estimate is scored against the truth."""
 
 import gc
 import traceback
@@ -34,7 +34,7 @@ from .usage import UsageError
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a trial leaves; everything but the ending is None where it ended before its first step."""
+    """The result of a trial; everything but the ending is None if it ended before its first step."""
 
     scenario: Scenario
     ending: Ending
@@ -46,16 +46,16 @@ class TrialResult:
     certificate: Certificate | None
     summary: dict[str, Any]
     smoothed: Smoothed | None = None
-    """What the back end made of everything at the end, if it smooths; the scores are of what each step knew."""
+    """The smoothed solution at the end, if the back end smooths; scores use the estimates available at each step."""
     recorded: RecordedLog | None = None
-    """The log of a real robot, of which no truth is known; None for a simulated run."""
+    """The log of a real robot, without ground truth; None for a simulated run."""
 
 
 Mission = Callable[[Scenario], Iterator[Step]]
 
 
 def default_mission(scenario: Scenario) -> Iterator[Step]:
-    """Return the closed loop over the simulated robot."""
+    """Return the closed loop with the simulated robot."""
     assert scenario.strategy is not None, "expected a strategy to explore by"
     rules = scenario.config.mission
     robot = heard_by(scenario.config.odometry, scenario.robot, scenario.config)
@@ -95,7 +95,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
 
 
 def relative_to_start(scenario: Scenario) -> FromStart:
-    """Return what tells the pose as it would be had the start been known; without noise it is as it is."""
+    """Return the estimator of the pose as if the start had been known; without noise they are the same."""
     config = scenario.config
     if config.errorless or config.p0 == KNOWN:
         return as_it_is
@@ -106,7 +106,7 @@ def relative_to_start(scenario: Scenario) -> FromStart:
 
 
 def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], mission: Mission) -> Ending:
-    """Go through a mission to its end, whatever that is, and return it; the recorder keeps every step."""
+    """Run a mission to its end, however it ends, and return the ending; the recorder keeps every step."""
     _prepare_process()
     try:
         for step in limited(mission(scenario), scenario.config.limits):
@@ -118,7 +118,7 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
         return Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'}")
     except UsageError:
         raise
-    except Exception as error:  # a run that fails keeps what it has computed; the trace goes beside the results
+    except Exception as error:  # a failed run keeps its results so far, with the traceback next to them
         words = " ".join(str(error).split())
         return Ending(Outcome.FAILED, f"{type(error).__name__}: {words}", traceback.format_exc())
     return Ending(Outcome.FAILED, "the mission ended without saying why")
@@ -126,16 +126,16 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
 
 @cache
 def _prepare_process() -> None:
-    """Do once a process what would count as a step's time.
+    """Do once per process what would otherwise count as the time of a step.
 
-    Link the kernels, and let the collector of garbage pass over all modules: that took a tenth of a second.
+    Link the kernels, and exclude all modules from garbage collection, which took a tenth of a second.
     """
     link_kernels()
     gc.freeze()
 
 
 def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
-    """Return the summary of a run without a single step: null for all that was not measured."""
+    """Return the summary of a run without a step: null for everything that was not measured."""
     keys = (
         "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
         " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band pose_anees_from_start map_anees duplicate_lines"

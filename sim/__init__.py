@@ -1,1 +1,1 @@
-"""Robots without hardware: drawn worlds, a range finder, slipping wheels, recorded runs."""
+"""Simulation and recordings: drawn worlds, a range finder, slipping wheels, recorded runs."""

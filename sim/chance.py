@@ -1,6 +1,7 @@
-"""Chance from streams keyed by (the world's content, seed, channel, step): no stream shifts or repeats another's draws.
+"""Random numbers from streams keyed by world content, seed, channel and step, so that draws of one never affect
+another.
 
-Back ends and strategies in one world on one seed meet the same draws; two worlds on one seed meet different ones.
+All back ends and strategies meet the same draws in one world with one seed; other worlds have other draws.
 """
 
 import hashlib
@@ -16,54 +17,55 @@ from jaxtyping import Float
 _STEP_BITS = 40
 SEED_MAX = 2**64 - 1
 GRID_M = 1e-6
-"""What lies closer together than this is the same content: readers of two formats round differently below it."""
+"""Coordinates closer than this count as equal: readers of two formats round differently below it."""
 
 
 class Channel(IntEnum):
-    """What a stream of random numbers is for."""
+    """The purpose of a stream of random numbers."""
 
     WHEELS = 1
     LASER = 2
     START = 3
-    """The error of the pose that the estimate starts from."""
+    """Error of the initial pose estimate."""
     ORACLE = 4
     """Noise of lines that an oracle extracts."""
     DROPOUTS = 5
     MIXED = 6
     BUMPS = 7
     MOVING = 8
-    """Which scans are taken while the robot still drives."""
+    """Which scans are taken while the robot is still driving."""
     PEOPLE = 9
-    """Where people stand at first, and where they turn to."""
+    """Where people start, and where they turn to."""
 
 
 @dataclass(frozen=True)
 class Chance:
-    """All streams of one seed in one world."""
+    """All random streams of one seed in one world."""
 
     seed: int
     world_key: int
-    """What `world_key` returns for the world."""
+    """Result of `world_key` for the world."""
 
     def standard_normals(self, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:
-        """Return `count` standard normal draws (count,), the same for the same stream on any process.
+        """Return `count` standard normal draws (count,), identical in every process.
 
         Raises ValueError for a seed or a step out of range.
         """
         return self._stream(channel, step).standard_normal(count)
 
     def uniforms(self, channel: Channel, step: int, count: int) -> Float[np.ndarray, " count"]:
-        """Return `count` draws (count,) even over [0, 1), the same for the same stream on any process.
+        """Return `count` uniform draws (count,) in [0, 1), identical in every process.
 
         Raises ValueError for a seed or a step out of range.
         """
         return self._stream(channel, step).random(count)
 
     def _stream(self, channel: Channel, step: int) -> np.random.Generator:
-        """Return a generator that is counter-based (Philox), at the beginning of its stream.
+        """Return a counter-based generator (Philox) at the beginning of its stream.
 
-        World and seed are its key, channel and step the upper word of its counter: no two streams meet. A new one
-        asks the system for entropy that it then leaves aside, so one is kept and set back: a tenth of the time.
+        World and seed are its key, channel and step the upper word of its counter, so that streams never overlap.
+        Creating a generator asks the system for entropy that is not used; one is therefore kept and reset, which takes
+        a tenth of the time.
         """
         if not (0 <= self.seed <= SEED_MAX and 0 <= step < 2**_STEP_BITS):
             raise ValueError(
@@ -91,7 +93,7 @@ def world_key(faces: Float[np.ndarray, "n 2 2"], start: Float[np.ndarray, "3"]) 
 
 @lru_cache
 def _kept(thread: int) -> np.random.Generator:
-    """Return the generator of a thread."""
+    """Return the generator of the thread."""
     return np.random.Generator(np.random.Philox(key=thread))
 
 
@@ -99,4 +101,4 @@ _NONE = np.zeros(4, dtype=np.uint64)
 _BEGINNING: dict[str, Any] = {
     "bit_generator": "Philox", "buffer": _NONE, "buffer_pos": len(_NONE), "has_uint32": 0, "uinteger": 0,
 }  # fmt: skip
-"""A stream of which nothing was drawn: its buffer of four numbers is used up."""
+"""State of a fresh stream: its buffer of four numbers is used up."""

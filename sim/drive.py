@@ -1,4 +1,4 @@
-"""Differential drive: the wheels report the arc that was commanded, the robot slips off it."""
+"""Differential drive: the odometry reports the commanded arc, and the robot slips off it."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, WheelSpec
 
 @dataclass(frozen=True)
 class Slip:
-    """How one step's true motion departs from the commanded one."""
+    """Deviation of one step's true motion from the commanded one."""
 
     left_m: float
     right_m: float
@@ -19,11 +19,9 @@ class Slip:
 
 
 def clamp(command: MotionCommand, robot: RobotSpec) -> MotionCommand:
-    """Return the command scaled by one factor to within the longest step and the widest turn: same arc, less of it.
+    """Return the command scaled by one factor to the longest step and the widest turn: the same arc, shortened.
 
-    A robot that cannot reverse turns on the spot instead.
-
-    Raises ValueError for a command that is not finite.
+    A robot that cannot reverse turns on the spot instead. Raises ValueError for a command that is not finite.
     """
     forward, turn = abs(command.forward_m), abs(command.turn_rad)
     if not (np.isfinite(forward) and np.isfinite(turn)):
@@ -35,7 +33,7 @@ def clamp(command: MotionCommand, robot: RobotSpec) -> MotionCommand:
 
 
 def seconds(command: MotionCommand, config: WheelSpec, speed_m_s: float) -> float:
-    """Return how long the command takes, s, if the faster wheel goes at this speed."""
+    """Return the duration of the command, s, if the faster wheel moves at this speed."""
     return max(abs(way) for way in config.ways(command.forward_m, command.turn_rad)) / speed_m_s
 
 
@@ -48,7 +46,7 @@ def draw_slip(command: MotionCommand, config: WheelSpec, standard_normals: Float
 def true_motion(
     command: MotionCommand, slip: Slip, config: WheelSpec, shares: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, "n 3"]:
-    """Return where the slipping robot is after these shares of its step: (n, 3) m m rad in the frame of its start."""
+    """Return the poses of the slipping robot after these shares of its step: (n, 3) m m rad from its start."""
     forward = command.forward_m + 0.5 * (slip.left_m + slip.right_m)
     turn = command.turn_rad + (slip.right_m - slip.left_m) / config.base_m
     half = 0.5 * turn * shares
@@ -60,5 +58,5 @@ def true_motion(
 
 
 def odometry(command: MotionCommand, config: WheelSpec) -> Odometry:
-    """Return what the wheels report: the commanded arc and its first-order covariance, robot frame before it."""
+    """Return the odometry: the commanded arc and its first-order covariance, in the robot frame before it."""
     return config.over_arc(command.forward_m, command.turn_rad)

@@ -1,4 +1,4 @@
-"""Beams against faces in compiled loops: along a beam 1/range is linear in (cos, sin), the nearest face is the largest.
+"""Ray casting in compiled loops: along a face 1/range is linear in (cos, sin), and the nearest face has the largest.
 
 A face is a column of `rows`: x and y of its start, of its end, the normal of its line and the line's distance.
 """
@@ -9,14 +9,14 @@ from jaxtyping import Float, Int
 from chainslam.slam.geometry.compiled import compiled
 
 _ON_THE_VERTEX = 1e-9
-"""Share of a beam step by which a face reaches past its ends, so that no beam slips between two faces that touch."""
+"""Share of a beam step by which faces are extended, so that no beam passes between two faces that touch."""
 
 
 @compiled
 def seen_from(
     rows: Float[np.ndarray, "7 m"], x: float, y: float
 ) -> tuple[Int[np.ndarray, " s"], Float[np.ndarray, "4 s"], Float[np.ndarray, "2 s"]]:
-    """Return which faces are seen from their free side, their ends from there, and normals over distances, 1/m."""
+    """Return which faces are seen from their free side, their ends from the scanner, and normals over distances."""
     seen, count = np.empty(rows.shape[1], np.int64), 0
     ends, inverse = np.empty((4, rows.shape[1])), np.empty((2, rows.shape[1]))
     for k in range(rows.shape[1]):

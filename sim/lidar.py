@@ -1,4 +1,4 @@
-"""The simulated range finder: exact ranges from a pose to the true faces, and the noise on top."""
+"""The simulated range finder: exact ranges to the true faces, and noise."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ class LidarConfig(LidarSpec):
 
     @property
     def is_full_turn(self) -> bool:
-        """Whether the first beam follows the last one."""
+        """Whether the first beam follows the last one, as on a full turn."""
         return self.fov_rad > 2 * np.pi - 1e-9
 
 
@@ -46,7 +46,7 @@ def bearings(config: LidarConfig) -> Float[np.ndarray, " k"]:
 
 
 def beam_sigmas(ranges: Float[np.ndarray, " k"], config: LidarConfig) -> float | Float[np.ndarray, " k"]:
-    """Return the standard deviation m of the radial error of beams by their exact ranges."""
+    """Return the standard deviation m of the range error of beams, given their exact ranges."""
     if config.sigma_share <= 0.0:
         return config.sigma_m
     return np.hypot(config.sigma_m, config.sigma_share * np.where(np.isfinite(ranges), ranges, 0.0))
@@ -64,7 +64,7 @@ def noisy(
 
 
 class RangeFinder:
-    """Casts scans in a world of directed faces; faces seen from behind are transparent."""
+    """Ray casting in a world of directed faces; faces seen from behind are transparent."""
 
     def __init__(self, faces: Float[np.ndarray, "n 2 2"], config: LidarConfig = LidarConfig()) -> None:
         """Prepare for `faces` (n, 2, 2) m in the world frame, each with its free side on the left."""
@@ -77,7 +77,7 @@ class RangeFinder:
         self._faces = faces[self._ids]
         self._middles, self._halves = self._faces.mean(axis=1), 0.5 * lengths[self._ids]
         alpha_r = through(self._faces)
-        # One row a face: both ends, the normal and the distance of its line, so that one lookup brings all of them.
+        # One row for each face: both ends, normal and distance of its line, so that one lookup returns everything.
         self._rows = np.column_stack([self._faces.reshape(-1, 4), normals(alpha_r[:, 0]), alpha_r[:, 1]])
         self.config = config
         self.bearings_rad = bearings(config)
@@ -85,7 +85,7 @@ class RangeFinder:
         self._cells: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
     def cast(self, pose_world: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-        """Return exact ranges (k,) m, +inf beyond the maximum, and the index of the face of each beam, -1 for none."""
+        """Return exact ranges (k,) m, +inf beyond the maximum, and the index of the face that each beam hits, or -1."""
         x, y, heading = float(pose_world[0]), float(pose_world[1]), float(pose_world[2])
         ids, rows = self._near(x, y)
         seen, ends, inverse = seen_from(rows, x, y)
@@ -116,11 +116,11 @@ class RangeFinder:
         return cell
 
     def _faces_near_cell(self, centre: Float[np.ndarray, "2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return ids and rows (7, m) of the faces that some point of the cell around `centre` may see."""
+        """Return ids and rows (7, m) of the faces that are visible from some point of the cell around `centre`."""
         radius = self.config.cell_m * np.sqrt(0.5)
         reach = self.config.range_max_m + radius + 1e-9
         faces_seen = self._rows[:, 6] - self._rows[:, 4:6] @ centre > -radius
-        # Of thousands of faces in a large building, the middle alone rules out nearly all.
+        # Among thousands of faces in a large building, their middles alone exclude nearly all.
         within = np.hypot(*(self._middles - centre).T) <= reach + self._halves + 1e-6
         near = np.flatnonzero(faces_seen & within)
         near = near[distance_to_segments(centre[None], self._faces[near])[0] <= reach]

@@ -39,7 +39,9 @@ class PeopleConfig:
     def __post_init__(self) -> None:
         """Raise RobotError for people that cannot be."""
         if len(self.standing) % 2:
-            raise RobotError(f"expected x and y of each who stands, found {len(self.standing)} numbers: leave none out")
+            raise RobotError(
+                f"expected x and y of each standing person, found {len(self.standing)} numbers: give an even count"
+            )
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The simulated robot: it owns the truth, and only what `slam.robot` defines leaves it towards the software."""
+"""The simulated robot: it knows the truth, and passes only what `slam.robot` defines to the software."""
 
 from dataclasses import dataclass, field, fields, replace
 from typing import Protocol, runtime_checkable
@@ -35,7 +35,7 @@ _CELL_M = 0.5
 
 @runtime_checkable
 class Building(Protocol):
-    """What the robot needs of a world."""
+    """The properties of a world that the robot needs."""
 
     @property
     def faces(self) -> Float[np.ndarray, "n 2 2"]:
@@ -49,7 +49,7 @@ class Building(Protocol):
 
 
 def chance_in(world: Building, seed: int) -> Chance:
-    """Return the streams that a robot in a world, and the estimate of its start, draw from on a seed."""
+    """Return the random streams of a robot in a world, and of the error of its initial estimate, for a seed."""
     return Chance(seed, world_key(world.faces, world.start))
 
 
@@ -68,7 +68,7 @@ class RobotConfig(RobotSpec):
 
     @property
     def true_scanner(self) -> ScannerSpec:
-        """Where the scanner really sits."""
+        """The true place of the scanner."""
         stated, faults = self.scanner, self.faults
         return ScannerSpec(
             stated.x_m + faults.scanner_ahead_m,
@@ -78,35 +78,35 @@ class RobotConfig(RobotSpec):
 
     @property
     def spec(self) -> RobotSpec:
-        """What the robot states, and nothing else."""
+        """What the robot states, without its simulation."""
         stated = {each.name: getattr(self, each.name) for each in fields(RobotSpec)}
         return RobotSpec(**stated | {"lidar": LidarSpec(calibrate=self.lidar.calibrate)})
 
     def stating(self, spec: RobotSpec) -> "RobotConfig":
-        """Return a robot with these devices that states what another does."""
+        """Return a robot with these devices and the statements of another."""
         stated = {each.name: getattr(spec, each.name) for each in fields(RobotSpec)}
         return replace(self, **stated | {"lidar": replace(self.lidar, calibrate=spec.lidar.calibrate)})
 
 
 @dataclass
 class TrueRecord:
-    """What really happened, step by step; only `experiments/` reads it."""
+    """The truth at each step; only `experiments/` reads it."""
 
     poses_world: list[Float[np.ndarray, "3"]] = field(default_factory=list)
     """The true pose at each scan."""
     faces_of_beams: list[Int[np.ndarray, " k"]] = field(default_factory=list)
-    """The face that each beam of each scan hit; -1 for none."""
+    """The face that each beam of each scan hits; -1 for none."""
     collisions: int = 0
     drive_time_s: float = 0.0
     path_length_m: float = 0.0
-    """Of the true path."""
+    """Length of the true path."""
 
 
 class SimulatedRobot:
-    """A body with a range finder and slipping wheels in a drawn building."""
+    """A robot with a range finder and slipping wheels in a drawn building."""
 
     def __init__(self, world: Building, seed: int, errorless: bool = False, config: RobotConfig | None = None) -> None:
-        """Stand at the start of `world`; `errorless` makes ranges and wheels exact but keeps the stated noise."""
+        """Start in `world`; `errorless` removes the noise of ranges and odometry but not the stated noise."""
         self.config = config or RobotConfig()
         self._record = TrueRecord()
         self._errorless = errorless
@@ -123,16 +123,16 @@ class SimulatedRobot:
 
     @property
     def record(self) -> TrueRecord:
-        """What really happened, up to the last scan."""
+        """The truth up to the last scan."""
         return self._record
 
     @property
     def true_pose(self) -> Float[np.ndarray, "3"]:
-        """Where the robot really is, world frame, m m rad."""
+        """The true pose, world frame, m m rad."""
         return self._pose.copy()
 
     def sense(self) -> Scan:
-        """Return the scan at the present place and record the truth about it."""
+        """Return the scan at the present pose and record the truth about it."""
         lidar, faults, step = self.config.lidar, self.config.faults, len(self._record.poses_world)
         ranges, faces = self._cast(len(self._way) > 0 and is_moving(faults, self._chance, step))
         ranges, mixed = with_mixed_pixels(ranges, faults, lidar.is_full_turn, self._chance, step)
@@ -159,19 +159,19 @@ class SimulatedRobot:
     def _as_told(
         self, ranges: Float[np.ndarray, " k"], faces: Int[np.ndarray, " k"], step: int
     ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-        """Return the ranges that the scanner tells in place of these, late, frozen or mirrored, and their faces."""
+        """Return the ranges with the scanner's faults (late, frozen or mirrored), and their faces."""
         faults = self.config.faults
         if faults.late or faults.frozen_from != NEVER:
             self._told.append((ranges, faces))
             ranges, faces = self._told[max(min(step, faults.frozen_from - 1) - faults.late, 0)]
         if not faults.mirrored:
             return ranges, faces
-        # On a full turn bearing -pi has no counterpart at +pi: it stays where it is.
+        # On a full turn bearing -pi has no counterpart at +pi: it stays in place.
         back = -np.arange(len(ranges)) if self.config.lidar.is_full_turn else -1 - np.arange(len(ranges))
         return ranges[back], faces[back]
 
     def _cast(self, moving: bool) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-        """Return exact ranges m and faces of the beams, of a scan in motion each from where the robot was then."""
+        """Return exact ranges m and faces of the beams; in a scan taken in motion, each from the pose at its time."""
         scanner = self.config.true_scanner
         if not moving:
             at = self._pose if scanner.is_at_axle else compose(self._pose, scanner.pose_robot)
@@ -185,7 +185,7 @@ class SimulatedRobot:
     def _seen_from(
         self, scanner_world: Float[np.ndarray, "3"]
     ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-        """Return exact ranges m and faces of the beams; where a person or a post of the robot is first, no face."""
+        """Return exact ranges m and faces of the beams; no face if a person or a post of the robot is hit first."""
         ranges, faces = self._finder.cast(scanner_world)
         faults, bearings = self.config.faults, self._finder.bearings_rad
         people = self._people.places_at(self._time_s)
@@ -227,7 +227,7 @@ class SimulatedRobot:
         return replace(odometry(command, drive), touched=touched)
 
     def _free_places(self, poses_world: Float[np.ndarray, "n 3"]) -> int:
-        """Return how many places, from the first on, keep the body clear of every face and everybody."""
+        """Return the number of positions, from the first on, at which the body is clear of every face and person."""
         places_world = poses_world[:, :2]
         near, people = self._faces_near(places_world[0]), self._people.places_at(self._time_s)
         if self.config.outline_m is not None:
@@ -248,7 +248,7 @@ class SimulatedRobot:
         faces: Float[np.ndarray, "m 2 2"],
         people: Float[np.ndarray, "p 2"],
     ) -> Bool[np.ndarray, " n"]:
-        """Return at which poses a body with an outline meets a face or somebody."""
+        """Return at which poses a body with an outline touches a face or a person."""
         corners = np.array([to_world(np.array(self.config.outline_m), pose) for pose in poses_world])
         bodies = shapely.polygons(corners)
         touched = shapely.intersects(bodies, shapely.multilinestrings(faces))
@@ -262,7 +262,7 @@ class SimulatedRobot:
         cell = (int(place_world[0] // _CELL_M), int(place_world[1] // _CELL_M))
         if cell not in self._near:
             centre = (np.array([cell]) + 0.5) * _CELL_M
-            # A slipping step is a little longer than the longest command.
+            # A slipping step may be a little longer than the longest command.
             reach = np.sqrt(0.5) * _CELL_M + 2.0 * self.config.step_m + self.config.radius_m
             self._near[cell] = self._faces[distance_to_segments(centre, self._faces)[0] <= reach]
         return self._near[cell]

@@ -1,1 +1,1 @@
-"""Pictures and recordings of what the other rooms did; reads everything, changes nothing."""
+"""Pictures and recordings of runs; it reads everything and changes nothing."""

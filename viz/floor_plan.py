@@ -1,7 +1,7 @@
-"""The map as a floor plan in SVG, one unit a metre, which `chainslam explore map.svg` reads as a world again.
+"""The map as a floor plan in SVG, one unit per metre, which `chainslam explore map.svg` reads as a world.
 
-What is dark is wall: beside each chain its walls as solid bands, a closed island as a solid block, in the colour of the
-chain. What is light is decoration: the grid, the way of the robot, the rings around open ends. Text is no wall either.
+Dark shapes are walls: solid bands beside each chain, and solid blocks for closed islands, in the colour of the chain.
+Light shapes are decoration: the grid, the path of the robot, the rings around open ends. Text is not a wall either.
 """
 
 from collections.abc import Sequence
@@ -21,16 +21,16 @@ from . import palette
 WALL_M = 0.1
 MARGIN_M = 0.8
 SCALE = 100
-"""Printed, the plan is this many times smaller than the building."""
+"""Scale of the printed plan, 1 to this."""
 MITRE = 5.0
 WAY, END, BAR = "#B9C3D6", "#FFB77A", "#B8B8B8"
-"""Light enough to be read as decoration."""
+"""Light enough to be read as decoration instead of a wall."""
 WORDS = "#444444"
 LETTERS_M = 0.22
 """Height of the letters on the plan; a shorter side has smaller ones, down to `SMALLEST_M`, else none."""
 SMALLEST_M = 0.06
 SHARE = 0.115
-"""Height of letters of which fifteen fit beside a side of length one."""
+"""Height of letters of which fifteen fit along a side of length one."""
 
 
 @dataclass(frozen=True)
@@ -40,28 +40,29 @@ class Dimension:
     at_world: Float[np.ndarray, "2"]
     """Middle of the side or of the room's largest free disc."""
     along_world: Float[np.ndarray, "2"]
-    """The side as a vector, m, the free side on its left; for an area as far as there is room, level."""
+    """The side as a vector, m, with the free side on its left; for an area, a horizontal one as long as there is
+    room."""
     words: str
     hint: str
-    """What a browser shows under the pointer."""
+    """Tooltip in a browser."""
     is_area: bool = False
 
     @property
     def letters_m(self) -> float | None:
-        """Height of its letters; None where there is no room for any."""
+        """Height of its letters; None without room for any."""
         letters = min(LETTERS_M, SHARE * float(np.hypot(*self.along_world)))
         return None if letters < SMALLEST_M else letters
 
     @property
     def beside_world(self) -> Float[np.ndarray, "2"]:
-        """The middle of its words: of a length on the free side of the wall."""
+        """Middle of its text; the text of a length is on the free side of the wall."""
         along = self.along_world / float(np.hypot(*self.along_world))
         beside = 0.0 if self.is_area else 0.9 * (self.letters_m or 0.0)
         return self.at_world + beside * np.array([-along[1], along[0]])
 
     @property
     def clockwise_deg(self) -> float:
-        """How far its words are turned: along the side, and upright."""
+        """Rotation of its text: along the side, and upright."""
         turn = float(np.rad2deg(np.arctan2(-self.along_world[1], self.along_world[0])))
         return turn - 180.0 if turn > 90.0 else turn + 180.0 if turn <= -90.0 else turn
 
@@ -112,7 +113,7 @@ def floor_plan(
 
 
 def _band(chain: Chain, index: int, walls: StochasticMap, certificate: Certificate) -> shapely.Geometry:
-    """Return the solid side of a chain: a band beside it, or all of a closed island."""
+    """Return the solid side of a chain: a band beside it, or the whole of a closed island."""
     area = next((contour for contour in certificate.contours if contour.chain == index), None)
     if area is not None and area.is_island:
         return area.polygon
@@ -120,7 +121,7 @@ def _band(chain: Chain, index: int, walls: StochasticMap, certificate: Certifica
         return area.polygon.buffer(WALL_M, join_style="mitre", mitre_limit=MITRE).difference(area.polygon)
     ends = walls.ends_world[walls.belief.rows(chain.walls)]
     way = shapely.LineString(np.concatenate([ends[:1, 0], chain.corners_world, ends[-1:, 1]]))
-    # On the right of the way: the free side is on its left.
+    # On the right of the direction of travel: the free side is on its left.
     return shapely.make_valid(way.buffer(-WALL_M, single_sided=True, join_style="mitre", mitre_limit=MITRE))
 
 
@@ -132,7 +133,7 @@ def _grid(plan: "_Plan", width: float, height: float) -> None:
 
 
 class _Plan:
-    """Draws in the map's metres onto a page whose y points down."""
+    """Draws in the map's metres onto a page whose y axis points down."""
 
     def __init__(self, page: Element, corner_world: Float[np.ndarray, "2"]) -> None:
         self._page, self._corner = page, corner_world
@@ -147,7 +148,7 @@ class _Plan:
         return SubElement(self._page, tag, {key.replace("_", "-"): value for key, value in attributes.items()})
 
     def straight(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Draw a line of the grid, given on the page."""
+        """Draw a grid line, given on the page."""
         (x1, y1), (x2, y2) = start, end
         self._add(
             "line", x1=f"{x1:g}", y1=f"{y1:g}", x2=f"{x2:g}", y2=f"{y2:g}", stroke=palette.GRID, stroke_width="0.015"
@@ -158,7 +159,7 @@ class _Plan:
         self._add("path", d=self._path(points_world), fill="none", **attributes)
 
     def area(self, shape: shapely.Geometry, **attributes: str) -> None:
-        """Fill polygons, their holes left free."""
+        """Fill polygons, with their holes left free."""
         parts = [part for part in shapely.get_parts(shape) if isinstance(part, shapely.Polygon)]
         rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
         path = " ".join(f"{self._path(shapely.get_coordinates(ring)[:-1])} Z" for ring in rings)
@@ -180,7 +181,7 @@ class _Plan:
         SubElement(text, "title").text = told.hint
 
     def footer(self, lines: Sequence[str], height_m: float) -> None:
-        """Write lines at the lower edge of the page, the first the highest."""
+        """Write lines of text at the lower edge of the page, the first at the top."""
         for k, words in enumerate(lines):
             y = height_m - 0.15 - 0.3 * (len(lines) - 1 - k)
             text = self._add("text", x="0.2", y=f"{y:g}", fill="#6A6A6A", font_size="0.26", font_family="sans-serif")

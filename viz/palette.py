@@ -1,4 +1,4 @@
-"""Colours, one meaning each, the same in Rerun and in matplotlib."""
+"""Colours with one meaning each, the same in Rerun and in matplotlib."""
 
 from chainslam.slam.backends import BACKENDS
 
@@ -6,28 +6,29 @@ BACKEND_COLOURS = (
     "#D55E00", "#E69F00", "#CC79A7", "#0072B2", "#56B4E9", "#009E73", "#3A3A3A", "#6B2C91",
     "#874B00", "#0000D2", "#B42D69", "#B400FF", "#2D002D",
 )  # fmt: skip
-"""Okabe and Ito's set without its yellow, which white paper swallows, and six darker ones. With any colour vision two
-of them are as easily told apart as any two of that set (tests/viz/test_palette.py simulates it)."""
+"""Okabe and Ito's palette without its yellow, which is invisible on white paper, and six darker colours. With any
+colour vision, two of them are as distinguishable as any two of that palette (simulated in
+tests/viz/test_palette.py)."""
 
 
 def of_backend(name: str) -> str:
-    """Return the colour of a back end by its place in the registry; of one that is in none, the last."""
+    """Return the colour of a back end by its place in the registry; of an unregistered one, the last."""
     names = list(BACKENDS)
     turn = names.index(name) if name in names else len(BACKEND_COLOURS) - 1
     return BACKEND_COLOURS[turn % len(BACKEND_COLOURS)]
 
 
 def of_rank(rank: int) -> str:
-    """Return the colour of what has no colour of its own, by its place in a list."""
+    """Return the colour of anything else, by its place in a list."""
     return BACKEND_COLOURS[rank % len(BACKEND_COLOURS)]
 
 
 CLOSED = ("#0072B2", "#7B4FA3", "#56B4E9", "#1F3F7A", "#A68BD0", "#4C5FD5", "#2A8FA8", "#5B2A86")
-"""Closed chains, in turn; none is green, which stands for segments that were fused."""
+"""Closed chains, in turn; none is green, which means fused segments."""
 OPEN = "#E69F00"
 """Chains with open ends ..."""
 OPEN_SHADES = (OPEN, "#B86E00", "#F2C45A", "#8C5A1E")
-"""... in turn, where several are told apart."""
+"""... in turn, if several are distinguished."""
 ALARM = "#D55E00"
 """Open ends."""
 TENTATIVE = "#9A9A9A"

@@ -1,4 +1,4 @@
-"""What is drawn, as arrays: ellipses, the model space (alpha, r), and which rows of a table have changed."""
+"""Shapes as arrays: ellipses, the model space (alpha, r), and the rows of a table that have changed."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -6,20 +6,20 @@ from jaxtyping import Bool, Float, Int
 from chainslam.slam.geometry.lines import directions
 
 VERTICES = 17
-"""An ellipse is a closed strip of so many points, the first again at its end."""
+"""Number of points of an ellipse, a closed strip whose first point is repeated at its end."""
 SIGMAS = 3.0
 VAGUE_RAD = float(np.deg2rad(1.0))
-"""Walls of a less certain direction (short faces, seen from afar) are drawn pale: their ellipses are huge."""
+"""Walls with a less certain direction (short, or seen from far away) are drawn pale, since their ellipses are huge."""
 
 
 def ellipses(
     centres: Float[np.ndarray, "n 2"], covs: Float[np.ndarray, "n 2 2"], times: float, vertices: int = VERTICES
 ) -> Float[np.ndarray, "n v 2"]:
-    """Return the contours of three standard deviations, `times` enlarged, as closed strips of points."""
+    """Return 3 sigma ellipses, enlarged by `times`, as closed strips of points."""
     turn = np.linspace(0.0, 2.0 * np.pi, vertices)
     cos, sin = np.cos(turn), np.sin(turn)
     a, b, c = covs[:, 0, 0], covs[:, 0, 1], covs[:, 1, 1]
-    # The Cholesky root by hand: a covariance that lost its definiteness by rounding draws as a line, not as an error.
+    # The Cholesky root in closed form: a covariance that is indefinite by rounding is drawn as a line.
     first = np.sqrt(np.maximum(a, 0.0))
     cross = np.divide(b, first, out=np.zeros_like(b), where=first > 0.0)
     last = np.sqrt(np.maximum(c - cross**2, 0.0))
@@ -41,7 +41,7 @@ def hessian_cov(
 
 
 def spread(heights: Float[np.ndarray, " k"], groups: Int[np.ndarray, " k"], gap: float) -> Float[np.ndarray, " k"]:
-    """Return the heights raised as little as leaves those of one group `gap` or more apart, in their order."""
+    """Return heights in their order, raised as little as possible so that those of a group are `gap` or more apart."""
     moved = heights.astype(np.float64)
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
@@ -52,7 +52,7 @@ def spread(heights: Float[np.ndarray, " k"], groups: Int[np.ndarray, " k"], gap:
 
 
 class Changes:
-    """Remembers what was last drawn of each thing, so that only what has changed is drawn again."""
+    """Remembers what was drawn last, so that only changes are drawn again."""
 
     def __init__(self, width: int) -> None:
         self._ids = np.zeros(0, dtype=np.int64)
@@ -81,5 +81,5 @@ class Changes:
 
 
 def rounded(values: Float[np.ndarray, "..."], quantum: float) -> Int[np.ndarray, "k w"]:
-    """Return rows of whole multiples of `quantum`, one row for each entry of the first axis."""
+    """Return rows rounded to multiples of `quantum`, one row for each entry of the first axis."""
     return np.round(values.reshape(len(values), -1) / quantum).astype(np.int64)

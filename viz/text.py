@@ -1,9 +1,9 @@
-"""Words that come from outside, drawn letter by letter."""
+"""User-provided text, drawn literally."""
 
 
 def literal(words: str) -> str:
-    r"""Return words for matplotlib that it draws as they are: between two bare dollar signs it would set mathematics.
+    r"""Return text that matplotlib draws as it is: between two plain dollar signs it would typeset mathematics.
 
-    An escaped dollar sign is drawn as one, also after a backslash of the words' own.
+    An escaped dollar sign is drawn as one, also after a backslash in the text itself.
     """
     return words.replace("$", r"\$")

@@ -1,4 +1,4 @@
-"""Rerun's viewer as a process of its own: bound to the loopback, and cut off from everything outside."""
+"""Rerun's viewer as a separate process, bound to the loopback interface, without access to the network."""
 
 import os
 import shutil
@@ -12,25 +12,25 @@ from urllib.parse import quote
 
 LOOPBACK = "127.0.0.1"
 NOWHERE = f"http://{LOOPBACK}:9"
-"""A proxy that nobody serves: the viewer asks a host outside for its newest version, analytics off or on."""
+"""A proxy without a server: the viewer asks an external host for its newest version, with or without analytics."""
 PATIENCE_S = 20.0
 PORT, PAGE_PORT = 9876, 9090
-"""Of the recordings and of the page, where nobody else has them: the same each time, so that ssh can forward them."""
+"""Ports of the recordings and of the page, if they are free: always the same, so that ssh can forward them."""
 
 
 class ViewerError(RuntimeError):
-    """The viewer cannot be shown, told in one line: what was expected, what was found, what to do."""
+    """The viewer cannot be shown. The message is one line: what was expected, what was found, what to do."""
 
 
 class Viewer:
-    """A running viewer; it stays when this program ends."""
+    """A running viewer; it stays open when this program ends."""
 
     def __init__(self, files: Sequence[Path] = ()) -> None:
         """Start it with some recordings, or empty; raises ViewerError."""
         executable = available()
         self._port = _free_port()
         command = [executable, "--bind", LOOPBACK, "--port", str(self._port), "--hide-welcome-screen", *map(str, files)]
-        # A session of its own: Ctrl-C ends the run, not the picture of it.
+        # A session of its own: Ctrl-C ends the run but not the viewer.
         self._process = subprocess.Popen(
             command, env=_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             start_new_session=True,
@@ -39,7 +39,7 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where a recording can be sent while it goes on."""
+        """Address to which a recording can be sent while it goes on."""
         return f"rerun+http://{LOOPBACK}:{self._port}/proxy"
 
     def _wait_until_it_listens(self) -> None:
@@ -47,7 +47,7 @@ class Viewer:
 
 
 class WebViewer:
-    """A viewer served to browsers of this machine, with some recordings, until it is closed."""
+    """A viewer served to browsers on this machine, with some recordings, until it is closed."""
 
     def __init__(self, files: Sequence[Path]) -> None:
         """Start it; raises ViewerError."""
@@ -65,7 +65,7 @@ class WebViewer:
 
     @property
     def url(self) -> str:
-        """Where a browser finds it."""
+        """Address for a browser."""
         source = quote(f"rerun+http://{LOOPBACK}:{self.port}/proxy", safe="")
         return f"http://{LOOPBACK}:{self.page_port}/?url={source}"
 
@@ -95,7 +95,7 @@ def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 def available() -> str:
-    """Return the viewer's path; raises ViewerError where there is none, or no display to show it on."""
+    """Return the viewer's path; raises ViewerError if it is not installed, or there is no display."""
     executable = _executable()
     display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform == "linux" and not display:
@@ -106,7 +106,7 @@ def available() -> str:
 
 
 def _executable() -> str:
-    """Return the viewer's path, beside this Python or on the path."""
+    """Return the viewer's path, next to this Python or on the search path."""
     beside = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     found = shutil.which("rerun", path=beside)
     if found is None:
@@ -115,7 +115,7 @@ def _executable() -> str:
 
 
 def _environment() -> dict[str, str]:
-    """Return the viewer's environment: no way outside, and no statistics kept."""
+    """Return the viewer's environment: no network access, and no analytics."""
     proxies = {name: NOWHERE for name in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY")}
     proxies |= {name.lower(): value for name, value in proxies.items()}
     settings = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "chainslam" / "viewer"
@@ -130,7 +130,7 @@ def _environment() -> dict[str, str]:
 
 
 def _free_port(wanted: int = 0) -> int:
-    """Return a port that nobody uses: the wanted one, if it is free."""
+    """Return a free port, the preferred one if possible."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,1 +1,1 @@
-"""Every file that a run leaves, written and read again."""
+"""The files of a run, written and read again."""

@@ -1,4 +1,4 @@
-"""What `--fence` takes: a box in four numbers, or a file with a polygon."""
+"""The argument of `--fence`: a box in four numbers, or a file with a polygon."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ SHAPE = "a fence as X0,Y0,X1,Y1 in metres or a GeoJSON file with one polygon"
 
 
 def fence_of(text: str) -> list[list[float]]:
-    """Return the corners of a fence, m, world frame; raises UsageError, in one line, for anything else."""
+    """Return the corners of a fence, m, world frame; raises UsageError for anything else."""
     parts = text.split(",")
     if len(parts) == 4:
         try:
@@ -31,7 +31,7 @@ def fence_of(text: str) -> list[list[float]]:
         reason = getattr(error, "strerror", None) or "no GeoJSON"
         raise UsageError(f"expected {SHAPE}, found {Path(text).name} ({reason}): name another") from error
     if polygon is None or not polygon.is_valid or polygon.area <= 0.0:
-        raise UsageError(f"expected {SHAPE}, found {Path(text).name} without one that is valid: draw it anew")
+        raise UsageError(f"expected {SHAPE}, found {Path(text).name} without a valid one: redraw it")
     return [list(point) for point in shapely.get_coordinates(polygon.exterior)[:-1].tolist()]
 
 

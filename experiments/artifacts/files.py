@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: the same bytes for the same content, with the number of their format."""
+"""Atomic file writes: complete or not at all, the same bytes for the same content, with a format number."""
 
 import csv
 import errno
@@ -17,23 +17,23 @@ import numpy as np
 from chainslam.sim.logs.recorded_robot import FORMAT
 
 CONFIG = "config.json"
-"""Of a run, of a campaign and of merged campaigns."""
+"""The file of settings in the folder of a run, a campaign or merged campaigns."""
 PART = re.compile(r"\..+\.\d+\.part")
-"""The names of files that are being written; a process that was killed leaves them behind."""
+"""Names of files that are being written; a killed process leaves them behind."""
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: under a temporary name first, then renamed; raises OSError that names it."""
+    """Write a file atomically: under a temporary name first, then renamed; raises OSError with the file's name."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with temporary.open("wb") as file:
             file.write(content)
             file.flush()
-            # Without this a power cut may leave the new name with nothing under it.
+            # Without this, a power failure may leave the new name with an empty file.
             os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
-        # A full disk names no file, and users should not see the temporary name.
+        # The error of a full disk has no file name, and users should not see the temporary one.
         error.filename, error.filename2 = str(path), None
         raise
     finally:
@@ -41,12 +41,12 @@ def write(path: Path, content: bytes) -> None:
 
 
 def stamp() -> dict[str, int]:
-    """Return what every file that is read back holds: keys and their order change only with this number."""
+    """Return the header of a file that is read back; its keys and order only change with the number."""
     return {"format": FORMAT}
 
 
 def format_fault(said: Any) -> str:
-    """Return in words what is wrong with the format number in a file; empty where it can be read."""
+    """Return what is wrong with the format number of a file, in words; empty if it can be read."""
     if type(said) is int and said == FORMAT:
         return ""
     shown = said if isinstance(said, int | float) else type(said).__name__
@@ -54,12 +54,12 @@ def format_fault(said: Any) -> str:
 
 
 def replacing(path: Path) -> str:
-    """Return words to tell, ahead of writing a file, that an earlier one gives way to it; none where there is none."""
+    """Return a note that an earlier file is about to be replaced; empty if there is none."""
     return ", in place of an earlier one" if path.exists() else ""
 
 
 def probe(path: Path) -> None:
-    """Raise OSError, leaving nothing behind, where `write_anywhere` could not write."""
+    """Raise OSError, leaving nothing behind, if `write_anywhere` could not write."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not path.exists() or path.is_file():
@@ -69,7 +69,7 @@ def probe(path: Path) -> None:
 
 
 def write_anywhere(path: Path, content: bytes) -> None:
-    """Write to a place that somebody named: its folder is made, and what is no plain file (a device, a pipe) is kept.
+    """Write to a path given by the user: create its folder, and keep what is not a regular file (a device or a pipe).
 
     Raises OSError, with nothing left behind.
     """
@@ -89,7 +89,7 @@ def json_bytes(value: Any) -> bytes:
 
 
 def npz_bytes(arrays: Mapping[str, Any]) -> bytes:
-    """Return arrays as an .npz archive without pickles; its entries carry no time of writing."""
+    """Return arrays as an .npz archive without pickles or time stamps."""
     buffer = BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **{name: np.asarray(array) for name, array in arrays.items()})
     return buffer.getvalue()
@@ -109,7 +109,7 @@ def _is_missing(cell: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value out of JSON's own types."""
+    """Convert a value to JSON's own types."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Settings by name: the method behind `--preset paper-method`, the robots behind `--robot`."""
+"""Named settings: the method of `--preset paper-method` and the robots of `--robot`."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
@@ -25,17 +25,17 @@ MATCHING = "mission.mapper.matching.method"
 
 @dataclass(frozen=True)
 class MethodPreset:
-    """A back end and the settings that go with it, by their dotted keys."""
+    """A back end and its settings, by their dotted keys."""
 
     backend: str
     mapper: tuple[tuple[str, Any], ...]
-    """What the robot makes of its scans: a campaign has it as one of its back ends."""
+    """How the robot maps its scans; a campaign treats it as one of its back ends."""
     driving: tuple[tuple[str, Any], ...]
-    """Where the robot goes: a campaign has it for all of its back ends, or for none."""
+    """Where the robot drives; it is the same for all back ends of a campaign."""
 
     @property
     def record(self) -> Record:
-        """All of it, as a nested record of a trial's settings."""
+        """The whole method, as a nested record of settings."""
         return nested([("backend", self.backend), *self.mapper, *self.driving])
 
 
@@ -55,17 +55,17 @@ METHODS: dict[str, MethodPreset] = {
 
 
 def backend_of(name: str) -> str:
-    """Return the back end that a campaign's name stands for: its own, or that of a method."""
+    """Return the back end behind a name in a campaign: itself, or that of a method."""
     return METHODS[name].backend if name in METHODS else name
 
 
 def mapping_of(name: str) -> Record:
-    """Return the settings that a campaign's name stands for beside its back end; none for a back end itself."""
+    """Return the settings that a campaign's name adds to its back end; none for a plain back end."""
     return nested(METHODS[name].mapper) if name in METHODS else {}
 
 
 def preset_of(name: str | None) -> Record:
-    """Return the settings of a trial behind a preset's name; none without one."""
+    """Return the settings of a preset; none without a name."""
     return METHODS[name].record if name else {}
 
 
@@ -99,17 +99,17 @@ def robot_of(name: str | None) -> Record:
         found = f"{path.name} ({error.strerror or type(error).__name__})"
         near = did_you_mean(name, ROBOTS)
         raise UsageError(
-            f"expected a robot out of {', '.join(ROBOTS)} or a file, found {found}{near}: name one of these"
+            f"expected a robot from {', '.join(ROBOTS)} or a file, found {found}{near}: name one of these"
         ) from error
     except UnfitError as error:
-        raise UsageError(f"expected what a robot states of itself, found {error}: correct {path.name}") from error
+        raise UsageError(f"expected a description of a robot, found {error}: correct {path.name}") from error
     except (WorldError, UsageError) as error:
         raise UsageError(f"{error} (in {path.name})") from error
     return record
 
 
 def stated(robot: Record) -> Record:
-    """Return of a robot's settings those that it states of itself; a recorded one has no other."""
+    """Return those settings of a robot that describe it to the software; the rest belongs to its simulation."""
     said: Record = robot.get("robot", {})
     found = {each.name: said[each.name] for each in fields(RobotSpec) if each.name in said}
     if "lidar" in found:

@@ -1,6 +1,6 @@
-"""Files of results read again: plain, of bounded size, of this format, and of the kind that they must be.
+"""Reading of result files: regular files of bounded size, of this format, and of the expected kind.
 
-Whatever else a file holds is told in one line by a UsageError.
+Anything else raises a UsageError with one line.
 """
 
 import json
@@ -21,14 +21,14 @@ from .files import format_fault
 from .schema import UnfitError, fit
 
 LIMIT_BYTES = 2**26
-"""A JSON file of more than this is not read."""
+"""Larger JSON files are not read."""
 DEPTH = 32
-"""Values nested deeper are nothing that this program wrote."""
+"""Deeper nested values were not written by this program."""
 
 
 @contextmanager
 def told(path: Path, todo: str) -> Iterator[None]:
-    """Turn what goes wrong in reading a file into a UsageError: what was expected, what was found, what to do."""
+    """Convert an error of reading a file into a UsageError: what was expected, what was found, what to do."""
     expected = f"expected {path.name} as this version writes it in {path.parent}"
     try:
         yield
@@ -43,13 +43,13 @@ def told(path: Path, todo: str) -> Iterator[None]:
 
 
 def read_json(path: Path, kind: Any, todo: str) -> dict[str, Any]:
-    """Return the object in a file of this format that holds at least what a kind names; raises UsageError."""
+    """Return the object in a file of this format with at least the keys of a kind; raises UsageError."""
     with told(path, todo):
         return _formed(read_plain(path), kind)
 
 
 def parse_json(content: bytes, kind: Any) -> dict[str, Any]:
-    """Return the object in JSON of this format that holds at least what a kind names; raises UnfitError."""
+    """Return the object in JSON of this format with at least the keys of a kind; raises UnfitError."""
     return _formed(plain_json(content), kind)
 
 
@@ -70,13 +70,13 @@ def plain_json(content: bytes) -> Any:
     except UnfitError:
         raise
     except (ValueError, RecursionError) as error:
-        raise UnfitError("no JSON, or some that was cut short") from error
+        raise UnfitError("invalid or truncated JSON") from error
     check_plain(said)
     return said
 
 
 def check_plain(said: Any) -> None:
-    """Raise UnfitError for values nested deeper than `DEPTH`, numbers that are none, and text that moves a cursor."""
+    """Raise UnfitError for values nested deeper than `DEPTH`, numbers that are not finite, and control characters."""
     level, depth = [said], 0
     while level:
         depth += 1
@@ -91,12 +91,12 @@ def check_plain(said: Any) -> None:
             elif isinstance(value, float) and not math.isfinite(value):
                 raise UnfitError(f"the number {json.dumps(value)}")
             elif isinstance(value, str) and not _is_text(value):
-                raise UnfitError(f"text that nobody can read ({ascii(value)[:30]})")
+                raise UnfitError(f"text with invalid characters ({ascii(value)[:30]})")
         level = below
 
 
 def check_format(said: Mapping[str, Any]) -> None:
-    """Raise UnfitError where what a file says has no format that is read."""
+    """Raise UnfitError if the format number is missing or unknown."""
     if "format" not in said:
         raise UnfitError("no format number")
     if wrong := format_fault(said["format"]):
@@ -120,10 +120,10 @@ def _formed(said: Any, kind: Any) -> dict[str, Any]:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of which every key stands there once."""
+    """Return an object; raises UnfitError if a key occurs twice."""
     said = dict(pairs)
     if len(said) < len(pairs):
-        raise UnfitError("a key that stands there twice")
+        raise UnfitError("a duplicate key")
     return said
 
 

@@ -1,4 +1,4 @@
-"""The folder that a trial leaves: all that is needed to look at it, score it again, replay it and run it again."""
+"""The folder of a trial: everything needed to look at it, score it again, replay it and run it again."""
 
 import platform
 import subprocess
@@ -34,7 +34,7 @@ from .trajectories import smoothed_path, trajectory, tum, wheels_alone
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
 RUNNING = "log.running"
-"""The log while the run goes on: it is there until all results are."""
+"""The log during the run; it is removed once all results are written."""
 RECORDING = "run.rrd"
 RUN_FILES = (
     *(CONFIG, SUMMARY, "failure.txt", LOG, RUNNING, MAP, "map.geojson", "map.svg", "map.dxf", "map.png"),
@@ -42,9 +42,9 @@ RUN_FILES = (
     *(f"trajectory_{name}.tum" for name in ("true", "estimated", "smoothed", "odometry")),
     *(RECORDING, "report.html", "tables.tex"),
 )
-"""All that a run leaves, and what `view` and `report` make of it in the same folder."""
+"""All files of a run, and those that `view` and `report` add to its folder."""
 REPLAY = "replay"
-"""In `config.json`: the options of a replay; none for a run that drove."""
+"""Key in `config.json` of the options of a replay; null for an exploration."""
 STEP_COLUMNS = (
     *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
     "pose_nees_from_start",
@@ -68,7 +68,7 @@ def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | No
     for name, make in _files(result, config or config_record(result.scenario.config)).items():
         try:
             write(folder / name, make())
-        except Exception as error:  # nothing that was computed may be lost to one bad file
+        except Exception as error:  # one file that cannot be written must not cost the other results
             known = error.strerror if isinstance(error, OSError) else None
             why = known or f"{type(error).__name__}: {' '.join(str(error).split())}"
             problems.setdefault(why, []).append(name)
@@ -94,7 +94,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         files["trajectory_true.tum"] = lambda: trajectory(result, log, log.true_world)
     else:
         files["trajectory_odometry.tum"] = lambda: trajectory(result, log, wheels_alone(log, recorded))
-    # A recorded drive was looked at again: its map goes with the smoothed path.
+    # After offline refinement the map is saved together with the smoothed path.
     shown = log if recorded is None or smoothed is None else replace(log, estimated_world=smoothed.poses_world)
     drawn = cache(lambda: map_geojson(last, result.joint, certificate, shown))
     told = cache(lambda: _dimensions(result, drawn()["features"]))
@@ -112,7 +112,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "visibility.png": lambda: _pictures().graph_png(result),
     }
     floor = last.free_space
-    if recorded is not None and not floor.evidence.size:  # Nobody planned, so nobody kept it.
+    if recorded is not None and not floor.evidence.size:  # A recorded drive has no planner, hence no planned routes.
         floor = drawn_floor(recorded.recording, shown.estimated_world, result.scenario.config.mission.free_space)
     if np.any(floor.evidence):
         ros_map = cache(lambda: occupancy_files(floor, shown.estimated_world[0]))
@@ -121,7 +121,7 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
 
 
 def _dimensions(result: TrialResult, features: list[dict[str, Any]]) -> list[Dimension]:
-    """Return lengths and areas as `measure` would tell them of the files; none where the covariance is lost."""
+    """Return lengths and areas as `measure` reports them; none if the covariance is lost."""
     arrays = map_arrays(result)
     if not np.all(np.isfinite(arrays["cov"])):
         return []
@@ -130,7 +130,7 @@ def _dimensions(result: TrialResult, features: list[dict[str, Any]]) -> list[Dim
 
 
 def config_record(config: TrialConfig) -> dict[str, Any]:
-    """Return all that is needed to run a trial again, with the versions that ran it."""
+    """Return everything needed to run a trial again, with the versions that ran it."""
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
@@ -141,14 +141,14 @@ def config_record(config: TrialConfig) -> dict[str, Any]:
 
 
 def _pictures() -> ModuleType:
-    # matplotlib takes as long to import as all else: a campaign's workers draw nothing.
+    # Importing matplotlib takes as long as everything else, and the workers of a campaign draw nothing.
     from .maps import picture
 
     return picture
 
 
 def _commit() -> str | None:
-    """Return the commit of the sources, with a plus sign where files have changed since; None outside git."""
+    """Return the commit of the sources, with a plus sign if files have changed since; None outside git."""
     here = Path(__file__).parent
     try:
         words = [
@@ -173,7 +173,7 @@ def log_arrays(result: TrialResult, log: Log) -> dict[str, Any]:
 
 def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
     recorded = result.recorded
-    # Scan matching takes the place of what the wheels reported; the log keeps their reports.
+    # Scan matching replaces the reported wheel odometry in the estimate; the log keeps the reports.
     wheels = log if recorded is None else recorded.recording
     return {
         "time_s": log.time_s,
@@ -230,7 +230,7 @@ def map_arrays(result: TrialResult) -> dict[str, Any]:
 
 
 def steps_csv(log: Log) -> bytes:
-    """Return a row for each step; the errors are the invariant ones that the NEES is made of."""
+    """Return a row for each step; its errors are the invariant ones that the NEES is computed from."""
     sigmas = np.sqrt(np.diagonal(log.estimated_cov, axis1=1, axis2=2))
     rows, columns_of_cov = np.triu_indices(3)
     wheels = np.hypot(*(odometry_path(log) - log.true_world)[:, :2].T)

@@ -1,4 +1,4 @@
-"""The folder that a command writes into: made, kept to one process, cleared of what an earlier one left."""
+"""The folder for a command's results: created, locked for one process, and cleared of an earlier run."""
 
 import fcntl
 import json
@@ -18,62 +18,58 @@ LOCK = ".lock"
 
 
 class FolderGoneError(UsageError):
-    """The folder for the results was taken away while they were worked out."""
+    """The folder for the results was removed during the run."""
 
     exit_status = 1
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(
-            f"expected the folder {folder} to stay, found it gone: nothing more could be written, run it again"
-        )
+        super().__init__(f"expected the folder {folder} to stay until the end, found it removed: repeat the run")
 
 
 def unwritable(folder: Path, error: OSError) -> UsageError:
-    """Return what is told, before anything is computed, of a folder into which nothing can be written."""
+    """Return the error for a folder that cannot be written, before anything is computed."""
     named = Path(error.filename or folder)
     where = str(folder) if folder.is_relative_to(named) else f"{folder / named.name}"
-    return UsageError(
-        f"expected a folder that can be written into, found {where} ({error.strerror}): name another with --out"
-    )
+    return UsageError(f"expected a writable folder, found {where} ({error.strerror}): name another with --out")
 
 
 def prepare(folder: Path) -> None:
-    """Make a folder that files can be written into; raises UsageError, before anything is computed, where it cannot."""
+    """Create a writable folder; raises UsageError, before anything is computed, if that is impossible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(folder, error) from error
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"expected a folder to write into, found {folder} read-only: name another with --out")
+        raise UsageError(f"expected a writable folder, found {folder} read-only: name another with --out")
 
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Keep a folder to this process while the block runs; raises UsageError where another process has it.
+    """Lock a folder while the block runs; raises UsageError if another process holds it.
 
-    The kernel lets go of it when the process ends, however it ends. A file system that knows no locks (some of NFS)
-    costs one line on standard error, and nobody is kept out.
+    The kernel releases the lock when the process ends, in whatever way. On a file system without locks (some NFS
+    servers) one line on standard error warns that nothing prevents another run from writing there.
     """
     path = folder / LOCK
     try:
         lock = _locked(path)
     except BlockingIOError as error:
         raise UsageError(
-            f"expected a folder to itself, found another run at work in {folder}: wait for it or name another --out"
+            f"expected a folder that no other run uses, found a run in {folder}: wait for it or name another --out"
         ) from error
     except OSError as error:
         raise unwritable(folder, error) from error
     try:
         yield
     finally:
-        # While it is still held: whoever opened it meanwhile finds that it is no longer the one in the folder.
+        # Unlinked while the lock is held, so that whoever opened it meanwhile sees that it is no longer in the folder.
         with suppress(OSError):
             path.unlink()
         os.close(lock)
 
 
 def _locked(path: Path) -> int:
-    """Return the lock's descriptor; raises BlockingIOError where another process has it."""
+    """Return the descriptor of the lock; raises BlockingIOError if another process holds it."""
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
@@ -83,7 +79,7 @@ def _locked(path: Path) -> int:
             raise
         except OSError as error:
             print(
-                f"chainslam: {path.parent} cannot be locked ({error.strerror}): let no other run write into it",
+                f"chainslam: {path.parent} cannot be locked ({error.strerror}): make sure no other run writes into it",
                 file=sys.stderr,
             )
             return lock
@@ -93,7 +89,7 @@ def _locked(path: Path) -> int:
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
-    """Return whether an open file is the one that bears this name now."""
+    """Return whether an open file is still the one with this name."""
     try:
         return os.path.samestat(os.fstat(descriptor), os.stat(path))
     except FileNotFoundError:
@@ -101,14 +97,14 @@ def _is_at(descriptor: int, path: Path) -> bool:
 
 
 def clear_leftovers(folder: Path, pattern: str = ".*") -> None:
-    """Remove the half-written files of processes that were killed; call it with the folder held."""
+    """Remove half-written files of killed processes; call it with the folder locked."""
     for path in folder.glob(pattern):
         if PART.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
 def refuse_others(folder: Path, config: Mapping[str, Any], force: bool) -> None:
-    """Raise UsageError where a held folder holds anything else than the run of this config; `force` lets runs pass."""
+    """Raise UsageError if a locked folder holds anything but the run of this config; `force` permits other runs."""
     clear_leftovers(folder)
     found = sorted(child.name for child in folder.iterdir() if child.name != LOCK)
     other = _other(folder, found, config) if found else ""
@@ -122,15 +118,15 @@ def refuse_others(folder: Path, config: Mapping[str, Any], force: bool) -> None:
 
 
 def settle(folder: Path, config: Mapping[str, Any]) -> None:
-    """Make a held folder that of a new run: what an earlier one left there goes, and `config.json` is written.
+    """Prepare a locked folder for a new run: delete the results of an earlier one, and write `config.json`.
 
-    Raises UsageError where that cannot be.
+    Raises UsageError if that is impossible.
     """
     try:
         for name in RUN_FILES:
             if name != CONFIG:
                 (folder / name).unlink(missing_ok=True)
-        # Last, so that a folder in which this was cut short is that of the earlier run still.
+        # Written last: until then the folder still belongs to the earlier run.
         write(folder / CONFIG, json_bytes(config))
     except OSError as error:
         raise unwritable(folder, error) from error
@@ -140,7 +136,7 @@ _CAMPAIGN = "a campaign"
 
 
 def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
-    """Return what else than this very run a folder holds, in words; empty if it is this run."""
+    """Return what a folder holds other than this run, in words; empty if it is this run."""
     few = found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
     try:
         there = json.loads((folder / CONFIG).read_text())
@@ -158,7 +154,7 @@ def _other(folder: Path, found: list[str], config: Mapping[str, Any]) -> str:
 
 
 def default_folder(world: str, trial: TrialConfig, preset: str | None = None) -> Path:
-    """Return the folder for a run that names none: the same run comes to the same place."""
+    """Return the default folder of a run; the same run always gets the same folder."""
     parts = [world.replace(":", "-"), trial.backend, trial.strategy, str(trial.seed)]
     parts += [preset] if preset else []
     parts += [trial.p0] if trial.p0 != "small" else []
@@ -168,7 +164,7 @@ def default_folder(world: str, trial: TrialConfig, preset: str | None = None) ->
 
 
 def point_latest_at(folder: Path) -> None:
-    """Let results/latest lead to the newest run; file systems without links go without."""
+    """Link results/latest to the newest run; ignored on file systems without links."""
     link = folder.parent / "latest"
     try:
         if link.is_symlink():

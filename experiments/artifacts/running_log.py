@@ -1,10 +1,10 @@
-"""A run's log while the run goes on: one record a step at the end of one file.
+"""The log of a run under way: one record per step, appended to one file.
 
-Whatever ends the run, the steps up to then are there: `--resume` holds the new drive against them. A record that was
-cut short is left out. Once all results are written the file is removed: `log.npz` holds all of it.
+However the run ends, its steps are kept: `--resume` compares the new drive with them. An incomplete last record is
+ignored. The file is removed once all results are written, since `log.npz` contains everything in it.
 
-A record is its length, a checksum of what follows, and that: first the format and the config as JSON, then for each
-step the time, the wheels' motion and its covariance, and the ranges, as 64-bit numbers.
+A record consists of its length, a checksum, and the data: first the format and the config as JSON, then for each step
+the time, the odometry with its covariance, and the ranges, as 64-bit numbers.
 """
 
 import json
@@ -30,28 +30,28 @@ from .run_folder import FolderGoneError, unwritable
 
 _NUMBER = "<f8"
 _BEFORE = 1 + 3 + 9
-"""Numbers of a step before its ranges."""
+"""Numbers per step before its ranges."""
 _HEAD = struct.Struct("<II")
 
 
 @dataclass(frozen=True)
 class Kept:
-    """What the file of a run holds; s steps, k beams."""
+    """The content of a running log; s steps, k beams."""
 
     config: bytes
-    """What `config.json` is to hold."""
+    """The record for `config.json`."""
     records: bytes
-    """The whole records of steps as they stand in the file."""
+    """The complete records of steps, as bytes."""
     time_s: Float[np.ndarray, " s"]
     ranges_m: Float[np.ndarray, "s k"]
     odometry: Float[np.ndarray, "s 3"]
 
 
 class RunningLog:
-    """Appends each step to a file in a folder; a disk that is full ends the file and not the run."""
+    """Appends each step to a file in a folder; a full disk ends the file, not the run."""
 
     def __init__(self, folder: Path, config: Mapping[str, Any], kept: Kept | None = None) -> None:
-        """Begin the file, or go on behind the steps that were kept of it; raises UsageError."""
+        """Start the file, or continue after the steps that were kept of it; raises UsageError."""
         self._folder, self._path = folder, folder / RUNNING
         self._steps = 0 if kept is None else len(kept.time_s)
         begin = json.dumps({"format": FORMAT, "config": json_bytes(config).decode()})
@@ -62,7 +62,7 @@ class RunningLog:
             raise unwritable(folder, error) from error
 
     def add(self, step: Step) -> None:
-        """Append a step unless it is there already; raises FolderGoneError where the file was taken away."""
+        """Append a step unless it is there already; raises FolderGoneError if the file was removed."""
         if self._file is None:
             return
         self.check()
@@ -83,7 +83,7 @@ class RunningLog:
         self._steps += 1
 
     def check(self) -> None:
-        """Raise FolderGoneError where the file is no longer the one in the folder."""
+        """Raise FolderGoneError if the file is no longer in the folder."""
         if self._file is None:
             return
         try:
@@ -94,13 +94,13 @@ class RunningLog:
             raise FolderGoneError(self._folder)
 
     def close(self) -> None:
-        """Append no more."""
+        """Stop appending."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
 
     def remove(self) -> None:
-        """Remove the file: what it holds is kept elsewhere, or was kept before."""
+        """Remove the file, once its content is kept elsewhere."""
         self.close()
         with suppress(OSError):
             self._path.unlink()
@@ -111,7 +111,7 @@ def _record(held: bytes) -> bytes:
 
 
 def _records(content: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield where each whole record ends, and what it holds; what follows one that is not whole is left out."""
+    """Yield the end and the content of each complete record; an incomplete one and what follows it are ignored."""
     at = 0
     while at + _HEAD.size <= len(content):
         length, checksum = _HEAD.unpack_from(content, at)
@@ -123,7 +123,7 @@ def _records(content: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def read_running(folder: Path) -> Kept | None:
-    """Return what the file in a folder holds, None where there is none; raises UsageError for a file that is none."""
+    """Return the content of the file in a folder, None without a file; raises UsageError for an invalid one."""
     path = folder / RUNNING
     try:
         content = path.read_bytes()
@@ -137,7 +137,7 @@ def read_running(folder: Path) -> Kept | None:
         said = json.loads(begin)
         config = said["config"].encode()
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise _none(path, "none of ours") from error
+        raise _none(path, "not written by chainslam") from error
     if said.get("format") != FORMAT:
         raise _none(path, f"format {said.get('format')}")
     end, steps = began, list[np.ndarray]()
@@ -152,5 +152,5 @@ def read_running(folder: Path) -> Kept | None:
 
 def _none(path: Path, found: str) -> UsageError:
     return UsageError(
-        f"expected the log of a run under way, found {path} ({found}): delete it, or explore anew with --force"
+        f"expected the log of a run under way, found {path} ({found}): delete it, or start again with --force"
     )

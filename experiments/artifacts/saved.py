@@ -1,9 +1,9 @@
-"""A run's own folder read again: its settings, and how to go on from where it stopped.
+"""A run read from its folder: its settings, and how to continue it.
 
-A run is decided by its settings alone, so going on means driving it once more from the start, past the place where
-it stopped; that costs the time of the first part again, and leaves the bytes of a run that was never stopped. What the
-robot reports on the way is held against the log, so that a world or a software that has changed since is noticed.
-A run that was killed left no `log.npz`, or an older one, but the stream that it wrote as it went (`running_log.py`).
+The settings alone determine a run. To continue, it is therefore driven again from the start, past the point where it
+stopped: this takes the time of the first part again, and gives the same bytes as an uninterrupted run. The robot's
+reports are compared with the log on the way, which detects a world or software that has changed since. A killed run has
+no `log.npz`, or an older one, but its running log (`running_log.py`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ from .results import LOG, RUNNING
 from .running_log import Kept, read_running
 from .schema import fit, many
 
-REMEDY = "keep a run's files together, or make it anew"
+REMEDY = "keep a run's files together, or repeat the run"
 NUMBERS = (
     *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
     *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
@@ -49,14 +49,14 @@ Summary = defstruct(
         ("set_aside", many(Aside) | None, None),
     ],
 )
-"""What pages and pictures take from a `summary.json`."""
+"""The keys that pages and pictures take from a `summary.json`."""
 
 
 Known = defstruct("Known", [("outcome", str)])
 
 
 class Ended(Struct):
-    """What every `summary.json` says of the end of the run."""
+    """The keys of every `summary.json` that describe the end of the run."""
 
     status: str
     reason: str
@@ -64,13 +64,13 @@ class Ended(Struct):
 
 @dataclass(frozen=True)
 class SavedRun:
-    """What a stopped or killed run has left; s steps, k beams."""
+    """The results of a stopped or killed run; s steps, k beams."""
 
     trial: TrialConfig
     outcome: Outcome | None
-    """What the saved results say; None where they are not all there."""
+    """The outcome in the saved results; None if they are incomplete."""
     kept: Kept | None
-    """The stream of a run that was killed, None where all results were written."""
+    """The running log of a killed run; None if all results were written."""
     time_s: Float[np.ndarray, " s"]
     ranges_m: Float[np.ndarray, "s k"]
     odometry: Float[np.ndarray, "s 3"]
@@ -79,22 +79,22 @@ class SavedRun:
         return len(self.time_s)
 
     def check(self, step: Step) -> None:
-        """Raise UsageError where a step differs from the saved one of the same number."""
+        """Raise UsageError if a step differs from the saved one with the same number."""
         if step.index >= len(self):
             return
         same = np.array_equal(step.scan.ranges_m, self.ranges_m[step.index], equal_nan=True)
         if not same or not np.array_equal(step.odometry.reported.motion, self.odometry[step.index]):
             raise UsageError(
-                f"expected the saved run again, found another from step {step.index} on (the world, the software or"
-                " the machine has changed): explore anew"
+                f"expected the saved run to repeat, found a difference at step {step.index} (the world, the software"
+                " or the machine has changed): start a new run"
             )
 
     def is_finished(self, trial: TrialConfig) -> bool:
-        """Return whether driving again with these settings would leave what is there already."""
+        """Return whether driving again with these settings would give the same results."""
         if self.kept is not None or self.outcome is None or self.outcome in (Outcome.INTERRUPTED, Outcome.FAILED):
             return False
         if self.outcome.status == "complete":
-            # It ended by itself: no other limit makes it longer.
+            # It ended by itself: a larger limit does not make it longer.
             saved = self.trial
             trial = replace(
                 trial, max_steps=saved.max_steps, max_path_m=saved.max_path_m, time_limit_s=saved.time_limit_s
@@ -102,7 +102,7 @@ class SavedRun:
         return trial == self.trial
 
     def outlasts(self, limits: Limits) -> bool:
-        """Return whether the saved results go further than these limits would let the run go."""
+        """Return whether the saved run is longer than these limits allow."""
         if self.outcome is None or not len(self):
             return False
         way_m = np.cumsum(np.hypot(self.odometry[:-1, 0], self.odometry[:-1, 1]))
@@ -114,12 +114,12 @@ class SavedRun:
 
 
 def read_saved(folder: Path) -> SavedRun:
-    """Read what a run left in its folder, whatever ended it; raises UsageError where none can go on."""
+    """Read the results of a run, however it ended; raises UsageError if it cannot be continued."""
     kept = read_running(folder)
     config = read_config(folder / CONFIG) if kept is None else _config_in(kept, folder / RUNNING)
     trial = config.trial
     if trial.strategy == STRATEGY_OF_REPLAYS:
-        raise UsageError(f"expected the folder of a run that drove, found that of a replay in {folder}: replay again")
+        raise UsageError(f"expected the folder of an exploration, found that of a replay in {folder}: replay again")
     time_s, ranges_m, odometry = np.empty(0), np.empty((0, 0)), np.empty((0, 3))
     outcome = None
     if (folder / LOG).exists():
@@ -143,18 +143,18 @@ def _outcome(summary: Path) -> Outcome | None:
 
 @dataclass(frozen=True)
 class SavedConfig:
-    """A run's `config.json`: what was run, as a replay or not, and by which versions."""
+    """A run's `config.json`: what was run, whether as a replay, and by which versions."""
 
     format: int
     trial: TrialConfig
     versions: dict[str, str] = field(default_factory=dict)
     commit: str | None = None
     replay: Any = None
-    """The options of a replay as they stand there; None for a run that drove."""
+    """The options of a replay; None for an exploration."""
 
 
 def read_config(path: Path) -> SavedConfig:
-    """Read a run's `config.json`; raises UsageError, in one line, for anything else."""
+    """Read a run's `config.json`; raises UsageError for anything else."""
     with told(path, REMEDY):
         return _config_of(read_plain(path))
 

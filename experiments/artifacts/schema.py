@@ -1,7 +1,7 @@
-"""Values held against what they may be, by msgspec: settings (dataclasses) and what results hold (structs).
+"""Validation of values by msgspec: settings (dataclasses) and the content of results (structs).
 
-Settings are read strictly, since one that is not understood would be another run: none is missing, none is unknown.
-What a struct does not name is left alone, since a later version may keep more.
+Settings are read strictly, since a setting that is not understood would mean another run: no key may be missing or
+unknown. In results, unknown keys are ignored, since a later version may write more.
 """
 
 import json
@@ -19,7 +19,7 @@ from chainslam.slam.geometry.quantities import allowed
 from chainslam.slam.robot import STATED
 
 STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
-"""Of the place that msgspec tells: the key of an object, the number of an entry, or some key of many."""
+"""Part of the location in msgspec's messages: the key of an object, the index of a list, or any key."""
 
 
 def many(kind: Any) -> Any:
@@ -28,11 +28,11 @@ def many(kind: Any) -> Any:
 
 
 class UnfitError(ValueError):
-    """A value of another kind than expected: which one, and what it is."""
+    """A value of another kind than expected: which one, and its content."""
 
 
 class UnknownKeyError(UnfitError):
-    """A key that stands for nothing."""
+    """A key that does not exist."""
 
     def __init__(self, key: str, near: str = "") -> None:
         super().__init__(f"the unknown key {key[:80]!r}{near}")
@@ -40,7 +40,7 @@ class UnknownKeyError(UnfitError):
 
 
 def fit(kind: Any, value: Any, name: str = "") -> Any:
-    """Return plain values as one of a kind; raises UnfitError, or what the kind itself raises, for any other."""
+    """Convert plain values to a kind; raises UnfitError, or what the kind itself raises, for anything else."""
     check_keys(kind, value, name)
     try:
         return convert(value, kind)
@@ -58,7 +58,7 @@ def settings_in(group: Any) -> dict[str, Any]:
 
 
 def group_of(kind: Any) -> Any:
-    """Return the dataclass that a type is, or may be beside None; None where it is none."""
+    """Return the dataclass in a type or in its optional form; None if it is neither."""
     options = [kind, *get_args(kind)]
     return next((option for option in options if isinstance(option, type) and is_dataclass(option)), None)
 
@@ -94,7 +94,7 @@ def shown(value: Any) -> str:
 
 
 def part_of(whole: Mapping[str, Any], said: Mapping[str, Any], step: str) -> Mapping[str, Any]:
-    """Return what a JSON Schema says of a key or an entry below one of its parts; nothing where it says nothing."""
+    """Return the part of a JSON Schema for a key or an entry; empty if it has none."""
     for each in said.get("anyOf", [said]):
         each = resolved(whole, each)
         inner = each.get("properties", {}).get(step)
@@ -112,7 +112,7 @@ def resolved(whole: Mapping[str, Any], said: Mapping[str, Any]) -> Mapping[str, 
 
 
 def _words(told: str, kind: Any, value: Any, name: str) -> str:
-    """Return what is wrong with a value by what msgspec tells of it: what stands where, and what should."""
+    """Return a readable form of msgspec's message about a value: what was found where, and what is allowed."""
     words, _, place = told.partition(" - at `$")
     whole = schema(kind)
     said = resolved(whole, whole)

@@ -1,6 +1,6 @@
-"""Settings of a trial by name: from a file (`--config`) and one by one (`--set KEY=VALUE`), over the defaults.
+"""Settings of a trial by name, from a file (`--config`) and one by one (`--set KEY=VALUE`), on top of the defaults.
 
-Keys are those of `config.json`, with a dot between an object and what it holds: `mission.mapper.matching.gate`.
+Keys are those of `config.json`, with dots between levels: `mission.mapper.matching.gate`.
 """
 
 import json
@@ -25,7 +25,7 @@ REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
 DRAWING = tuple(each.name for each in fields(DrawingOptions))
-"""Options that say how a world's file is read."""
+"""Options about how a world's file is read."""
 SEE = "docs/settings.md names all"
 Record = dict[str, Any]
 
@@ -45,24 +45,24 @@ def read_settings(path: Path) -> Record:
 
 
 def parse_setting(text: str) -> Record:
-    """Return one `KEY=VALUE` as a nested record; raises UsageError for a key or a value that no trial can have.
+    """Return one `KEY=VALUE` as a nested record; raises UsageError for an unknown key or an invalid value.
 
-    A value is JSON; what is no JSON is text.
+    A value is JSON; anything that is not valid JSON is taken as text.
     """
     key, equals, words = text.partition("=")
     if not equals or not key:
-        raise UsageError(f"expected --set KEY=VALUE, found {text[:60]!r}: write it so")
+        raise UsageError(f"expected --set KEY=VALUE, found {text[:60]!r}: use this form")
     with _asked_for("a setting"):
         return some_settings(nested([(key, _value(words))]))
 
 
 def parse_settings(texts: Iterable[str]) -> Record:
-    """Return several of `KEY=VALUE` as a nested record, the last one on top; raises UsageError."""
+    """Return several `KEY=VALUE` as a nested record, the last with priority; raises UsageError."""
     return over({}, *map(parse_setting, texts))
 
 
 def settings_of(said: Mapping[str, Any]) -> Record:
-    """Return settings by their dotted keys as a nested record; raises UsageError for what no trial can have."""
+    """Return settings by their dotted keys as a nested record; raises UsageError for invalid ones."""
     return parse_settings(f"{key}={json.dumps(value)}" for key, value in said.items())
 
 
@@ -72,24 +72,26 @@ def asked(file: Path | None, named: Record, settled: Collection[str]) -> Record:
     The latter go before. What is settled is left aside in a file; raises UsageError where it is named.
     """
     for key in named.keys() & set(settled):
-        raise UsageError(f"expected --set of what this command leaves open, found {key!r}: it is settled otherwise")
+        raise UsageError(
+            f"expected --set with a key that this command leaves open, found {key!r}: use the command's own options"
+        )
     base = {} if file is None else read_settings(file)
     return over({key: value for key, value in base.items() if key not in settled}, named)
 
 
 def differing(trial: TrialConfig) -> list[tuple[str, Any]]:
-    """Return the dotted keys and values in which the settings of a trial are not the defaults."""
+    """Return the dotted keys and values of a trial's settings that differ from the defaults."""
     before = dict(leaves(defaults()))
     return [(key, value) for key, value in leaves(record_of(trial)) if key not in before or before[key] != value]
 
 
 def options_of(settings: Iterable[tuple[str, Any]]) -> list[str]:
-    """Return the words of a command that ask for some settings."""
+    """Return the command-line words for some settings."""
     return [word for key, value in settings for word in ("--set", f"{key}={json.dumps(value)}")]
 
 
 def drawing_said(**said: Any) -> DrawingOptions:
-    """Return the options of a drawing; raises UsageError for a value that means nothing."""
+    """Return the options of a drawing; raises UsageError for an invalid value."""
     try:
         return DrawingOptions(**said)
     except WorldError as error:
@@ -103,7 +105,7 @@ def drawing_settings(said: DrawingOptions, typed: Collection[str] = ()) -> Recor
 
 
 def over(base: Record, *changes: Mapping[str, Any]) -> Record:
-    """Return a nested record with the changes laid over it, the last one on top."""
+    """Return a nested record with changes merged into it, the last with priority."""
     result = dict(base)
     for change in changes:
         for key, value in change.items():
@@ -113,9 +115,9 @@ def over(base: Record, *changes: Mapping[str, Any]) -> Record:
 
 
 def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
-    """Return the settings of a trial: the defaults with some nested records over them, the last one on top.
+    """Return the settings of a trial: the defaults, updated by nested records, the last with priority.
 
-    Raises UsageError for a key that no trial has, and for a value that its key does not allow.
+    Raises UsageError for an unknown key or an invalid value.
     """
     with _asked_for("settings of a trial"):
         return fit(TrialConfig, over(defaults(), *changes))
@@ -123,18 +125,18 @@ def trial_of(*changes: Mapping[str, Any]) -> TrialConfig:
 
 @cache
 def defaults() -> Record:
-    """Return the settings of a trial as they are where nothing else is said, for nobody to change."""
+    """Return the default settings of a trial, as read-only."""
     return record_of(TrialConfig(""))
 
 
 def record_of(trial: TrialConfig) -> Record:
-    """Return the settings of a trial as they come back from a file."""
+    """Return the settings of a trial as they are read back from a file."""
     record: Record = plain(own(trial))
     return record
 
 
 def own(group: Any) -> Record:
-    """Return a group of settings and those within as a nested record; what the robot states stands in `robot` alone."""
+    """Return a group of settings as a nested record; the description of the robot stands in `robot` only."""
     values = {each.name: getattr(group, each.name) for each in fields(group) if not each.metadata.get(STATED)}
     return {name: own(value) if is_dataclass(value) else value for name, value in values.items()}
 
@@ -145,7 +147,7 @@ def plain(value: Any) -> Any:
 
 
 def leaves(record: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the dotted key and the value of everything in a nested record that holds nothing itself."""
+    """Yield the dotted key and the value of every leaf of a nested record."""
     for key, value in record.items():
         if isinstance(value, Mapping) and value:
             yield from leaves(value, f"{above}{key}.")
@@ -187,7 +189,7 @@ def some_settings(record: Record) -> Record:
 
 @contextmanager
 def _asked_for(what: str) -> Iterator[None]:
-    """Turn what is wrong with settings into a UsageError."""
+    """Convert an error in settings into a UsageError."""
     try:
         yield
     except UnfitError as error:

@@ -1,4 +1,4 @@
-"""Paths of a run as files: of its steps, or of all scans of a recorded drive."""
+"""Paths of a run as files: at its steps, or at all scans of a recorded drive."""
 
 import numpy as np
 from jaxtyping import Float
@@ -13,14 +13,14 @@ from ..trial import TrialResult
 
 
 def trajectory(result: TrialResult, log: Log, poses_world: Float[np.ndarray, "s 3"]) -> bytes:
-    """Return the poses of a run's steps in the TUM format; of a recorded drive those of all its scans, on its clock."""
+    """Return the poses at a run's steps, or at all scans of a recorded drive on its own clock, in the TUM format."""
     return tum(*path_of(result, log, poses_world))
 
 
 def path_of(
     result: TrialResult, log: Log, poses_world: Float[np.ndarray, "s 3"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Return times and poses of a run's path: of its steps, or of all scans of a recorded drive, on its own clock."""
+    """Return times and poses of a run's path: at its steps, or at all scans of a recorded drive, on its own clock."""
     recorded = result.recorded
     if recorded is None:
         return log.time_s, poses_world
@@ -31,7 +31,7 @@ def path_of(
 def smoothed_path(
     result: TrialResult, log: Log, smoothed: Smoothed
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Return the same of the smoothed path: a scan between two keyframes knows both."""
+    """Return the same for the smoothed path, where a scan between two keyframes is interpolated from both."""
     recorded = result.recorded
     if recorded is None:
         return log.time_s, smoothed.poses_world
@@ -40,7 +40,7 @@ def smoothed_path(
 
 
 def wheels_alone(log: Log, recorded: RecordedLog) -> Float[np.ndarray, "s 3"]:
-    """Return where wheel odometry puts a recorded robot, from where the estimate begins."""
+    """Return the path of a recorded robot's wheel odometry, from the start of the estimate."""
     return odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)])
 
 

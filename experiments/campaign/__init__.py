@@ -1,1 +1,1 @@
-"""Campaigns: many trials, three questions, one table."""
+"""Campaigns: many trials, their tables and the comparison of estimators and strategies."""

@@ -1,4 +1,4 @@
-"""Trials on the workers of a Dask scheduler; whatever becomes of the cluster is told in one line."""
+"""Trials on the workers of a Dask scheduler; every failure of the cluster is reported in one line."""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -14,28 +14,28 @@ from .runner import Executor, lost
 from .work import Done, Job, perform
 
 WAIT_S = 30.0
-"""How long a scheduler may be without a worker."""
+"""How long a scheduler may be without workers."""
 LOOK_S = 2.0
-"""How often it is asked whether it has one."""
+"""How often it is asked for workers."""
 AT_ONCE = 2
-"""Jobs that a thread of a worker has at hand, so that it need not wait for the next."""
+"""Jobs queued for each thread of a worker, so that it does not wait for the next one."""
 
 
 class ClusterError(RuntimeError):
-    """A cluster that cannot go on: what was expected, what was found, what to do."""
+    """A cluster that cannot continue: what was expected, what was found, what to do."""
 
 
 def on_dask(address: str) -> Executor:
-    """Return an executor over the workers of a Dask scheduler; raises UsageError where there is none.
+    """Return an executor over the workers of a Dask scheduler; raises UsageError without one.
 
-    The executor raises ClusterError where the scheduler goes, no worker comes, or one cannot run a trial.
+    The executor raises ClusterError if the scheduler disappears, no worker connects, or a worker cannot run a trial.
     """
     try:
         import distributed
     except ImportError as error:
         raise missing(error) from error
     for name in ("distributed", *(name for name in logging.root.manager.loggerDict if name.startswith("distributed"))):
-        # What they tell of a lost connection is told here in a line.
+        # Their messages about a lost connection are replaced by one line of ours.
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         client = distributed.Client(address, timeout=5, set_as_default=False)
@@ -46,19 +46,19 @@ def on_dask(address: str) -> Executor:
 
 
 def program() -> str:
-    """Return the version of this package; a worker that can tell has it."""
+    """Return the version of this package, which every worker that has it can report."""
     return version("chainslam")
 
 
 def _guarded(client: Any, address: str, performed: Iterator[Done]) -> Iterator[Done]:
-    """Go through the jobs, with a ClusterError in place of whatever a cluster that breaks down raises."""
+    """Run the jobs, and raise ClusterError in place of whatever a failing cluster raises."""
     try:
         yield from performed
     except (CancelledError, OSError, RuntimeError) as error:
         if isinstance(error, ClusterError) or client.status == "running":
             raise
         raise ClusterError(
-            f"expected the Dask scheduler at {address} to stay, found it gone: start it and its workers again"
+            f"expected the Dask scheduler at {address} to keep running, found it gone: start it and its workers again"
         ) from error
 
 
@@ -81,28 +81,28 @@ def _perform_all(client: Any, address: str, performs: Callable[[Job], Done], job
                 done = lost(job, f"its worker died: {error}")
             except CancelledError:
                 raise
-            except Exception as error:  # a trial's own troubles are in its record
+            except Exception as error:  # errors of the trial itself are in its record
                 raise _unable(address, error) from error
             send(1)
             yield done
 
 
 def _check(client: Any, address: str) -> None:
-    """Raise ClusterError where no worker comes, or one lacks this package."""
+    """Raise ClusterError if no worker connects, or a worker lacks this package."""
     try:
         client.wait_for_workers(1, timeout=WAIT_S)
     except TimeoutError as error:
         raise _alone(address) from error
     try:
         found = set(client.run(program).values())
-    except Exception as error:  # a worker's ImportError comes as a plain Exception
+    except Exception as error:  # a worker's ImportError arrives as a plain Exception
         raise _unable(address, error) from error
     if found != {program()}:
         raise _unable(address, f"version {', '.join(sorted(found))}, not {program()}")
 
 
 def _some_done(client: Any, address: str, futures: list[Any]) -> list[Any]:
-    """Return the jobs that are done, waiting for one; raises ClusterError once there is no worker for `WAIT_S`."""
+    """Return the finished jobs, waiting for at least one; raises ClusterError without workers for `WAIT_S`."""
     from distributed import wait
 
     alone_since = None

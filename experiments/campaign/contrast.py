@@ -1,4 +1,4 @@
-"""Two campaigns held against each other, trial by trial: which trials differ, and by how much on the whole."""
+"""Comparison of two campaigns, trial by trial: which trials differ, and by how much overall."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -21,7 +21,7 @@ CONTRAST, TRIALS = "contrast.json", "contrast.csv"
 SETTINGS = ("driver", "p0", "max_steps")
 NAMES = ("world", "strategy", "backend", "mode", "association", "seed")
 COMPARED = ("status", "steps", "path_length_m", "coverage", *(measure.name for measure in MEASURES))
-"""Columns that are written for both, where a trial differs."""
+"""Columns that are written for both campaigns if a trial differs."""
 
 
 def contrast(first: Path, second: Path, out: Path) -> None:
@@ -68,12 +68,12 @@ def contrast(first: Path, second: Path, out: Path) -> None:
 
 
 def read_contrast(folder: Path) -> dict[str, Any]:
-    """Return what `contrast` left in a folder; raises UsageError."""
-    return read_json(folder / CONTRAST, shapes.CONTRAST, "run `compare --against` anew")
+    """Return the result of `contrast` in a folder; raises UsageError."""
+    return read_json(folder / CONTRAST, shapes.CONTRAST, "run `compare --against` again")
 
 
 def _stores(folder: Path) -> dict[Trial, Store]:
-    """Return where each trial of a campaign stands; those that have no result are left out."""
+    """Return the row of each trial of a campaign; trials without a result are omitted."""
     stores = [Store(folder, campaign) for campaign in read_campaigns(folder)]
     return {trial: store for store in stores for trial in trials(store.campaign) if store.has(trial)}
 
@@ -86,7 +86,7 @@ def _same_worlds(first: Path, second: Path) -> None:
 
 
 def _settings(first: Path, second: Path) -> dict[str, list[Any]]:
-    """Return what the two were run with where it is not the same: settings, versions, commit."""
+    """Return the settings, versions and commits in which the two campaigns differ."""
     pair = [_made_with(folder) for folder in (first, second)]
     names = sorted(pair[0].keys() | pair[1].keys())
     return {name: [made.get(name) for made in pair] for name in names if pair[0].get(name) != pair[1].get(name)}
@@ -107,13 +107,13 @@ def _side_by_side(first: Row, second: Row) -> Row:
 
 
 def _statuses(first: Sequence[Row], second: Sequence[Row]) -> Mapping[str, int]:
-    """Return how often a trial went from one status to another."""
+    """Count how often a trial changed from one status to another."""
     changes = [f"{a['status']} -> {b['status']}" for a, b in zip(first, second, strict=True)]
     return {change: changes.count(change) for change in dict.fromkeys(changes)}
 
 
 def _differences(first: Sequence[Row], second: Sequence[Row]) -> list[Row]:
-    """Compare by each measure, for each back end in each arm."""
+    """Compare every measure, for each back end in each arm."""
     cells = dict.fromkeys((row["backend"], row["mode"], row["association"]) for row in first)
     found = []
     for (backend, mode, association), measure in product(cells, MEASURES):

@@ -1,4 +1,4 @@
-"""Campaigns put together: more seeds, more worlds, more back ends, in one folder with one comparison."""
+"""Merging campaigns: more seeds, worlds or back ends in one folder with one comparison."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from .scores.score import TrialScores
 from .store import MERGED, Store, opened_anew, read_campaigns, read_config
 
 SHARED = ("driver", "p0", "max_steps", "settings")
-"""What campaigns must have in common to be one."""
+"""The settings that campaigns must have in common."""
 
 
 def merge(folders: Sequence[Path], out: Path) -> None:
@@ -56,7 +56,7 @@ def merge(folders: Sequence[Path], out: Path) -> None:
 
 
 def union(campaigns: Sequence[Campaign]) -> Campaign:
-    """Return a campaign with all the levels of several, each in the order in which it is first met."""
+    """Return a campaign with the union of the levels of several, each in order of first occurrence."""
     worlds, backends, strategies = (
         tuple(dict.fromkeys(level for campaign in campaigns for level in getattr(campaign, name)))
         for name in ("worlds", "backends", "strategies")
@@ -78,8 +78,8 @@ def in_order(found: Iterable[Trial], levels: Campaign) -> list[Trial]:
 
 def _take(found: dict[Trial, Store], trial: Trial, store: Store) -> None:
     if not store.has(trial):
-        raise UsageError(f"expected a campaign that is done, found {store.folder} without {trial.path}: run it again")
-    # Read before anything is written: a result that is none must leave no folder that is half made.
+        raise UsageError(f"expected a finished campaign, found {store.folder} without {trial.path}: run it again")
+    # Read before anything is written: an invalid result must not leave a half-made folder.
     record = store.record(trial)
     if trial in found and not same(found[trial].record(trial), record):
         raise UsageError(f"expected one result of {trial.path}, found two that differ: merge campaigns of one version")

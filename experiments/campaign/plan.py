@@ -1,4 +1,4 @@
-"""The plan of a campaign: which trials there are, in which order, and the name of each."""
+"""The plan of a campaign: its trials, their order, and the name of each."""
 
 from dataclasses import dataclass
 from hashlib import sha256
@@ -22,7 +22,7 @@ ARMS = (CLOSED, "replay-own", "replay-true")
 Replay with the true association: the algebra alone."""
 MAX_STEPS = 5000
 MOST_TRIALS = 1_000_000
-"""A campaign of more does not begin: its list of trials alone would take the memory of a small machine."""
+"""Larger campaigns are refused: their list of trials alone would fill the memory of a small machine."""
 PAPER_BACKENDS = ("block-ekf", "joint-block-ekf", "relocation-ekf", "full-ekf", "invariant-ekf", "graph")
 PAPER_STRATEGIES = ("nearest-robot", "same-chain", "nearest-start")
 
@@ -36,20 +36,20 @@ class Campaign:
     """Names of back ends, and of methods, which bring their own mapper (`METHODS`)."""
     strategies: tuple[str, ...]
     trials: int
-    """How many, in every cell."""
+    """Number of trials of each combination."""
     arms: tuple[str, ...] = ARMS
     driver: str = "full-ekf"
-    """The back end that drives the recordings: one for each world, strategy and seed, shared by all that replay it."""
+    """The back end that drives the recordings; replays of a world, strategy and seed share one recording."""
     p0: P0 = "small"
     max_steps: int = MAX_STEPS
     """A trial is stopped, and counts as a failure, after this many scans."""
     first_seed: int = 1
     settings: tuple[tuple[str, Any], ...] = ()
-    """Of every trial, over the defaults: dotted keys of `config.json` and their values."""
+    """Settings of every trial that differ from the defaults: dotted keys of `config.json` and their values."""
 
     @property
     def seeds(self) -> range:
-        """The seeds of every cell."""
+        """The seeds of each combination."""
         return range(self.first_seed, self.first_seed + self.trials)
 
 
@@ -58,33 +58,33 @@ class Trial:
     """One row of the table of trials."""
 
     world: str
-    """A bundled name or a file."""
+    """Name of a bundled world, or a file."""
     strategy: str
-    """Of a replay: that of its recording."""
+    """For a replay, the strategy of its recording."""
     backend: str
     arm: str
-    """One of `ARMS`, or `RECORDING` for a drive that is only there to be replayed."""
+    """One of `ARMS`, or `RECORDING` for a drive that only serves replays."""
     seed: int
 
     @property
     def recording(self) -> "Trial":
-        """The drive that a replay plays back, whoever drives it."""
+        """The recording that a replay uses, whoever drives it."""
         return Trial(self.world, self.strategy, "", RECORDING, self.seed)
 
     @property
     def association(self) -> Association | None:
-        """Whose matches a replay uses; None in a closed loop."""
+        """The data association of a replay; None in a closed loop."""
         return "own" if self.arm == "replay-own" else "true" if self.arm == "replay-true" else None
 
     @property
     def path(self) -> Path:
-        """Where its result stands, inside the campaign's folder and without a suffix."""
+        """Path of its result inside the campaign's folder, without a suffix."""
         folder = Path(world_key(self.world)) / self.strategy
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
 
 DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start")
-"""Settings of a trial that the campaign itself decides, or that would make its statistics none."""
+"""Settings that the campaign itself decides, or that would invalidate its statistics."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "smoke": {
@@ -98,7 +98,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "backends": PAPER_BACKENDS,
         "strategies": PAPER_STRATEGIES,
         "trials": 20,
-        # Four times the longest run that is not lost; a lost one would go round to the default limit.
+        # Four times the longest run that is not lost; a lost robot would drive on to the default limit.
         "max_steps": 2500,
         "settings": ((NAVIGATION, "visibility"),),
     },
@@ -107,7 +107,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "backends": ("paper-method", "block-ekf", "full-ekf", "invariant-ekf"),
         "strategies": ("nearest-robot",),
         "trials": 20,
-        # Twice what today's mapper takes; a robot lost among duplicate walls would go round to the default limit.
+        # Twice the steps of today's mapper; a robot lost among duplicate walls would drive on to the default limit.
         "max_steps": 1000,
         "settings": METHODS["paper-method"].driving,
     },
@@ -118,17 +118,17 @@ PRESETS: dict[str, dict[str, Any]] = {
         "trials": 400,
     },
 }
-"""What `--preset` stands for; anything named beside it goes before."""
+"""The campaigns of `--preset`; other options have priority."""
 
 
 def trials(campaign: Campaign) -> list[Trial]:
-    """Return every trial of the tables, in the one order of the tables: world, strategy, back end, arm, seed."""
+    """Return every trial in the order of the tables: world, strategy, back end, arm, seed."""
     cells = product(campaign.worlds, campaign.strategies, campaign.backends, campaign.arms)
     return [Trial(*cell, seed) for cell in cells for seed in campaign.seeds]
 
 
 def recordings(campaign: Campaign) -> list[Trial]:
-    """Return the drives that the replays of a campaign play back, in order."""
+    """Return the recordings that the replays of a campaign need, in order."""
     if not any(arm != CLOSED for arm in campaign.arms):
         return []
     drives = product(campaign.worlds, campaign.strategies, campaign.seeds)
@@ -154,12 +154,12 @@ def drawing_of(campaign: Campaign) -> DrawingOptions:
 
 
 def is_errorless(campaign: Campaign) -> bool:
-    """Return whether all trials of a campaign have exact ranges and wheels."""
+    """Return whether all trials of a campaign run without noise."""
     return trial_of(nested(campaign.settings)).errorless
 
 
 def gate_of(campaign: Campaign) -> float:
-    """Return the level of the gate that all trials of a campaign match with."""
+    """Return the level of the gate that all trials of a campaign use."""
     return trial_of(nested(campaign.settings)).mission.mapper.matching.gate
 
 

@@ -1,4 +1,4 @@
-"""Back ends, strategies and readers of others: found where installed or in a file, and taken along to workers."""
+"""Plug-ins with back ends, strategies and readers: found in installed packages or files, and sent to workers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _looked: list[bool] = []
 
 @dataclass(frozen=True)
 class OwnEntries:
-    """What is registered besides what comes along."""
+    """Names that chainslam registers itself."""
 
     backends: dict[str, BackendEntry]
     strategies: dict[str, StrategyEntry]
@@ -42,11 +42,11 @@ class OwnEntries:
 
 
 def register_installed() -> None:
-    """Register what other distributions bring, once; tell what cannot be, and leave it out."""
+    """Register the entries of installed distributions, once; report and skip those that fail."""
     if _looked:
         return
     _looked.append(True)
-    there = entry_points()  # which reads every distribution: once, not for each group
+    there = entry_points()  # reads every distribution: once, not for each group
     for group, place in GROUPS.items():
         for point in there.select(group=group):
             known = _registry(*place)
@@ -54,13 +54,13 @@ def register_installed() -> None:
                 if point.name in known:
                     raise ValueError(f"the name {point.name} is taken")
                 known[point.name] = point.load()
-            except Exception as error:  # whatever a stranger's module raises
+            except Exception as error:  # a plug-in may raise anything
                 whose = f" of {point.dist.name}" if point.dist else ""
-                say(f"chainslam: left out the plug-in {point.value}{whose}: {_named(error)}", stderr=True)
+                say(f"chainslam: ignored the plug-in {point.value}{whose}: {_named(error)}", stderr=True)
 
 
 def register_files(paths: Iterable[Path]) -> None:
-    """Run Python files that register something of their own; raises UsageError, in one line, where one cannot be."""
+    """Run Python files that register plug-ins; raises UsageError for one that fails."""
     for path in paths:
         name = f"chainslam_plugin_{path.stem}"
         spec = importlib.util.spec_from_file_location(name, path)
@@ -72,7 +72,7 @@ def register_files(paths: Iterable[Path]) -> None:
         sys.modules[name] = module
         try:
             spec.loader.exec_module(module)
-        except Exception as error:  # whatever a stranger's module raises
+        except Exception as error:  # a plug-in may raise anything
             raise UsageError(
                 f"expected a plug-in that can be loaded, found {path.name}, which raises {_named(error)}: correct it"
             ) from error
@@ -83,11 +83,11 @@ def register_files(paths: Iterable[Path]) -> None:
             )
         import cloudpickle
 
-        cloudpickle.register_pickle_by_value(module)  # no worker could import it by its name
+        cloudpickle.register_pickle_by_value(module)  # a worker could not import it by its name
 
 
 def own_entries() -> OwnEntries:
-    """Return what is registered in this process beyond what comes along."""
+    """Return what plug-ins have registered in this process."""
     return OwnEntries(
         *(
             {name: entry for name, entry in _registry(*place).items() if name not in _registry(place[0], "BUILT_IN")}
@@ -97,7 +97,7 @@ def own_entries() -> OwnEntries:
 
 
 def with_own(perform: Callable[[Task], Result]) -> Callable[[Task], Result]:
-    """Return what performs a task in another process as this one would, with all that is registered here."""
+    """Return a function that performs a task in another process with the plug-ins of this one."""
     own = own_entries()
     return perform if own == OwnEntries({}, {}, {}) else partial(_registered, own, perform)
 

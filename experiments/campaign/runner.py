@@ -1,4 +1,4 @@
-"""Runs what is missing of a campaign, on the cores of this machine or on a cluster; the results are the same."""
+"""Runs the missing trials of a campaign on local cores or on a cluster, with identical results."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -15,22 +15,22 @@ from .work import Done, Job, failed, pack, perform
 from .workers import on_workers
 
 Executor = Callable[[Iterable[Job]], Iterator[Done]]
-"""Performs jobs, in any order, taking each one up only when there is room for it."""
+"""Performs jobs in any order and takes each one only when there is room for it."""
 
 
 @dataclass(frozen=True)
 class Tally:
-    """What a campaign's trials took, those excepted that were there already."""
+    """The cost of a campaign's trials, without those that were finished before."""
 
     trials: int
     wall_s: float
     cpu_s: float
-    """Of the trials alone, over all processes."""
+    """Summed over all processes."""
 
     def words(self) -> str:
-        """Return the rate, and how many processes computed at a time: with two of them 2 is perfect."""
+        """Return the rate and the mean number of busy processes: with two processes, 2 is perfect."""
         if not self.trials:
-            return "all trials were there already"
+            return "all trials were finished already"
         return (
             f"{self.trials} trials in {duration(self.wall_s)}: {self.trials / self.wall_s:.2f} a second, computing time"
             f" {duration(self.cpu_s)}, {self.cpu_s / self.wall_s:.2f} processes at a time"
@@ -38,12 +38,12 @@ class Tally:
 
 
 def run_campaign(store: Store, executor: Executor) -> Tally:
-    """Perform every trial that has no result yet, recordings first; what is done stays done whatever happens."""
+    """Perform every trial without a result, recordings first; finished trials are kept whatever happens."""
     began, count, cpu_s = monotonic(), 0, 0.0
     drives = _drives(store)
     driven = {job.trial for job in drives}
     rest = [t for t in trials(store.campaign) if not store.has(t) and t not in driven]
-    # Replays of one recording follow each other, so that a process reads it once.
+    # Replays of one recording are consecutive, so that a process reads it only once.
     rest.sort(key=lambda t: (store.campaign.worlds.index(t.world), t.strategy, t.seed))
     total = len(drives) + len(rest)
     with bar_of("trials", float(total), MofNCompleteColumn()) as (bar, task):
@@ -56,7 +56,7 @@ def run_campaign(store: Store, executor: Executor) -> Tally:
 
 
 def _drives(store: Store) -> list[Job]:
-    """Return the drives that recordings are missing from; the driver's own closed loop serves as one."""
+    """Return the recordings that are missing; a closed loop of the driver serves as one."""
     campaign, jobs = store.campaign, []
     own = campaign.driver in campaign.backends and CLOSED in campaign.arms
     for recording in recordings(campaign):
@@ -72,16 +72,16 @@ def _job(store: Store, trial: Trial) -> Job:
     if trial.association is None:
         return Job(trial, config_of(store.campaign, trial))
     recording = trial.recording
-    # A method brings a mapper of its own to the recording; back ends share one, and so the recording, read once.
+    # A method brings its own mapper; plain back ends share one, and with it the recording, which is read once.
     rules = replace(recording, backend=trial.backend) if trial.backend in METHODS else recording
     return Job(trial, config_of(store.campaign, rules), store.path(recording).read_bytes())
 
 
 def on_cores(count: int | None) -> Executor:
-    """Return an executor over processes of this machine: `count` of them, or one for each core."""
+    """Return an executor over `count` local processes, or one for each core."""
     return on_workers(with_own(perform), lost, count)
 
 
 def lost(job: Job, reason: str) -> Done:
-    """Return what stands for a trial of which nothing came back."""
+    """Return the record of a trial that returned nothing."""
     return Done(job.trial, pack(failed(job, reason)))

@@ -1,4 +1,4 @@
-"""A campaign's folder: a file for each trial, written whole or not at all, so that whatever stops it can go on."""
+"""A campaign's folder: one file for each trial, written atomically, so that an interrupted campaign can continue."""
 
 import os
 import sys
@@ -23,9 +23,9 @@ from .plan import Campaign, Trial, check_campaign, config_of, world_digests
 from .scores.score import TrialScores
 from .work import Done, unpack
 
-REMEDY = "name the folder of a campaign, what `compare --out` made"
+REMEDY = "name the folder of a campaign, as written by `compare --out`"
 MERGED = "merged"
-"""The key under which the config of a merged folder holds the campaigns that went into it."""
+"""Key in the config of a merged folder that holds the merged campaigns."""
 Worlds = defstruct("Worlds", [("worlds_sha256", dict[str, str])])
 Merged = defstruct(
     "Merged", [(MERGED, list[dict[str, Any]]), ("from_", list[dict[str, Any]])], rename={"from_": "from"}
@@ -35,19 +35,19 @@ MadeBy = defstruct("MadeBy", [("versions", dict[str, str]), ("commit", str | Non
 
 @dataclass(frozen=True)
 class Store:
-    """Where the results of a campaign stand."""
+    """Paths of a campaign's results."""
 
     folder: Path
     campaign: Campaign
 
     def path(self, trial: Trial) -> Path:
-        """Return the file of a trial, or of the recording that a drive leaves."""
+        """Return the file of a trial, or of a recording."""
         if trial.arm == "recording":
             return self.folder / "recordings" / trial.path.parts[0] / trial.strategy / f"{trial.seed:05d}" / "log.npz"
         return self.folder / "trials" / trial.path.with_suffix(".npz")
 
     def has(self, trial: Trial) -> bool:
-        """Return whether the trial is done."""
+        """Return whether the trial is finished."""
         return self.path(trial).exists()
 
     def save(self, done: Done) -> None:
@@ -60,7 +60,7 @@ class Store:
         if done.log is not None:
             path = self.path(done.trial.recording)
             path.parent.mkdir(parents=True, exist_ok=True)
-            # So that the recording is one that `chainslam replay` takes, too.
+            # Makes the recording acceptable to `chainslam replay`.
             config = config_of(self.campaign, done.trial.recording)
             write(path.with_name(CONFIG), json_bytes({**stamp(), "trial": own(config)}))
             write(path, done.log)
@@ -70,7 +70,7 @@ class Store:
             write(path, done.record)
 
     def record(self, trial: Trial) -> TrialScores:
-        """Return what a trial left; raises UsageError where its file is none."""
+        """Return the result of a trial; raises UsageError if its file is invalid."""
         path = self.path(trial)
         with told(path, "delete it and run `compare` again"):
             return unpack(regular(path).read_bytes(), trial)
@@ -109,25 +109,25 @@ def opened(folder: Path, campaign: Campaign) -> Iterator[Store]:
 
 @dataclass(frozen=True)
 class Settled:
-    """What a campaign's `config.json` says."""
+    """The content of a campaign's `config.json`."""
 
     campaigns: tuple[Campaign, ...]
-    """Several where it was merged."""
+    """Several if it was merged."""
     worlds_sha256: dict[str, str]
     versions: dict[str, str]
-    """Of the first, where it was merged."""
+    """That of the first campaign if it was merged."""
     commit: str | None
     said: dict[str, Any]
-    """As it stands in the file."""
+    """As in the file."""
 
 
 def read_campaigns(folder: Path) -> tuple[Campaign, ...]:
-    """Return the campaigns whose results stand in a folder, several where it was merged; raises UsageError."""
+    """Return the campaigns in a folder, several if it was merged; raises UsageError."""
     return read_config(folder).campaigns
 
 
 def read_config(folder: Path) -> Settled:
-    """Return the config of a campaign's folder; raises UsageError where it has none."""
+    """Return the config of a campaign's folder; raises UsageError without one."""
     said = read_json(folder / CONFIG, Worlds, REMEDY)
     with told(folder / CONFIG, REMEDY):
         if MERGED in said:
@@ -147,7 +147,7 @@ def read_config(folder: Path) -> Settled:
 
 
 def _settle(folder: Path, campaign: Campaign) -> None:
-    """Write the config, or hold it against the one that is there."""
+    """Write the config, or compare it with the existing one."""
     path = folder / CONFIG
     held = read_config(folder) if os.path.lexists(path) else None
     before = None if held is None else held.said
@@ -167,11 +167,12 @@ def _settle(folder: Path, campaign: Campaign) -> None:
     different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
     if different:
         raise UsageError(
-            f"expected the campaign that {folder} holds, found other {', '.join(different)}: name another --out"
+            f"expected the settings of the campaign in {folder}, found other {', '.join(different)}: name another --out"
         )
     if {key: before.get(key) for key in made_with} != plain(made_with):
         print(
-            f"chainslam: {folder} was begun by other sources or packages; its trials are kept as they are",
+            f"chainslam: {folder} was started with another version of the code or its packages;"
+            " finished trials are kept",
             file=sys.stderr,
         )
         write(path, json_bytes(before | {"resumed_with": [*before.get("resumed_with", []), made_with]}))

@@ -1,4 +1,4 @@
-"""One trial's work: a pure function of its job, wherever it runs."""
+"""The work for one trial: a pure function of its job, wherever it runs."""
 
 import traceback
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from .scores.observer import Observer
 from .scores.score import TrialScores, record_of
 
 SUMMARY = "summary_json"
-"""The name under which a trial's file holds its summary."""
+"""Name of the summary in a trial's file."""
 
 NUMBERS = (
     *("path_length_m", "coverage", "swept", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band"),
@@ -67,7 +67,7 @@ Summary = defstruct(
         ("marks", GenericAlias(dict, (str, AtAMark)) | None, None),
     ],
 )
-"""Of a trial's summary, as the tables take it."""
+"""Keys of a trial's summary that the tables contain."""
 LAYOUTS = {
     **dict.fromkeys(("path_length_m", "pose_nees", "pose_trace", "pose_error_m"), "float s"),
     "pose_nees_from_start": "float s",
@@ -81,45 +81,45 @@ LAYOUTS = {
     "nis": "float q",
     "nis_dof": "float q",
 }
-"""Of a trial's arrays."""
+"""Layouts of a trial's arrays."""
 HEARD = ("nis", "nis_dof")
 LATER = ("pose_nees_from_start",)
-"""There only where innovations were listened to; the others are all there, or none of them for a trial that failed."""
+"""Present only if innovations were recorded; of the others all are present, or none for a failed trial."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A trial and all that it needs."""
+    """A trial and all its inputs."""
 
     trial: Trial
     config: TrialConfig
-    """Of the trial, or of the recording that it replays."""
+    """World of the trial, or of the recording that it replays."""
     log: bytes | None = None
     """The recording's file, for a replay."""
     keep_log: bool = False
-    """Whether this drive is played back by replays."""
+    """Whether replays use this drive."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """What a job leaves: the contents of its files."""
+    """The result of a job: the contents of its files."""
 
     trial: Trial
     record: bytes
     log: bytes | None = None
     cpu_s: float = 0.0
-    """How long the job computed, s."""
+    """Computing time of the job, s."""
 
 
 def perform(job: Job) -> Done:
-    """Run one trial; whatever goes wrong in it becomes its record, with the reason, and the campaign goes on."""
+    """Run one trial; an error becomes its record, with the reason, and the campaign continues."""
     log, began = None, process_time()
     try:
         if job.trial.association is None:
             record, log = _drive(job)
         else:
             record = _replay(job)
-    except Exception as error:  # the trial failed; a campaign of thousands must not end with it
+    except Exception as error:  # a failed trial must not end a campaign of thousands
         record = failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
     if job.keep_log and log is None:
         log = npz_bytes({"reason": record.summary["reason"]})
@@ -127,7 +127,7 @@ def perform(job: Job) -> Done:
 
 
 def failed(job: Job, reason: str, trace: str = "") -> TrialScores:
-    """Return the record of a trial that left nothing but a reason."""
+    """Return the record of a trial with a reason and nothing else."""
     config = job.config
     summary = {
         "seed": config.seed,
@@ -163,7 +163,7 @@ def unpack(content: bytes, trial: Trial) -> TrialScores:
 
 
 def _named(trial: Trial, summary: dict[str, Any]) -> dict[str, Any]:
-    """Return a summary under the trial's own names: a replay's strategy is that of its recording."""
+    """Return a summary under the trial's own names: a replay has the strategy of its recording."""
     names = _names(trial)
     return names | {key: value for key, value in summary.items() if key not in names}
 
@@ -185,7 +185,7 @@ def _world(name: str, drawing: DrawingOptions) -> World:
 
 @lru_cache(maxsize=2)
 def _recording(log: bytes, config: TrialConfig) -> RecordedRun:
-    """Return a recording; replays of one recording follow each other, so that it is mostly read once."""
+    """Return a recording; since replays of one recording are consecutive, it is usually read once."""
     reason = read_archive(log, {}, {"reason": "text"}).get("reason")
     if reason is not None:
         raise RuntimeError(f"nothing was recorded: {reason}")

@@ -1,4 +1,4 @@
-"""Tasks performed by processes of this machine: one that dies costs its task another try, and the others nothing."""
+"""Tasks in local processes: a process that dies costs its task one attempt and no other task anything."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from joblib.externals.loky.backend.resource_tracker import ensure_running
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 STRIKES = 3
-"""A task whose process dies this often is lost."""
+"""A task whose process dies this often is given up."""
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 

@@ -114,12 +114,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             status = _run(arguments)
         except SystemExit as leaving:
-            # The help; any other end of the parser is told as bad usage.
+            # The parser printed its help; it reports everything else as bad usage.
             if not _is_lost(out):
                 raise leaving
             status = 0
         if out is not None and _is_lost(out):
-            _tell(f"expected room on standard output, found {out.problem}: files were written all the same")
+            _tell(f"expected to write to standard output, found {out.problem}: the files were written nevertheless")
             return status or FAILED
     return status
 
@@ -161,7 +161,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         _tell(f"expected files that can be read and written, found {error.strerror or error}{place}: check that place")
         return FAILED if is_full(error) else BAD_USAGE
     except MemoryError:
-        _tell("expected an input that fits into memory, found one that does not: take a smaller one")
+        _tell("expected an input that fits into memory, found one that does not: use a smaller one")
         return FAILED
     except KeyboardInterrupt:
         return _interrupted()
@@ -177,7 +177,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _interrupted() -> int:
-    _tell("interrupted; files that were written are whole")
+    _tell("interrupted; every file that was written is complete")
     return INTERRUPTED
 
 
@@ -203,7 +203,7 @@ def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
         register_installed()
         register_files(_plugins(words))
     classes = {name: entry.load() if words[:1] == [name] else entry.named() for name, entry in COMMANDS.items()}
-    made, output = parsed(words, classes, f"{ABOUT} --version tells which version this is.")
+    made, output = parsed(words, classes, f"{ABOUT} `chainslam --version` prints the version.")
     command = with_files(made)
     asked: Command = replace(command, given=given(words)) if hasattr(command, "given") else command
     return asked, output
@@ -230,7 +230,7 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if not word or (word.startswith("--") and word.endswith("=")):
             option = word.rstrip("=") or (before if before.startswith("--") else "")
             value = f"a value for {option}" if option else "a word"
-            raise UsageError(f"expected {value}, found an empty one: is a variable not set?")
+            raise UsageError(f"expected {value}, found an empty one: is a shell variable unset?")
 
 
 def given(words: Sequence[str]) -> frozenset[str]:

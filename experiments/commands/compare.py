@@ -90,7 +90,7 @@ class Compare:
     """How the files of the worlds are read."""
     robot: str | None = None
     """Description of the robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file
-    (docs/robots.md). --config and --set have priority."""
+    (docs/howto/use-your-robot.md). --config and --set have priority."""
     config: Path | None = None
     """Settings of every trial from a file: a run's `config.json`, or some of its keys. What the campaign decides
     (worlds and starts, back ends, strategies, seeds) is not taken from it."""
@@ -148,7 +148,7 @@ class Compare:
         worlds = [load_world(world, drawing=drawing_of(campaign)) for world in campaign.worlds]
         executor = on_cores(self.jobs) if self.dask is None else on_dask(self.dask)
         with opened(self.out, campaign) as store:
-            # A result that cannot be read is told now, not after hours of computing.
+            # Report a result that cannot be read now, not after hours of computing.
             for trial in filter(store.has, trials(campaign)):
                 store.record(trial)
             try:
@@ -161,11 +161,11 @@ class Compare:
                     say(campaign_line(left, campaign.max_steps, jobs))
                 tally = run_campaign(store, executor)
             except KeyboardInterrupt:
-                print(f"chainslam: interrupted; what is done is kept in {self.out}, the same command goes on",
+                print(f"chainslam: interrupted; finished trials are kept in {self.out}, and the same command continues",
                       file=sys.stderr)  # fmt: skip
                 return INTERRUPTED
             except ClusterError as error:
-                print(f"chainslam: {error}; what is done is kept in {self.out}, the same command goes on",
+                print(f"chainslam: {error}; finished trials are kept in {self.out}, and the same command continues",
                       file=sys.stderr)  # fmt: skip
                 return FAILED
             said = write_tables(self.out, campaign, trials(campaign), store.record)

@@ -1,4 +1,4 @@
-"""What was understood of a world, and the time that it will take, told before anything is computed in it."""
+"""What is printed before a run: how the world was read, and how long the run will probably take."""
 
 from collections.abc import Iterable
 
@@ -78,7 +78,7 @@ def campaign_line(runs: Iterable[tuple[World, str]], most: int, processes: int |
     """Return in one line how long many runs will probably compute, each given by its world and back end."""
     each = [expected_computing_s(world, backend, most) for world, backend in runs]
     low, high = (sum(column) / (processes or 1) for column in zip(*each, strict=True))
-    where = "over all workers" if processes is None else f"on {processes} process{'es' if processes > 1 else ''}"
+    where = "summed over all workers" if processes is None else f"on {processes} process{'es' if processes > 1 else ''}"
     return f"expected, roughly: {len(each)} trials; computing time {_range(_about(low), _about(high))} {where}"
 
 

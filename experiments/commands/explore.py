@@ -115,10 +115,10 @@ class Explore:
     """Replace another run in the folder for the results: remove the files of a run, and no others."""
     preset: PresetName | None = None
     """A named method: paper-method is everything that the paper describes, with its filter, matching, navigation
-    and wall following (docs/exploration.md). --config, --set and other options have priority."""
+    and wall following (docs/concepts/exploration.md). --config, --set and other options have priority."""
     robot: str | None = None
     """Description of the robot and its simulated devices: a bundled robot (paper, turtlebot, front-scanner) or a
-    YAML file (docs/robots.md). --config, --set and other options have priority."""
+    YAML file (docs/howto/use-your-robot.md). --config, --set and other options have priority."""
     config: Path | None = None
     """Settings from a file: a run's `config.json`, or an object with some of its keys. --set and other options have
     priority."""
@@ -157,7 +157,8 @@ class Explore:
         for name in SETTLED:
             if self._is_given(name):
                 raise UsageError(
-                    f"expected nothing but limits and --out with --resume, found {name}: the saved run has settled it"
+                    f"expected only limits and --out with --resume, found {name}: leave it out, the saved run decides"
+                    " it"
                 )
         home = self.return_to_start or saved.mission.return_to_start
         going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
@@ -169,7 +170,7 @@ class Explore:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         if self.view and self.rrd is not None:
-            raise UsageError("expected --rrd or --view, found both: the viewer can save what it shows")
+            raise UsageError("expected --rrd or --view, found both: leave one out (the viewer can save what it shows)")
         if self.resume is not None:
             return self._go_on(self.resume)
         trial = self.trial
@@ -202,8 +203,8 @@ class Explore:
                 return 0
             if saved.outlasts(trial.limits):
                 raise UsageError(
-                    f"expected limits beyond the {len(saved)} steps of the saved run, found one before their end: its"
-                    " files are left as they were, raise it"
+                    f"expected limits beyond the {len(saved)} steps of the saved run, found one before its end: raise"
+                    " it (the files are unchanged)"
                 )
             config = config_record(trial)
             if in_place:
@@ -221,7 +222,7 @@ class Explore:
         echo_world(world)
         say(run_line(world, trial))
         if not HAS_GTSAM and trial.backend == DRIVER and not self._is_given("backend"):
-            say(f"note: the package gtsam is not installed, so that {DRIVER} explores in place of graph")
+            say(f"note: the package gtsam is not installed; {DRIVER} is used instead of graph")
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
         log = RunningLog(folder, config, saved.kept if saved is not None else None)
@@ -249,8 +250,8 @@ class Explore:
             log.close()
         if saved is not None and result.ending.exit_status and len(result.log or ()) < len(saved):
             recording.drop()
-            told = f"expected to pass the end of the saved run, found {result.ending.reason}: its files are left as"
-            say(f"chainslam: {told} they were, --resume goes on", stderr=True)
+            told = f"expected to get past the end of the saved run, found {result.ending.reason}: its files are"
+            say(f"chainslam: {told} unchanged, --resume continues it", stderr=True)
             return result.ending.exit_status
         problems = write_results(result, folder, config)
         if not problems:
@@ -275,4 +276,4 @@ def _why(saved: SavedRun) -> str:
     """Return in words why a finished run is over."""
     assert saved.outcome is not None
     words = f"{saved.outcome.status}: {saved.outcome}"
-    return words if saved.outcome.status == "complete" else f"{words}; raise the limit to go on"
+    return words if saved.outcome.status == "complete" else f"{words}; raise the limit to continue"

@@ -29,7 +29,7 @@ class Measure:
         """Run the command and return its exit status; raises UsageError for names that are no corners."""
         mapped = read_corners(self.folder)
         if len(self.corners) not in (0, 2):
-            raise UsageError(f"expected two corners or none, found {len(self.corners)}: name two of the listing")
+            raise UsageError(f"expected two corners or none, found {len(self.corners)}: name two from the list")
         if not self.corners:
             _list(mapped, self.folder)
             return 0
@@ -56,11 +56,11 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
     for k, walls in enumerate(mapped.walls):
         x, y = mapped.points.positions_world[k]
         spread = 1e3 * max(mapped.points.cov[k, 0, k, 0] + mapped.points.cov[k, 1, k, 1], 0.0) ** 0.5
-        sigma = f"{spread:.1f}" if mapped.sharp[k] else "one line"
+        sigma = f"{spread:.1f}" if mapped.sharp[k] else "collinear"
         corners.add_row(str(k), f"{x:.3f}", f"{y:.3f}", sigma, f"{walls[0]}, {walls[1]}", str(mapped.chains[k]))
     console.print(corners)
     if not mapped.rooms:
-        print("no closed chain, so no area")
+        print("no chain is closed, so there is no area")
         return
     rooms = Table(title="closed chains, value and 95 % interval", title_justify="left")
     for title in ("chain", "is", "corners", "area m²", "length m"):
@@ -94,6 +94,6 @@ def _words(measured: Measured) -> str:
 
 
 def _estimator(folder: Path) -> str:
-    """Return whose word the intervals are; nothing where the folder does not tell."""
+    """Return which estimator reports the intervals; nothing if the folder does not say."""
     config = folder / "config.json"
-    return f", as {read_config(config).trial.backend} states it" if os.path.lexists(config) else ""
+    return f", reported by {read_config(config).trial.backend}" if os.path.lexists(config) else ""

@@ -1,4 +1,4 @@
-"""`chainslam view`: what a run left, in Rerun's viewer."""
+"""`chainslam view`: the results of a run in Rerun's viewer."""
 
 import socket
 import sys
@@ -64,7 +64,7 @@ def _serve(files: list[Path]) -> int:
     found(url=viewer.url)
     say(f"open {viewer.url}")
     say(f"from another machine first: ssh -L {page}:127.0.0.1:{page} -L {data}:127.0.0.1:{data} {socket.gethostname()}")
-    say("Ctrl-C ends it")
+    say("stop it with Ctrl-C")
     try:
         viewer.wait()
     except KeyboardInterrupt:
@@ -82,11 +82,13 @@ def recordings_at(path: Path) -> Callable[[], list[Path]]:
     if (path / TRIALS).is_file():
         return lambda: [_made(path, lambda target: record_campaign(path, read_campaigns(path)[0], target))]
     if not path.exists():
-        raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found no {path}: name what a run left")
+        raise UsageError(
+            f"expected a .rrd file, a {LOG} or a folder with one, found no {path}: name the results of a run"
+        )
     log = path if path.name == LOG else path / LOG
     logs = [log] if log.is_file() else sorted(path.glob(f"*/{LOG}"))
     if not logs:
-        raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found {path}: name what a run left")
+        raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found {path}: name the results of a run")
     runs = [read_run(each) for each in logs]
     if not all(_is_same(runs[0], run) for run in runs):
         raise UsageError(f"expected one run, found several in {path}: name the folder of one")
@@ -106,7 +108,9 @@ def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
     target = folder / RECORDING
     problems = record(target)
     if problems:
-        raise UsageError(f"expected to keep a recording in {folder}, found {problems[0]}: free the place and try again")
+        raise UsageError(
+            f"expected to write a recording into {folder}, found {problems[0]}: make it writable and try again"
+        )
     return target
 
 

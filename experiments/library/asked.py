@@ -78,12 +78,14 @@ def asked_source(
         raise UsageError(f"expected a ROS bag for --scan-topic and --odom-topic, found {path.name}: leave them out")
     if is_own and knows_truth(path):
         if real.range_noise is not None:
-            raise UsageError(f"expected --range-noise with a log that states none, found {path.name}: leave it out")
+            raise UsageError(
+                f"expected --range-noise with a log that does not state it, found {path.name}: leave it out"
+            )
         run = retuned(read_run(path), config, settings, spec)
         return OwnLog(run, own, load_world(run.trial.world, run.trial.start, run.trial.drawing))
     if own.association != "own" or own.perfect_extraction or own.perfect_odometry:
         raise UsageError(
-            "expected a log that knows the truth for --association true, --perfect-extraction and"
+            "expected a log with the truth for --association true, --perfect-extraction and"
             f" --perfect-odometry, found {path.name}: leave them out"
         )
     read = read_own_run if is_own else read_real_run

@@ -24,7 +24,7 @@ def _page(folder: Path) -> Page:
     from ..views.run_page import is_run, run_page
 
     if not folder.is_dir():
-        raise UsageError(f"expected a folder of results, found no folder {folder}: name what a command left")
+        raise UsageError(f"expected a folder of results, found no folder {folder}: name that of a run or a campaign")
     if (folder / CONTRAST).is_file():
         return contrast_page(folder)
     # A campaign keeps no summary.json; its recordings lie two folders further down.

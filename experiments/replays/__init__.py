@@ -1,1 +1,1 @@
-"""Recorded scans through a back end, with the truth in place of one part where that is asked for."""
+"""Recorded scans through a back end, optionally with the truth in place of one part of the software."""

@@ -1,4 +1,4 @@
-"""A ring of corridors of any length, and what a robot with stated noise sees on its way round: no scan, no mapper."""
+"""A ring of corridors of any length and noisy observations on the way round it, without scans or a mapper."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,7 +15,7 @@ from .oracles import as_stated
 
 HALF_WIDTH_M = 1.2
 NICHE_M = 0.6
-"""Depth of the niches whose sides tell how far along the corridor the robot is."""
+"""Depth of the niches, whose sides localise the robot along the corridor."""
 PIECE_M = (2.0, 5.0)
 """Shortest and longest piece of wall between two niches."""
 RANGE_M = 4.0
@@ -27,21 +27,21 @@ FIRM_RAD = float(np.deg2rad(6.0))
 
 @dataclass(frozen=True)
 class Loop:
-    """A drive round the ring and on over its beginning."""
+    """A drive round the ring and beyond its beginning."""
 
     length_m: float = 200.0
-    """Of the ring, along its middle."""
+    """Length of the ring along its middle."""
     heading_deg: float = 0.6
-    """Standard deviation of the heading that the wheels lose in one metre; it grows with the square root."""
+    """Standard deviation of the heading error of the odometry after one metre; it grows with the square root."""
     gap_m: float = 0.0
-    """Length of the last stretch before the ring closes in which nothing is seen."""
+    """Length of the last stretch before the ring closes, on which nothing is observed."""
     after_m: float = 20.0
-    """Length of the drive once the ring is closed."""
+    """Length of the drive after the ring is closed."""
     step_m: float = 0.25
 
     @property
     def way_m(self) -> Float[np.ndarray, " s"]:
-        """Where each scan is taken, along the ring's middle."""
+        """Position of each scan along the ring's middle."""
         return self.step_m * np.arange(int((self.length_m + self.after_m) / self.step_m) + 1)
 
     @property
@@ -51,7 +51,7 @@ class Loop:
 
 
 def drive(loop: Loop, seed: int) -> DriveObservations:
-    """Return a drive round a ring whose niches are drawn with `seed`, all noise being the stated one."""
+    """Return a drive round a ring with randomly placed niches and noise as stated."""
     walls = ring(loop.length_m, np.random.default_rng(seed))
     way = loop.way_m
     poses = on_ring(way, loop.length_m)
@@ -92,7 +92,7 @@ def on_ring(way_m: Float[np.ndarray, " s"], length_m: float) -> Float[np.ndarray
 
 
 def ring(length_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2 2"]:
-    """Return the faces of both walls of each side of the ring, every second piece set back by a niche's depth."""
+    """Return the faces of both walls of each side of the ring; every second piece is set back by a niche."""
     quarter = (length_m - 2.0 * np.pi) / 4.0 + 0.5 * np.pi
     starts = on_ring(quarter * np.arange(4.0), length_m)
     faces = []
@@ -100,14 +100,14 @@ def ring(length_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2 2"
         for left in (True, False):
             cuts = np.cumsum(np.concatenate([[0.0], rng.uniform(*PIECE_M, int(quarter / PIECE_M[0]))]))
             cuts = np.append(cuts[cuts < quarter - 1.0], quarter)
-            # The outer wall runs on around the corner, the inner one stops short of it.
+            # The outer wall continues around the corner, the inner one ends before it.
             cuts = np.clip(cuts, *((HALF_WIDTH_M, quarter - HALF_WIDTH_M) if left else (-1.0, quarter + 1.0)))
             back = HALF_WIDTH_M + NICHE_M * (np.arange(len(cuts) - 1) % 2)
             points = np.stack([np.repeat(cuts, 2)[1:-1], np.repeat(back, 2)], axis=-1)
             points = points * [1.0, 1.0 if left else -1.0]
             pieces = np.stack([points[:-1], points[1:]], axis=1)
             pieces = pieces[np.hypot(*(pieces[:, 1] - pieces[:, 0]).T) > 0.1]
-            # The free side is on the left: of a wall on the robot's left that is walked against the robot's way.
+            # The free side is on the left: a wall on the robot's left points against its direction of travel.
             faces.append(to_world(pieces[:, ::-1] if left else pieces, begin))
     return np.concatenate(faces)
 
@@ -115,7 +115,7 @@ def ring(length_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2 2"
 def _wheels(
     poses: Float[np.ndarray, "s 3"], loop: Loop, chance: Chance
 ) -> tuple[Float[np.ndarray, "s 3"], Float[np.ndarray, "s 3 3"]]:
-    """Return what the wheels report and its covariance, 14 mm along and 6 mm across per square root of a metre."""
+    """Return the odometry and its covariance: 14 mm along and 6 mm across per square root of a metre."""
     cov = loop.step_m * np.diag([0.014, 0.006, np.deg2rad(loop.heading_deg)]) ** 2
     true = [compose(inverse(a), b) for a, b in pairwise(poses)]
     draws = [chance.standard_normals(Channel.WHEELS, step, 3) for step in range(len(true))]
@@ -130,10 +130,7 @@ def look(
     standard_normals: Float[np.ndarray, "n 2"],
     share: float = 1.0,
 ) -> ScanObservations:
-    """Return the walls within range whose free side the robot is on, each with the noise of the beams that it takes.
-
-    A beam's sigma is this share of what it is.
-    """
+    """Return the visible walls within range, each with the noise of its beams, whose sigma is scaled by `share`."""
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
     r = lines[:, 1] - n @ pose[:2]
     along = np.sort(np.sum((walls - pose[:2]) * t[:, None], axis=-1), axis=1)

@@ -1,7 +1,7 @@
-"""The ideal EKF: every Jacobian at the truth, which no estimator has; what a filter could reach by better ones.
+"""The ideal EKF, which evaluates every Jacobian at the truth: the limit of what better Jacobians could achieve.
 
-The yardstick of the papers on observability (Huang, Mourikis and Roumeliotis). It reads the truth of the drive that it
-is taken along, so it stands here, in no registry, and can only be ridden.
+It is the reference of the papers on observability (Huang, Mourikis and Roumeliotis). Since it reads the truth of the
+drive, it is not in the registry of back ends, and can only replay.
 """
 
 from dataclasses import replace

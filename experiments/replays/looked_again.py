@@ -1,4 +1,4 @@
-"""A real robot's log looked at again once its drive has ended: path and map are what all scans say together."""
+"""Offline refinement of a real robot's log after its drive: path and map from all scans together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,9 +25,9 @@ from ..trial import TrialResult
 
 
 def looked_again(result: TrialResult) -> TrialResult:
-    """Return a result whose smoothed path and whose map are those of second looks.
+    """Return a result whose smoothed path and map come from offline refinement.
 
-    They are the same whichever back end ran: scans and odometry alone tell them.
+    They only depend on scans and odometry, and are the same for every back end.
     """
     log, last, recorded = result.log, result.last, result.recorded
     if log is None or last is None or recorded is None:
@@ -37,7 +37,7 @@ def looked_again(result: TrialResult) -> TrialResult:
 
 
 def surveyed(scans: Sequence[Scan], log: Log, config: TrialConfig) -> Survey:
-    """Return what the scans of a drive say together, in the frame of its first pose as it was estimated."""
+    """Return the solution for all scans of a drive, in the frame of its first estimated pose."""
     mission, on_body = config.mission, config.robot.scanner
     rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
@@ -47,7 +47,7 @@ def surveyed(scans: Sequence[Scan], log: Log, config: TrialConfig) -> Survey:
 
 
 def _mapped(result: TrialResult, last: Step, survey: Survey) -> TrialResult:
-    """Return a result with a survey's path and walls, and what these can vouch for."""
+    """Return a result with the path and walls of a refined solution and their covariances."""
     mission = result.scenario.config.mission
     walls = survey.walls
     step = replace(last, map=walls, chains=connect(walls, shared=mission.mapper.shared))

@@ -1,4 +1,4 @@
-"""A replay held against what others measured of its drive."""
+"""Comparison of a replay with measurements of its drive."""
 
 from dataclasses import replace
 from typing import Any
@@ -20,17 +20,17 @@ from ..usage import UsageError
 CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}
 UNITS = {"millimetres": 1000.0, "centimetres": 100.0, "inches": 39.37}
 OTHER_UNIT = 20.0
-"""Wheels are never wrong by such a factor, however they slip."""
+"""Odometry is never wrong by such a factor, however much the wheels slip."""
 MOVED_M = 0.5
-"""Less way tells nothing of a unit."""
+"""Shorter paths say nothing about the unit."""
 
 
 def check_references(
     references: References, time_s: Float[np.ndarray, " s"], wheels_world: Float[np.ndarray, "s 3"]
 ) -> None:
-    """Raise UsageError where what others measured cannot be of this drive: no time in common, or another unit.
+    """Raise UsageError if measurements cannot belong to this drive: no common time, or another unit.
 
-    `wheels_world` is where the odometry puts the robot at the times of the log.
+    `wheels_world` are the poses of the odometry at the times of the log.
     """
     if references.path is not None:
         times, poses = references.path
@@ -52,11 +52,11 @@ def _no_common_time(what: str, ours: Float[np.ndarray, " s"], theirs: Float[np.n
     if unit is not None:
         hint = f"its times are in {unit}: divide them"
     elif most - least <= 2.0 * (high - low) and abs(least) < 1.0 < abs(low):
-        hint = f"its times count from its beginning: add {low:.3f} or so"
+        hint = f"its times count from its beginning: add about {low:.3f} s"
     elif most >= low and least <= high:
-        hint = "take one that was measured at the scans, or interpolate it to their times"
+        hint = "use one that was measured at the scans, or interpolate it to their times"
     else:
-        hint = "take one of this drive, by the same clock"
+        hint = "use one of this drive, on the same clock"
     return (
         f"expected a time of the {what} within {1e3 * SAME_TIME_S:.0f} ms of a scan, found none: the log is of"
         f" {low:.3f} to {high:.3f} s, the {what} of {least:.3f} to {most:.3f} s; {hint}"
@@ -64,7 +64,7 @@ def _no_common_time(what: str, ours: Float[np.ndarray, " s"], theirs: Float[np.n
 
 
 def _check_unit(what: str, theirs_m: Float[np.ndarray, " k"], ours_m: Float[np.ndarray, " k"]) -> None:
-    """Raise UsageError where distances differ by a factor that only another unit explains."""
+    """Raise UsageError if distances differ by a factor that only another unit explains."""
     theirs, ours = float(theirs_m.sum()), float(ours_m.sum())
     if max(theirs_m.max(initial=0.0), ours_m.max(initial=0.0)) < MOVED_M or min(theirs, ours) <= 0.0:
         return
@@ -76,17 +76,17 @@ def _check_unit(what: str, theirs_m: Float[np.ndarray, " k"], ours_m: Float[np.n
         )
     if factor < 1.0 / OTHER_UNIT:
         raise UsageError(
-            f"expected a {what} in metres, found it {1.0 / factor:.0f} times as short as the odometry: multiply it, or"
-            " take one of this drive"
+            f"expected a {what} in metres, found it {1.0 / factor:.0f} times shorter than the odometry: multiply it, or"
+            " use one of this drive"
         )
 
 
 def held_against(result: TrialResult, references: References) -> TrialResult:
-    """Return a result whose summary has the scores by relations and by a reference path, as far as there are any.
+    """Return a result whose summary has the scores by relations and by a reference path, as far as they exist.
 
-    `relations` and `reference` are of the path available at each step, `*_smoothed` of the smoothed one. `*_normalised`
-    are errors in units of what is stated: of the path available at each step against the reference, and of relations
-    by the joint covariance of two poses, where a back end keeps all poses or second looks were taken.
+    `relations` and `reference` are computed from the path available at each step, `*_smoothed` from the smoothed one.
+    `*_normalised` are normalised errors: of the path available at each step against the reference, and of relations
+    with the joint covariance of two poses, if the back end keeps all poses or the log was refined offline.
     """
     log, smoothed = result.log, result.smoothed
     if log is None or (references.relations is None and references.path is None):
@@ -120,7 +120,7 @@ def _normalised(result: TrialResult, log: Log, references: References) -> dict[s
 
 
 def _time_of_steps(result: TrialResult, log: Log) -> Float[np.ndarray, " s"]:
-    """Return when each step's scan was taken, on the clock of what others measured."""
+    """Return the time of each step's scan, on the clock of the measurements."""
     recorded = result.recorded
     if recorded is None:
         return log.time_s

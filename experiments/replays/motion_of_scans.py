@@ -1,4 +1,4 @@
-"""Odometry for a log that tells none: each scan is laid onto those before it, about where the last motion leads."""
+"""Odometry for a log without one: each scan is matched with earlier ones, starting from the last motion."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,36 +12,36 @@ from chainslam.slam.odometry.scan_matching import ScanMatcher
 from chainslam.slam.robot import Odometry, Scan
 
 KEPT_M, KEPT_RAD = 0.1, float(np.deg2rad(5.0))
-"""The robot goes so far before its scan is one of those that others are laid onto."""
+"""Distance after which a scan becomes one of the reference scans."""
 CHANGE_M_S, CHANGE_RAD_S = 0.5, 1.0
-"""Standard deviation by which its speed may change from one scan to the next, for each second between them."""
+"""Standard deviation of the change of speed between two scans, per second between them."""
 LEAST_M, LEAST_RAD = 0.02, float(np.deg2rad(2.0))
-"""No motion is foretold better."""
+"""Lower limit of the standard deviation of a predicted motion."""
 MOST_M, MOST_RAD = 0.3, float(np.deg2rad(15.0))
-"""None is sought farther off, one standard deviation."""
+"""Upper limit of the standard deviation of the search."""
 SIGMA_M = 0.02
 
 
 def motion_of_scans(scans: Iterator[RawScan | LogError]) -> Iterator[RawScan | LogError]:
-    """Yield scans with odometry: their own where the log tells it, else that of the scans themselves."""
+    """Yield scans with odometry: that of the log, or that of scan matching if it has none."""
     told = _Told()
     for scan in scans:
         yield scan if isinstance(scan, LogError) or scan.robot_odom is not None else told.at(scan)
 
 
 class _Told:
-    """Where the scans have led so far."""
+    """Pose after the last scan by scan matching."""
 
     def __init__(self) -> None:
         self._matcher = ScanMatcher(ScanMatchingConfig())
         self._kept = np.zeros(3)
         self._pose = np.zeros(3)
         self._speed = np.zeros(3)
-        """Of the robot in its own frame, m/s m/s rad/s."""
+        """Velocity of the robot in its own frame, m/s m/s rad/s."""
         self._time_s: float | None = None
 
     def at(self, raw: RawScan) -> RawScan:
-        """Return a scan with the pose where it was taken."""
+        """Return a scan with its pose."""
         scan = Scan(raw.bearings_rad, raw.ranges_m, SIGMA_M, raw.range_max_m, raw.time_s)
         if self._time_s is None:
             self._matcher.begin(scan)

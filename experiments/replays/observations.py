@@ -1,7 +1,7 @@
-"""Observations told wall by wall, so that a back end runs alone: no mapper, the true association settled beforehand.
+"""Observations with known wall, for a back end without a mapper: the true association is determined beforehand.
 
-What the mapper asks of a back end under `--association true` does not depend on the back end. It is worked out once for
-a drive and handed to many.
+With `--association true` the mapper's requests to a back end do not depend on the back end. They are computed once for
+a drive and passed to many.
 """
 
 from dataclasses import dataclass, replace
@@ -31,15 +31,15 @@ from .replay import RecordedRun
 
 @dataclass(frozen=True, eq=False)
 class ScanObservations:
-    """Lines seen in one scan, robot frame."""
+    """Lines observed in one scan, robot frame."""
 
     walls: Int[np.ndarray, " m"]
-    """The true wall of each."""
+    """The true wall of each line."""
     lines: Float[np.ndarray, "m 2"]
     """(alpha rad, r m)."""
     cov: Float[np.ndarray, "m 2 2"]
     centres: Float[np.ndarray, "m 2"]
-    """Middle of each seen piece, m."""
+    """Middle of each observed piece, m."""
 
     def __len__(self) -> int:
         return len(self.walls)
@@ -57,39 +57,39 @@ class DriveObservations:
     """Motion that led to each scan, robot frame before the motion, m m rad; the first is not used."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
     again: tuple[ScanObservations, ...]
-    """For each scan the observations of walls seen before."""
+    """For each scan, the observations of walls seen before."""
     first: tuple[ScanObservations, ...]
-    """And those that begin a line."""
+    """And those that start a new line."""
     true_poses_world: Float[np.ndarray, "s 3"]
     true_lines_world: dict[int, Float[np.ndarray, "2"]]
-    """(alpha rad, r m) of each wall that begins a line."""
+    """(alpha rad, r m) of each wall that starts a new line."""
     chance: Chance
-    """What drew its noise, and is to draw the error of the estimate's start."""
+    """Random numbers from which its noise was drawn, and the error of the initial estimate is to be drawn."""
 
     def told(self, share: float) -> "DriveObservations":
-        """Return the same observations with their covariances stated as this share of what they are."""
+        """Return the same observations with their stated covariances scaled by this share."""
         again, first = ([replace(looks, cov=share * looks.cov) for looks in part] for part in (self.again, self.first))
         return replace(self, again=tuple(again), first=tuple(first))
 
 
 @dataclass(frozen=True, eq=False)
 class Ridden:
-    """What a back end made of a drive."""
+    """The estimates of a back end along a drive."""
 
     estimated_world: Float[np.ndarray, "s 3"]
-    """The estimate available after each scan."""
+    """Estimate after each scan."""
     estimated_cov: Float[np.ndarray, "s 3 3"]
     joint: Joint
     """Pose and all lines after the last scan."""
     true_poses_world: Float[np.ndarray, "s 3"]
     true_lines_world: Float[np.ndarray, "m 2"]
     from_start_world: Float[np.ndarray, "s 3"]
-    """The estimates relative to the start, as `scoring/from_start.py` has them."""
+    """Estimates relative to the start, as in `scoring/from_start.py`."""
     from_start_cov: Float[np.ndarray, "s 3 3"]
 
     @property
     def pose_nees(self) -> Float[np.ndarray, " s"]:
-        """NEES of the invariant pose error after each scan; raises LinAlgError where a covariance is none."""
+        """NEES of the invariant pose error after each scan; raises LinAlgError for an invalid covariance."""
         errors = pose_errors(self.estimated_world, self.true_poses_world)
         return nees(errors, pose_covariances(self.estimated_world, self.estimated_cov))
 
@@ -101,13 +101,13 @@ class Ridden:
 
     @property
     def map_anees(self) -> float:
-        """ANEES of all lines after the last scan, in the map's own gauge; raises LinAlgError likewise."""
+        """ANEES of all lines after the last scan, after gauge alignment; raises LinAlgError likewise."""
         means, cov = self.joint.mean[POSE:].reshape(-1, 2), self.joint.cov[POSE:, POSE:]
         return own_gauge(means, cov, self.joint.anchors, self.true_lines_world).anees or 0.0
 
 
 def observations_of(run: RecordedRun, perfect_extraction: bool) -> DriveObservations:
-    """Return what a recorded run saw, as the mapper would hand it to any back end under the true association.
+    """Return the observations of a recorded run, as the mapper hands them to any back end with true association.
 
     Raises UsageError for a world that cannot be loaded.
     """
@@ -149,7 +149,7 @@ def _looks(segments: Segments, walls: Int[np.ndarray, " n"]) -> ScanObservations
 
 
 def ride(backend: Backend, drive: DriveObservations, from_start: FromStart = as_it_is) -> Ridden:
-    """Take a back end without lines along a drive and return its estimates."""
+    """Run a back end without lines along a drive and return its estimates."""
     line_of_wall: dict[int, int] = {}
     poses, covs, relative = [], [], []
     for k, (again, first) in enumerate(zip(drive.again, drive.first, strict=True)):

@@ -1,4 +1,4 @@
-"""The truth in place of one part of the software, to find out which part a fault comes from; handed to the mapper."""
+"""The truth in place of one part of the software, to find out which part causes an error; used by the mapper."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -22,31 +22,31 @@ from ..scoring.beam_votes import UNLABELLED, vote
 from ..scoring.truth import Truth
 
 MOST_TURN_RAD = 1.0
-"""No observation is drawn farther off its wall's direction than this: only tentative ones know it so badly."""
+"""Observations are not drawn farther from the direction of their wall; only tentative ones are that uncertain."""
 MOST_SLANT_RAD = 1.5
-"""Nor so that its beams would meet it at more than this from its normal: a wall is not seen from behind."""
+"""Nor so that beams would meet the line at a larger angle to its normal: a wall is not seen from behind."""
 
 
 @dataclass
 class Witness:
-    """What really stood before the robot in each scan of a run, and where the run now is."""
+    """The true objects in each scan of a run, and the true pose of the robot."""
 
     truth: Truth
     poses_world: Float[np.ndarray, "s 3"]
-    """Of the scanner."""
+    """Pose of the scanner."""
     face_of_beam: Int[np.ndarray, "s k"]
     at: int = 0
     """The scan that is being mapped."""
 
     def faces(self, segments: Segments) -> Int[np.ndarray, " n"]:
-        """Return the true face of each segment: the one of most beams on its wall; -1 where several walls mixed."""
+        """Return the true face of each segment, that with most beams; -1 if the segment mixes several walls."""
         beams = self.face_of_beam[self.at]
         votes = (vote(span, beams, self.truth.walls) for span in segments.beams.tolist())
         return np.array([told.face if told.is_clear else UNLABELLED for told in votes], dtype=np.int64)
 
 
 class TrueAssociation:
-    """A matcher that knows which wall each segment was seen on; a line's wall is that of the segment that began it."""
+    """A matcher that knows the true wall of each segment; a line belongs to the wall of the segment that started it."""
 
     def __init__(self, witness: Witness) -> None:
         self._witness = witness
@@ -63,9 +63,9 @@ class TrueAssociation:
         *,
         clear_only: bool = False,
     ) -> Matches:
-        """Return the true pairs when asked for the clear ones, and none of the rest."""
+        """Return the true pairs when asked for the unambiguous ones, and none in the second pass."""
         if not clear_only:
-            # Called with the segments left over: those of walls without a line begin one, the others are not used.
+            # Called with the unmatched segments: those of walls without a line start one, the others are not used.
             begins = begins_a_line(self._rest[:, 0], self._rest[:, 1], self._line_of_wall)
             return replace(NO_MATCHES, unmatched=np.arange(len(segments)), doubtful=np.flatnonzero(~begins))
         faces = self._witness.faces(segments)
@@ -82,7 +82,7 @@ class TrueAssociation:
         )
 
     def learn(self, owners: Int[np.ndarray, " s"]) -> None:
-        """Take note of which lines were begun by which walls; call it after each scan was mapped."""
+        """Record which walls started new lines; call it after each scan was mapped."""
         for wall, line in zip(self._all.tolist(), owners.tolist(), strict=True):
             if wall >= 0 and line >= 0:
                 self._line_of_wall.setdefault(wall, line)
@@ -91,7 +91,7 @@ class TrueAssociation:
 def begins_a_line(
     walls: Int[np.ndarray, " u"], beam_counts: Int[np.ndarray, " u"], known: Collection[int]
 ) -> Bool[np.ndarray, " u"]:
-    """Return which segments are on walls (-1 for none) without a line: of several on one wall, that of most beams."""
+    """Return the walls of segments that have no line yet (else -1); of several on one wall, that with most beams."""
     begins = np.zeros(len(walls), dtype=bool)
     for wall in np.unique(walls).tolist():
         if wall >= 0 and wall not in known:
@@ -101,7 +101,7 @@ def begins_a_line(
 
 
 class PerfectExtraction:
-    """Real segmentation, but each line is the true one with an error drawn as the measurement model states it."""
+    """Real segmentation, but each line is the true one with an error drawn from the measurement model."""
 
     def __init__(self, witness: Witness, chance: Chance) -> None:
         self._witness, self._chance = witness, chance
@@ -109,7 +109,7 @@ class PerfectExtraction:
     def __call__(
         self, scan: Scan, config: ExtractionConfig, *, vertices_rad: Float[np.ndarray, " b"] = NO_VERTICES
     ) -> Segments:
-        """Extract the segments of one scan; those of several walls are left out, so that the map need not say where."""
+        """Extract the segments of one scan; those of several walls are dropped, so that the map need not split them."""
         segments = extract(scan, config)
         faces = self._witness.faces(segments)
         segments, faces = segments.take(faces >= 0), faces[faces >= 0]
@@ -127,7 +127,7 @@ class PerfectExtraction:
 
 
 def of_true_lines(config: MapperConfig) -> MapperConfig:
-    """Return a mapper for perfect extraction, whose short faces are known for what they are."""
+    """Return a mapper for perfect extraction, in which short faces are treated as such."""
     reliability = replace(config.walls.reliability, straightness=StraightnessConfig(edge_m=0.0), edge_m=0.0)
     return replace(config, walls=replace(config.walls, reliability=reliability))
 
@@ -160,7 +160,7 @@ def as_stated(
 
 
 def true_odometry(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
-    """Return the true motion that led to each pose, in the frame of the pose before; zero for the first."""
+    """Return the true motion before each pose, in the frame of the pose before; zero for the first."""
     motions = [np.zeros(3)]
     for before, after in pairwise(poses_world):
         motions.append(compose(inverse(before), after))

@@ -1,4 +1,4 @@
-"""A real robot's log through a back end: no truth is known, so what is scored is what the map and the log tell."""
+"""A real robot's log through a back end; without ground truth, scores come from the map and the log alone."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -32,30 +32,29 @@ from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
 _BOW = {"bow_rad": SecondLooksConfig.floor_rad, "bow_m": SecondLooksConfig.floor_m}
 REAL_WALLS = {"mission": {"mapper": {"walls": {"reliability": {"straightness": _BOW}}}}}
-"""Doors, panels and cupboards of a real building: no wall is nearer to its line than this, in any log."""
+"""Standard deviation of real walls about their line: doors, panels and cupboards, in any log."""
 
 
 FARTHEST_NOISE_M = 1.0
-"""No range finder is as bad."""
+"""No range finder is as bad as this."""
 
 
 @dataclass(frozen=True)
 class RealOptions:
-    """How a real robot's log is taken."""
+    """How a real robot's log is read."""
 
     every: int = 1
-    """One of so many keyframes is mapped."""
+    """Every n-th keyframe is mapped."""
     odometry: OdometrySource | None = None
-    """Who tells the motion between two keyframes; None for who told it when a robot of one's own drove, and for the
-    scans of other logs."""
+    """Source of the motion between two keyframes; None for that of the drive, or scan matching for logs of others."""
     second_looks: bool = False
-    """Whether all segments are associated anew once the drive has ended; a back end that smooths has it anyway."""
+    """Whether to refine offline once the drive has ended; back ends that smooth always do."""
     range_noise: float | None = None
-    """Standard deviation of a range, where the scanner's is known; None for what is assumed of all logs."""
+    """Standard deviation of a range, if the scanner's is known; None for the default of all logs."""
     scan_topic: str | None = None
-    """The scans of a bag that holds several; None for those that look around the farthest."""
+    """Topic of the scans in a bag with several; None for the one with the widest view."""
     odom_topic: str | None = None
-    """The odometry of a bag that holds several; None for the first by name."""
+    """Topic of the odometry in a bag with several; None for the first by name."""
 
 
 @dataclass(frozen=True)
@@ -67,17 +66,17 @@ class RealRun:
     trial: TrialConfig
     options: RealOptions
     cut_short: str = ""
-    """What ended the drive or its log early, in words."""
+    """Why the drive or its log ended early, in words."""
 
     @property
     def unread(self) -> str:
-        """Why most of the log was not read, in words; nothing where half of it or more was."""
+        """Why most of the log was not read, in words; empty if at least half of it was."""
         left_out, read = self.log.left_out, len(self.log.scan_time_s)
         return left_out.words(read) if left_out.count > read else ""
 
     @cached_property
     def wheels_alone(self) -> Float[np.ndarray, "s 3"]:
-        """Where wheel odometry puts the robot at each keyframe, in the map's frame."""
+        """Poses of the wheel odometry at each keyframe, in the map's frame."""
         return odometry_poses(np.zeros(3), self.log.recording.odometry)
 
 
@@ -89,7 +88,7 @@ def read_real_run(
     `robot` holds settings of what the robot states. Where its scanner sits the log itself has told.
     """
     if options.every < 1:
-        raise UsageError(f"expected each keyframe or one of so many, found --every {options.every}: give 1 or more")
+        raise UsageError(f"expected --every of 1 or more keyframes, found {options.every}: raise it")
     try:
         wanted = TopicsWanted(options.scan_topic, options.odom_topic)
         log = read_recorded_log(path, _keyframes(options), wanted, motion_of_scans)
@@ -104,12 +103,12 @@ def read_real_run(
 
 
 def _keyframes(options: RealOptions) -> KeyframesConfig:
-    """Return which scans are mapped and with which noise; raises UsageError for a noise that no scanner has."""
+    """Return the keyframes and their range noise; raises UsageError for an impossible noise."""
     plain, noise_m = KeyframesConfig(every=options.every), options.range_noise
     if noise_m is None:
         return plain
     if not 0.0 < noise_m < FARTHEST_NOISE_M:
-        raise UsageError(f"expected a range noise in metres, found --range-noise {noise_m:g}: give 0.001 to 0.1 or so")
+        raise UsageError(f"expected a range noise in metres, found --range-noise {noise_m:g}: give about 0.001 to 0.1")
     return replace(plain, sigma_m=noise_m)
 
 
@@ -121,7 +120,7 @@ def read_own_run(
     Settings, odometry and noise are those of its drive. `robot` holds settings of what the robot states.
     """
     if options.range_noise is not None:
-        raise UsageError(f"expected --range-noise with a log that states none, found {path.name}: leave it out")
+        raise UsageError(f"expected --range-noise with a log that does not state it, found {path.name}: leave it out")
     try:
         recording = recording_of(read_log(path))
     except RecordingError as error:
@@ -139,12 +138,12 @@ def replayed_real(run: RealRun, backend: str) -> TrialConfig:
 
 
 def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
-    """Map a real robot's log with one back end, to its end or to what ends it early; raises UsageError before."""
+    """Map a real robot's log with one back end, to its end or until it fails; raises UsageError before."""
     return looked_over(run, mapped_real(run, backend, watch))
 
 
 def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
-    """Map it, without second looks."""
+    """Map it, without offline refinement."""
     scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
@@ -156,9 +155,9 @@ def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
 
 
 def looked_over(run: RealRun, result: TrialResult) -> TrialResult:
-    """Return what second looks make of a log that was mapped; without them where nobody asked, or it was interrupted.
+    """Return a mapped log after offline refinement, if it was asked for.
 
-    One that is interrupted in them keeps what was mapped.
+    If the refinement is interrupted, the mapped result is kept.
     """
     asked_for = run.options.second_looks or result.smoothed is not None
     if not asked_for or result.ending.outcome is Outcome.INTERRUPTED:
@@ -166,6 +165,6 @@ def looked_over(run: RealRun, result: TrialResult) -> TrialResult:
     try:
         return looked_again(result)
     except KeyboardInterrupt as interrupt:
-        ending = Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'} in second looks")
+        ending = Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'} during offline refinement")
         said = {"status": ending.status, "reason": ending.reason, "outcome": str(ending.outcome)}
         return replace(result, ending=ending, smoothed=None, summary=result.summary | said)

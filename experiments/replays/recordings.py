@@ -1,4 +1,4 @@
-"""Runs explored once and kept, so that every back end and every study meets the same scans."""
+"""Runs that are explored once and kept, so that every back end and study gets the same scans."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from .replay import RecordedRun, read_run
 
 
 def recorded(made: TrialResult) -> RecordedRun:
-    """Return the recording that a trial left; raises UsageError where it ended before its first step."""
+    """Return the recording of a trial; raises UsageError if it ended before its first step."""
     log, scenario = made.log, made.scenario
     if log is None:
         raise UsageError(f"expected a run of at least one step, found none: {made.ending.reason}")

@@ -51,26 +51,26 @@ from .oracles import PerfectExtraction, TrueAssociation, Witness, of_true_lines,
 
 Association = Literal["own", "true"]
 OPEN_TO_REPLAYS = ("mission", "backend_options")
-"""The settings that a replay may have of its own; the log has settled all others."""
+"""The settings that a replay may change; all others are fixed by the log."""
 
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Which parts of the software the truth takes the place of."""
+    """The parts of the software that the truth replaces."""
 
     association: Association = "own"
-    """Whose matches: the back end's own gate, or the truth."""
+    """Data association: the back end's own, or the true one."""
     perfect_extraction: bool = False
-    """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
+    """Replace the extracted segments by true lines with noise of exactly the stated covariance."""
     perfect_odometry: bool = False
-    """The true motions in place of what the wheels reported; the stated covariance stays."""
+    """Replace the reported motions by the true ones; the stated covariance stays."""
     odometry: OdometrySource | None = None
-    """Who tells the motion between two scans; None for the same as when the run was driven."""
+    """Source of the motion between two scans; None for that of the run."""
 
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A run's own log with the truth beside it, and the settings that made it."""
+    """A run's own log with the truth, and its settings."""
 
     trial: TrialConfig
     recording: Recording
@@ -79,7 +79,7 @@ class RecordedRun:
     true_poses_world: Float[np.ndarray, "s 3"]
     true_face_of_beam: Int[np.ndarray, "s k"]
     cut_short: str = ""
-    """What ended the drive before its own end, in words."""
+    """Why the drive ended early, in words."""
 
 
 def read_run(log: Path) -> RecordedRun:
@@ -93,16 +93,16 @@ def read_run(log: Path) -> RecordedRun:
 
 
 def read_options(config: Path) -> ReplayOptions:
-    """Return the options of the replay that left a `config.json`, those by default for a run that drove."""
+    """Return the options of the replay in a `config.json`, or the default ones for an exploration."""
     said = read_config(config).replay
     if said is None:
         return ReplayOptions()
-    with told(config, "keep a run's files together, or make it anew"):
+    with told(config, "keep a run's files together, or repeat the run"):
         return fit(ReplayOptions, said, "replay")
 
 
 def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> RecordedRun:
-    """Return the run in the arrays of a `log.npz`; raises UsageError, in one line, where they make none."""
+    """Return the run in the arrays of a `log.npz`; raises UsageError if they are inconsistent."""
     try:
         recording = recording_of(arrays)
     except RecordingError as error:
@@ -110,19 +110,21 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
     missing = [name for name in TRUTH if name not in arrays]
     if missing:
         raise UsageError(
-            f"expected a log with its truth, found none of {', '.join(missing)}: replay a simulated run,"
+            f"expected a log with the truth, found none of {', '.join(missing)}: replay a simulated run,"
             " or a real robot's log itself"
         )
     poses, cov, faces = arrays["true_poses"], arrays["start_cov"], arrays["true_face_of_beam"]
     numbers = (poses, cov, arrays["start_pose"], arrays["true_faces"])
     known = faces.min(initial=-1) >= -1 and faces.max(initial=-1) < len(arrays["true_faces"])
     if not known or not all(within(values, MOST_M) for values in numbers) or not are_covariances(cov):
-        raise UsageError("expected a log with its truth, found one that no simulated run leaves: record the run anew")
+        raise UsageError(
+            "expected a log with the truth, found one that does not come from a simulated run: record it again"
+        )
     return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces)
 
 
 class ReplayedRobot(RecordedRobot):
-    """A recorded robot that goes on keeping the true record of what it plays back."""
+    """A recorded robot that also keeps the true record of the recording."""
 
     def __init__(self, run: RecordedRun, recording: Recording) -> None:
         super().__init__(recording)
@@ -131,7 +133,7 @@ class ReplayedRobot(RecordedRobot):
 
     @property
     def record(self) -> TrueRecord:
-        """What really happened, up to the last scan."""
+        """The truth up to the last scan."""
         return self._record
 
     def sense(self) -> Scan:
@@ -142,7 +144,7 @@ class ReplayedRobot(RecordedRobot):
         return super().sense()
 
     def drive(self, command: MotionCommand) -> Odometry:
-        """Go on to the next scan."""
+        """Go to the next scan."""
         odometry = super().drive(command)
         self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
         self._record.collisions += odometry.touched
@@ -191,7 +193,9 @@ def replay(
     scanner_world = scanner_poses(run.true_poses_world, config.robot.true_scanner)
     witness = Witness(truth_of(world, config.robot), scanner_world, run.true_face_of_beam)
     if len(witness.truth.faces) <= int(run.true_face_of_beam.max(initial=-1)):
-        raise UsageError(f"expected the world that the log was made in, found another {config.world}: bring it back")
+        raise UsageError(
+            f"expected the world in which the log was recorded, found that {config.world} has changed: restore it"
+        )
     chance = chance_in(world, config.seed)
     oracle = TrueAssociation(witness) if options.association == "true" else None
 
@@ -217,5 +221,5 @@ def replay(
 
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:
-    """Return a mapper that never forgets, cuts or merges a wall: with the true association nothing needs mending."""
+    """Return a mapper that never deletes, splits or merges a wall: with true association nothing needs repair."""
     return replace(config, walls=replace(config.walls, housekeeping=False), merging=None)

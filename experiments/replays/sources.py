@@ -1,4 +1,4 @@
-"""What `replay` takes: a simulated run's own log with its truth, or a real robot's log without."""
+"""The inputs of `replay`: a simulated run's log with the truth, or a real robot's log without it."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -17,7 +17,7 @@ from .real_log import RealRun, looked_over, mapped_real, replay_real, replayed_r
 from .replay import RecordedRun, ReplayOptions, replay, replayed
 
 RECORDED = "recorded"
-"""Among the options of a replay in `config.json`: how a real robot's log was taken."""
+"""Key of a real robot's log among the options of a replay in `config.json`."""
 
 
 def was_real(said: Any) -> bool:
@@ -35,12 +35,12 @@ class OwnLog:
 
     @property
     def title(self) -> str:
-        """World, seed and whose matches."""
+        """World, seed and association."""
         return f"{self.world.name}, seed {self.run.trial.seed}, replayed with {self.options.association} association"
 
     @property
     def scans(self) -> int:
-        """All that the log holds."""
+        """Number of scans."""
         return len(self.run.recording)
 
     def config(self, backend: str) -> dict[str, Any]:
@@ -53,12 +53,12 @@ class OwnLog:
 
     @property
     def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:
-        """Return the times of the scans, and where the odometry puts the robot at each."""
+        """Return the times of the scans and the odometry's pose at each."""
         recording = self.run.recording
         return recording.time_s, odometry_poses(self.run.true_poses_world[0], recording.odometry)
 
     def true_pose(self, step: Step) -> Float[np.ndarray, "3"]:
-        """Return where the robot was at a step."""
+        """Return the true pose at a step."""
         return np.asarray(self.run.true_poses_world[step.index])
 
 
@@ -70,21 +70,21 @@ class RealLog:
 
     @property
     def title(self) -> str:
-        """The log's name."""
+        """Name of the log."""
         return self.run.name
 
     @property
     def scans(self) -> int:
-        """Its keyframes."""
+        """Number of keyframes."""
         return len(self.run.log.recording)
 
     def config(self, backend: str) -> dict[str, Any]:
-        """Return the settings of the mapper, and how the log was taken."""
+        """Return the settings of the mapper, and how the log was read."""
         said = {name: value for name, value in asdict(self.run.options).items() if value is not None}
         return config_record(replayed_real(self.run, backend)) | {REPLAY: {RECORDED: said}}
 
     def go(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
-        """Map it, and look at it again."""
+        """Map it and refine the result offline, if asked for."""
         return replay_real(self.run, backend, watch)
 
     def mapped(self, backend: str, watch: Callable[[Step], None]) -> TrialResult:
@@ -92,14 +92,14 @@ class RealLog:
         return mapped_real(self.run, backend, watch)
 
     def looked_over(self, result: TrialResult) -> TrialResult:
-        """Look again at what was mapped."""
+        """Refine a result offline."""
         return looked_over(self.run, result)
 
     @property
     def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:
-        """Return the times of the scans, and where the odometry puts the robot at each."""
+        """Return the times of the scans and the odometry's pose at each."""
         return self.run.log.scan_time_s, self.run.log.poses_of_scans(self.run.wheels_alone)
 
     def wheels_pose(self, step: Step) -> Float[np.ndarray, "3"]:
-        """Return where wheel odometry puts the robot at a step."""
+        """Return the odometry's pose at a step."""
         return np.asarray(self.run.wheels_alone[step.index])

@@ -1,4 +1,4 @@
-"""A robot of which nobody knows the truth: it explores or is ridden, and is scored by what its map itself tells."""
+"""A robot without ground truth: it explores or plays a recording, and is scored from its map alone."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,22 +25,22 @@ from ..scoring.without_truth.unwitnessed import (
 from ..trial import Mission, TrialResult, bare_summary, ride
 
 START_SIGMAS = (1e-4, 1e-4, 1e-5)
-"""The first scan is the map's frame: the pose there is known, m m rad."""
+"""The first pose is the origin of the map and known exactly, m m rad."""
 
 
 class UnwitnessedRobot:
-    """Any robot, and a record of its drive that knows nothing of the truth."""
+    """Any robot, with a record of its drive that lacks the truth."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._record = robot, UnwitnessedRecord()
 
     @property
     def record(self) -> UnwitnessedRecord:
-        """What is known of what really happened: nothing."""
+        """Record of the truth: empty."""
         return self._record
 
     def sense(self) -> Scan:
-        """Return the scan at the present place."""
+        """Return the scan at the present pose."""
         scan = self._robot.sense()
         self._record.sensed(len(scan.ranges_m))
         return scan
@@ -51,7 +51,7 @@ class UnwitnessedRobot:
 
 
 def unwitnessed(config: TrialConfig, robot: Robot) -> Scenario:
-    """Return the scenario of a robot in a building that nobody drew; raises UsageError for names in no registry."""
+    """Return the scenario of a robot in an unknown building; raises UsageError for unknown names."""
     check(config)
     start, cov = np.zeros(3), np.diag(np.square(START_SIGMAS))
     strategy = None if config.strategy == STRATEGY_OF_REPLAYS else strategy_of(config.strategy)
@@ -69,9 +69,9 @@ def unwitnessed(config: TrialConfig, robot: Robot) -> Scenario:
 def run_unwitnessed(
     scenario: Scenario, watch: Callable[[Step], None], mission: Mission, recorded: RecordedLog | None = None
 ) -> TrialResult:
-    """Run a scenario without truth to its end, whatever that is, and return all that was computed.
+    """Run a scenario without ground truth to its end and return everything that was computed.
 
-    `recorded` is the log that the robot plays back; of a robot that drives itself its own steps are taken.
+    `recorded` is the log that the robot plays; for a robot that drives itself its own steps are used.
     """
     votes = NoVotes(no_truth(scenario.world))
     recorder = Recorder(scenario.robot, votes)
@@ -89,7 +89,7 @@ def run_unwitnessed(
 
 
 def _own_log(log: Log) -> RecordedLog:
-    """Return what a robot reported on its own drive."""
+    """Return the reports of a robot on its own drive."""
     return every_scan(
         Recording(
             log.time_s, log.bearings_rad, log.ranges_m, log.sigma_m, log.range_max_m, log.odometry, log.odometry_cov,
@@ -99,7 +99,7 @@ def _own_log(log: Log) -> RecordedLog:
 
 
 def every_scan(recording: Recording) -> RecordedLog:
-    """Return a recording as a log of which every scan is a keyframe."""
+    """Return a recording as a log in which every scan is a keyframe."""
     steps = len(recording)
     return RecordedLog(
         recording, recording.time_s, np.arange(steps), np.zeros((steps, 3)), np.zeros(steps), np.zeros(3)

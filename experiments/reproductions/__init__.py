@@ -1,4 +1,4 @@
-"""The paper's figures, one file each, and one line in the registry."""
+"""The paper's figures: one file for each, and one line in the registry."""
 
 from . import eq4, fig4, fig5, fig6, fig8, fig9, fig10, fig11, standing, table1
 from .reproduction import Entry, Reproduction

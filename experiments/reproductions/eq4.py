@@ -1,4 +1,4 @@
-"""Equation (4): r is measured from the world's origin, so that its uncertainty grows with the way to there."""
+"""Equation (4): r is measured from the world's origin, so that its uncertainty grows with the distance from it."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -37,7 +37,7 @@ VARIANTS = tuple((name, at_wall) for name in FILTERS for at_wall in (False, True
 
 
 def numbers(seed: int) -> Numbers:
-    """Return the sigmas of one wall, and what one ring ridden here and there gives."""
+    """Return the sigmas of one wall, and the results of one ring at two places."""
     return {_variant(*variant): _numbers(variant, [seed]) for variant in VARIANTS}
 
 
@@ -61,7 +61,7 @@ def _numbers(variant: tuple[str, bool], seeds: Iterable[int]) -> dict[str, Value
 
 
 def reproduce(seed: int) -> Reproduction:
-    """See one wall ever farther from the origin; then ride one ring beside the origin and 100 m from it."""
+    """Observe one wall at growing distances from the origin; then drive one ring near the origin and 100 m from it."""
     curves = {variant: _curve(*variant) for variant in VARIANTS}
     return Reproduction(
         "Equation (4): r and the way to the world's origin",
@@ -112,7 +112,7 @@ def _figure(curves: dict[tuple[str, bool], Float[np.ndarray, "d 3"]]) -> Figure:
     figure, axes = panels("Equation (4): one wall, seen once, ever farther from the world's origin", 1, 3, (3.7, 3.2))
     for column, (one, title) in enumerate(zip(axes, titles, strict=True)):
         for turn, ((name, at_wall), found) in enumerate(curves.items()):
-            # Most curves lie on each other: the first ones are drawn broad, so that they show under the last.
+            # Most curves coincide: the first ones are drawn wide, so that they remain visible below the last.
             width = 7.5 - 1.8 * (turn // 2)
             one.plot(
                 AWAY_M, found[:, column], "--" if at_wall else "-", linewidth=width, color=palette.of_backend(name)

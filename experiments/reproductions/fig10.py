@@ -1,4 +1,4 @@
-"""Figure 10: the trace of the pose covariance falls below its initial value, and a wall is entered a second time."""
+"""Figure 10: the trace of the pose covariance falls below its initial value, and a wall gets a duplicate."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,13 +24,13 @@ SAID: Said = {LEAST: "below 1", TWICE: "A and A*, among others", AWAY: "outside 
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what each back end makes of one drive there and back."""
+    """Return the results of each back end for one drive there and back."""
     config = there_and_back(seed)
     return {name: _numbers(name, config) for name in COMPARED}
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9 with an uncertain start and drive back there, until there is a duplicate wall."""
+    """Explore the world of figure 9 from an uncertain start and return, until there is a duplicate wall."""
     search = first_double(there_and_back(seed))
     ours = {name: _numbers(name, search.config) for name in COMPARED}
     ours[PAPER] |= {TRIED: search.tried, AWAY: None if search.double is None else search.double.sigmas_away}
@@ -70,7 +70,7 @@ def _figure(search: Search) -> Figure:
     figure, (trace, space, place) = panels(title, 1, 3, (4.3, 4.0))
     drive = watched(config)
     curves = {name: trace_over_start(replayed(config, name)) for name in COMPARED}
-    words = "way driven, m", "trace of the pose covariance over the start's"
+    words = "path length, m", "trace of the pose covariance over the start's"
     paint_curves(trace, log_of(drive.made).path_length_m, curves, words)
     trace.axhline(1.0, color=palette.INK, linewidth=0.8, linestyle="--")
     trace.set_title("(a) no look tells where the world lies: below 1 is wrong", fontsize=8, loc="left")
@@ -89,7 +89,7 @@ def _figure(search: Search) -> Figure:
 
 
 def _paint_space(axes: Axes, double: Double) -> None:
-    """Paint the ellipses of A, and of A* as the paper's filter entered it, at the step when it did."""
+    """Draw the ellipses of A and A* at the step at which the paper's filter started A*."""
     first, second = double.space.rows(double.ids)
     middle = double.space.ends_world[first].mean(axis=0)
     theirs = double.space.about(middle)

@@ -1,4 +1,4 @@
-"""Figure 11: the robot repasses its start with a smaller uncertainty than it had there."""
+"""Figure 11: the robot passes its start again with less uncertainty than it had there."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,17 +18,17 @@ REPASSING = "trace on repassing the start, over the start's"
 LARGEST = "largest trace on the way, over the start's"
 SAID: Said = {REPASSING: "below 1", LARGEST: "above that of the repassing"}
 EVERY = 12
-"""An ellipse at every so many steps."""
+"""Steps between two ellipses."""
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what each back end makes of one drive there and back."""
+    """Return the results of each back end for one drive there and back."""
     config = there_and_back(seed)
     return {name: _numbers(replayed(config, name)) for name in COMPARED}
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9 with an uncertain start, drive back there, and compare the uncertainty."""
+    """Explore the world of figure 9 from an uncertain start, return to it, and compare the uncertainties."""
     config = there_and_back(seed)
     results = {name: replayed(config, name) for name in COMPARED}
     return Reproduction(
@@ -41,7 +41,7 @@ def reproduce(seed: int) -> Reproduction:
 
 
 def repassed(result: TrialResult) -> int | None:
-    """Return the step nearest to the start after the robot has been away, None where it never came back."""
+    """Return the step nearest to the start after the robot has been away; None if it never returned."""
     off = np.hypot(*(log_of(result).true_world - log_of(result).true_world[0])[:, :2].T)
     away = np.flatnonzero(off > AWAY_M)
     back = np.flatnonzero((np.arange(len(off)) > (away[0] if len(away) else len(off))) & (off <= REPASSED_M))

@@ -1,4 +1,4 @@
-"""Figure 4: one cycle with a dead end, its partial visibility graph, and a route of walls planned by it and driven."""
+"""Figure 4: one cycle with a dead end, its partial visibility graph, and a planned and driven route of walls."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -29,12 +29,12 @@ RADIUS_POINTS = 6.2
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what one drive with noise gives."""
+    """Return the results of one drive with noise."""
     return {PAPER: _numbers(_driven(seed, errorless=False))}
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the environment of figure 4 without errors, then plan from wall 8 to wall 16 over the graph and drive."""
+    """Explore the environment of figure 4 without noise, then plan from wall 8 to wall 16 on the graph and drive."""
     drive = _driven(seed, errorless=True)
     return Reproduction(
         "Figure 4: a partial visibility graph, and a route planned by it",
@@ -75,7 +75,7 @@ def _numbers(drive: RouteDrive) -> dict[str, Value]:
 
 
 def _words(drive: RouteDrive, walls: tuple[int, ...]) -> str:
-    """Return walls by their numbers in the paper; one that has none there has its own in brackets."""
+    """Return walls by their numbers in the paper, or by their own in brackets if they have none there."""
     return ", ".join(name for name, _ in groupby(drive.names.get(wall, f"({wall})") for wall in walls))
 
 
@@ -102,7 +102,7 @@ def _figure(drive: RouteDrive) -> Figure:
 
 
 def _paint_place(axes: Axes, drive: RouteDrive, picture: GraphPicture) -> None:
-    """Paint the environment with its walls, the way of the exploration, and that from wall to wall."""
+    """Draw the environment with its walls, the path of the exploration, and the path from wall to wall."""
     for index, ring in enumerate(picture.true_floor):
         axes.fill(*ring.T, facecolor=palette.SOLID if index else palette.FLOOR, edgecolor=palette.SOLID, linewidth=5.0)
     axes.plot(*picture.map.ends_world.transpose(2, 1, 0), color=palette.INK, linewidth=1.8, solid_capstyle="round")

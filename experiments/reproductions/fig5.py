@@ -1,4 +1,4 @@
-"""Figure 5: the nearest open end from where the robot is, a search depth first."""
+"""Figure 5: the open end nearest to the robot, a depth-first search."""
 
 from .reproduction import Numbers, Reproduction, Said
 from .runs.drives import driven
@@ -8,12 +8,12 @@ SAID: Said = {"passes by the start": 1}
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what one drive with noise gives."""
+    """Return the results of one drive with noise."""
     return traversal_numbers(noisy(NEAREST_ROBOT, seed))
 
 
 def reproduce(_seed: int) -> Reproduction:
-    """Explore the world of figure 5 by `nearest-robot`, without errors."""
+    """Explore the world of figure 5 by `nearest-robot`, without noise."""
     made = driven(NEAREST_ROBOT)
     length = made.summary["path_length_m"]
     return Reproduction(

@@ -1,4 +1,4 @@
-"""Figure 6: the open end nearest to the start, a pendulum about it."""
+"""Figure 6: the open end nearest to the start, which makes the robot swing about it like a pendulum."""
 
 from ..scenario import TrialConfig
 from .reproduction import Numbers, Reproduction, Said
@@ -10,7 +10,7 @@ SAID: Said = {RATIO: "about 3", "passes by the start": "regularly"}
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what one drive with noise gives, beside figure 5's with the same seed."""
+    """Return the results of one drive with noise, and of figure 5's with the same seed."""
     return _numbers(noisy(NEAREST_START, seed), noisy(NEAREST_ROBOT, seed))
 
 
@@ -20,7 +20,7 @@ def _numbers(config: TrialConfig, other: TrialConfig) -> Numbers:
 
 
 def reproduce(_seed: int) -> Reproduction:
-    """Explore the world of figure 5 by `nearest-start`, without errors, and compare the way driven."""
+    """Explore the world of figure 5 by `nearest-start`, without noise, and compare the path lengths."""
     made = driven(NEAREST_START)
     ours = _numbers(NEAREST_START, NEAREST_ROBOT)
     length, times = made.summary["path_length_m"], next(iter(ours.values()))[RATIO]

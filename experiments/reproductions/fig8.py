@@ -1,4 +1,4 @@
-"""Figure 8: the cyclic environment of 7 m x 7 m, explored and mapped on its own."""
+"""Figure 8: the cyclic environment of 7 m x 7 m, explored and mapped."""
 
 from chainslam.viz.figures.panels import map_panels
 
@@ -14,7 +14,7 @@ SAID: Said = {
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what each back end makes of one drive."""
+    """Return the results of each back end for one drive."""
     return {name: map_numbers(result) for name, result in compared(drive_by_walls("paper-fig8", seed=seed)).items()}
 
 

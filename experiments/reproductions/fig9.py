@@ -13,7 +13,7 @@ from .runs.drives import PAPER, drive_by_walls, last_map, log_of, mark_double, s
 from .runs.maps import compared, map_numbers, map_words, mark
 
 STAGES_M = (4.0, 12.0)
-"""Path driven at the pictures before the obstacle's chain is closed."""
+"""Path lengths of the pictures before the obstacle's chain is closed."""
 
 TRIED = "seeds tried until there is a duplicate wall"
 SAID: Said = {
@@ -25,12 +25,12 @@ SAID: Said = {
 
 
 def numbers(seed: int) -> Numbers:
-    """Return what each back end makes of one drive."""
+    """Return the results of each back end for one drive."""
     return {name: map_numbers(result) for name, result in compared(drive_by_walls("paper-fig9", seed=seed)).items()}
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Explore the world of figure 9 until there is a duplicate wall, show the map as it grows, and by each back end."""
+    """Explore the world of figure 9 until there is a duplicate wall; show the growing map, and every back end's."""
     search = first_double(drive_by_walls("paper-fig9", seed=seed))
     config, double = search.config, search.double
     results = compared(config)
@@ -58,7 +58,7 @@ def reproduce(seed: int) -> Reproduction:
 
 
 def _stages(config: TrialConfig, double: Double | None) -> list[tuple[SmallMap, Step]]:
-    """Return the map at some places of the path, where the first chain was closed, and where a wall has a duplicate."""
+    """Return the map at some path lengths, at the first closed chain, and at a duplicate wall."""
     drive = watched(config)
     log = log_of(drive.made)
     wanted = {int(np.searchsorted(log.path_length_m, at)): "" for at in STAGES_M if at < log.path_length_m[-1]}

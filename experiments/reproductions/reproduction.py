@@ -1,4 +1,4 @@
-"""What the reproduction of one of the paper's figures is: its picture, and the numbers beside the paper's."""
+"""The reproduction of one of the paper's figures: its picture, and numbers next to the paper's."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,33 +7,33 @@ from typing import Any
 from matplotlib.figure import Figure
 
 Value = float | int | str | None
-"""None where there is nothing to measure."""
+"""None if there is nothing to measure."""
 Numbers = dict[str, dict[str, Value]]
-"""For each back end (or variant of one) its quantities."""
+"""Quantities of each back end, or variant of one."""
 Said = Mapping[str, Value]
-"""What the paper says, for those quantities of which it says something."""
+"""The paper's values, for those quantities that it reports."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Numbers by quantity (its unit in its name) and the picture."""
+    """Numbers by quantity (with its unit in the name) and the picture."""
 
     title: str
     paper: Said
     ours: Mapping[str, Mapping[str, Value]]
-    """For each back end (or variant of one) its quantities."""
+    """Quantities of each back end, or variant of one."""
     figure: Figure
     notes: tuple[str, ...] = ()
-    """What a reader of the numbers has to know."""
+    """Notes for the reader of the numbers."""
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """All quantities, ours first, in the order in which they come."""
+        """All quantities in order, ours first."""
         names = [name for values in self.ours.values() for name in values]
         return tuple(dict.fromkeys([*names, *self.paper]))
 
     def record(self, command: str) -> dict[str, Any]:
-        """Return what goes into the JSON file, with the command that makes it."""
+        """Return the content of the JSON file, with the command that makes it."""
         return {
             "title": self.title,
             "command": command,
@@ -49,6 +49,6 @@ class Entry:
 
     make: Callable[[int], Reproduction]
     numbers: Callable[[int], Numbers]
-    """What one drive with a seed gives, for tables over many seeds."""
+    """Results of one drive with a seed, for tables over many seeds."""
     paper: Said
     about: str

@@ -1,4 +1,4 @@
-"""Julier and Uhlmann's robot (2001): it stands still and looks, and must not learn where in the world it stands."""
+"""The robot of Julier and Uhlmann (2001): it stands still and observes, and must not learn its place in the world."""
 
 import numpy as np
 from jaxtyping import Float
@@ -20,12 +20,12 @@ Curves = dict[str, tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]]
 
 
 def numbers(seed: int) -> Numbers:
-    """Return how sure each back end becomes of its pose."""
+    """Return how certain each back end becomes of its pose."""
     return {name: _numbers(*found) for name, found in _curves("large", seed).items()}
 
 
 def reproduce(seed: int) -> Reproduction:
-    """Look at the same walls from one place again and again, with an uncertain start and with a sure one."""
+    """Observe the same walls from one place again and again, with an uncertain and with a certain start."""
     large, small = (_curves(p0, seed) for p0 in ("large", "small"))
     return Reproduction(
         "A robot that stands still and looks (Julier and Uhlmann 2001)",

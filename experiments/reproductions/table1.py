@@ -67,7 +67,7 @@ def reproduce(seed: int) -> Reproduction:
 
 
 def _table(runs: list[dict[str, dict[str, float | None]]], pairs: tuple[str, ...], key: str) -> np.ndarray:
-    """Return one row for each pair and one column for each drive, NaN where a corner was not found."""
+    """Return one row for each pair and one column for each drive, NaN for a missing corner."""
     return np.array([[run[pair][key] for run in runs] for pair in pairs], dtype=np.float64)
 
 

@@ -1,1 +1,1 @@
-"""Where truth and estimate meet: every number of summary.json."""
+"""Scores: where truth and estimate meet. Every number of summary.json is computed here."""

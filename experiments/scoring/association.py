@@ -1,4 +1,4 @@
-"""Which true face each mapped line came from, told by the beams; never by the nearest wall."""
+"""The true face of each mapped line, decided by its beams and never by the nearest wall."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ from .beam_votes import ONE_FACE_SHARE, UNLABELLED, vote
 from .truth import Truth
 
 OVERLAP_M = 0.2
-"""Two lines of one wall that overlap over this length are one too many."""
+"""Two lines of one wall that overlap by this length are duplicates."""
 NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 
@@ -27,7 +27,7 @@ class Votes:
     fused: list[tuple[int, int]] = field(default_factory=list)
     """(line id, true wall) of each segment fused, `UNLABELLED` where its beams came from several walls."""
     fused_of_few_beams: list[tuple[int, int]] = field(default_factory=list)
-    """The same of segments of few beams: they move the estimate, but say of no line which wall it is."""
+    """The same for segments of few beams, which update the estimate but do not label a line."""
     merges: int = 0
     false_merges: int = 0
     """Of these, pairs of lines each of which has `ONE_FACE_SHARE` of its beams from a wall of its own."""
@@ -61,12 +61,12 @@ class Votes:
         theirs, none = self.beams.get(drop), np.zeros(len(self.truth.faces), dtype=np.int64)
         ours = self.beams.setdefault(keep, none)
         ours += 0 if theirs is None else theirs
-        # Ids that were merged into the dropped one before go along.
+        # Ids that were merged into the dropped one earlier come along.
         same = [line for line, beams in self.beams.items() if theirs is not None and beams is theirs]
         self.beams.update(dict.fromkeys([drop, *same], ours))
 
     def face_of(self, line_id: int) -> int:
-        """Return the face that stands for a line: of the wall with most of its beams, the face with most; or -1."""
+        """Return the face that represents a line: the face with most beams, of the wall with most beams; or -1."""
         votes = self.beams.get(line_id)
         if votes is None or not votes.any():
             return UNLABELLED
@@ -74,16 +74,16 @@ class Votes:
         return int(np.argmax(np.where(self.truth.walls == per_wall.argmax(), votes, -1)))
 
     def faces_of(self, ids: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the face of each line, -1 where no beam tells."""
+        """Return the face of each line, -1 without any beam."""
         return np.array([self.face_of(int(i)) for i in ids], dtype=np.int64)
 
     def walls_of(self, ids: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the true wall of each line, -1 where no beam tells."""
+        """Return the true wall of each line, -1 without any beam."""
         faces = self.faces_of(ids)
         return np.where(faces >= 0, self.truth.walls[faces], UNLABELLED)
 
     def _clear_wall_of(self, line_id: int) -> int:
-        """Return the wall that a line is of by the rule for segments, or `UNLABELLED`."""
+        """Return the wall of a line by the rule for segments, or `UNLABELLED`."""
         beams = self.beams.get(line_id)
         if beams is None or not beams.any():
             return UNLABELLED
@@ -101,7 +101,7 @@ class Votes:
     def _false(self, fused: list[tuple[int, int]]) -> int:
         ids = np.array(sorted(self.beams), dtype=np.int64)
         label = dict(zip(ids.tolist(), self.walls_of(ids).tolist(), strict=True))
-        # A line that took the place of another has no beams of its own until it is seen again.
+        # A line that replaced another has no beams of its own until it is observed again.
         return sum(UNLABELLED not in (wall, of := label.get(line, UNLABELLED)) and wall != of for line, wall in fused)
 
 

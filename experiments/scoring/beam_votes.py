@@ -1,4 +1,4 @@
-"""Which true wall a segment was seen on: its beams vote."""
+"""The true wall of a segment, by the vote of its beams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ UNLABELLED = -1
 
 @dataclass(frozen=True)
 class BeamVote:
-    """What the beams of one segment say."""
+    """The votes of a segment's beams."""
 
     faces: Int[np.ndarray, " b"]
     """The true face of each beam that met one."""

@@ -1,4 +1,4 @@
-"""How far scans lay from where the estimate put them, without any truth: what a robot can watch on its way."""
+"""Innovation statistics, which need no truth: what a robot can monitor while it drives."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -37,7 +37,7 @@ def share_in_own_band(values: Sequence[float], dofs: Sequence[int]) -> float:
 
 
 def innovation_scores(log: Log) -> dict[str, Any]:
-    """Return the keys of `summary.json` that tell what the robot itself noticed of its estimate."""
+    """Return the innovation statistics for `summary.json`."""
     total = int(log.nis_dof.sum())
     return {
         "nis": float(log.nis.sum()) / total if total else None,

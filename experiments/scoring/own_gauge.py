@@ -1,7 +1,8 @@
-"""How wrong a map is in itself: a common shift and turn of all its walls is taken out exactly.
+"""The error of a map after gauge alignment: a common rigid motion of all walls is removed exactly.
 
-No scan can tell where the world lies, so what a map knows is its shape. Told against the robot's last pose the shape's
-error is right to first order only: a robot that ends lost by tens of degrees makes a good map look hopeless.
+The pose of the whole map in the world is unobservable, so a map is judged by its shape. Relative to the robot's last
+pose, the error of the shape is only correct to first order: with a final heading error of tens of degrees a good map
+would seem inconsistent.
 """
 
 from dataclasses import dataclass
@@ -14,26 +15,26 @@ from chainslam.slam.geometry.lines import normals
 from chainslam.slam.geometry.poses import J, to_robot, wrap
 
 DAMPING_MAX = 1e6
-"""With so much damping, in units of the squared columns, no step is long enough to make the error less: it is least."""
+"""With this damping, in units of the squared columns, no step reduces the error further: it is minimal."""
 
 
 @dataclass(frozen=True)
 class OwnGauge:
-    """The error of some walls, apart from where their frame lies."""
+    """The error of some walls after gauge alignment."""
 
     squared: float
     """Squared error of the shape in units of its covariance: chi-square with `dof` degrees of freedom."""
     dof: int
     frame_world: Float[np.ndarray, "3"]
-    """The motion (m, m, rad) about the world's origin that carries the true walls onto the map."""
+    """The motion (m, m, rad) about the world's origin that moves the true walls onto the map."""
     shift_m: float
-    """How far it carries the middle of the walls."""
+    """Displacement of the middle of the walls by this motion."""
     frame_squared: float
     """Squared error of the frame in units of its covariance: 3 degrees of freedom."""
 
     @property
     def anees(self) -> float | None:
-        """The squared error over its degrees of freedom; None for walls that have no shape, as a lone one."""
+        """The squared error over its degrees of freedom; None for walls without a shape, such as a single one."""
         return self.squared / self.dof if self.dof > 0 else None
 
 
@@ -45,8 +46,8 @@ def own_gauge(
 ) -> OwnGauge:
     """Return the error of walls (alpha rad, d m) about their anchors against the true lines (alpha rad, r m).
 
-    `cov` (s = 2 m) is that of plain errors. The frame is the motion g that makes e(g)' P^-1 e(g) least, as if nothing
-    were known of it beforehand. Raises numpy.linalg.LinAlgError where P is not positive definite.
+    `cov` (s = 2 m) is that of plain errors. The frame is the motion g that minimises e(g)' P^-1 e(g), without prior
+    knowledge of it. Raises numpy.linalg.LinAlgError if P is not positive definite.
     """
     walls = (means, anchors_world, true_lines_world, np.linalg.inv(np.linalg.cholesky(cov)))
     turn = float(np.angle(np.mean(np.exp(1j * (means[:, 0] - true_lines_world[:, 0])))))
@@ -58,8 +59,8 @@ def own_gauge(
     frame = np.array([start[0], start[1], wrap(start[2])])
     error = _off(frame, *walls)
     rank = np.linalg.matrix_rank(_by_motion(true_lines_world[:, 0] + frame[2], anchors_world - frame[:2], walls[-1]))
-    # The covariance is stated where the walls are estimated. At the moved truth, millimetres beside, a heading that is
-    # known to ten degrees would seem to be known to a twentieth of one.
+    # The covariance must be evaluated at the estimated walls. Evaluating it at the true walls, only millimetres away,
+    # would understate a heading uncertainty of 10 degrees by a factor of 200.
     xi = _by_motion(means[:, 0], anchors_world, walls[-1]) @ pose_errors(frame[None], np.zeros((1, 3)))[0]
     middle = anchors_world.mean(axis=0)
     shift_m = float(np.hypot(*(middle - to_robot(middle, frame))))
@@ -98,7 +99,7 @@ def _off(
     true_lines_world: Float[np.ndarray, "m 2"],
     white: Float[np.ndarray, "s s"],
 ) -> Float[np.ndarray, " s"]:
-    """Return the whitened errors (s,) once the truth is moved by the frame."""
+    """Return the whitened errors (s,) after the truth is moved by the frame."""
     alpha = true_lines_world[:, 0] + frame_world[2]
     n = normals(alpha)
     d = true_lines_world[:, 1] + n @ frame_world[:2] - np.vecdot(n, anchors_world)

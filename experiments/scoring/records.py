@@ -1,4 +1,4 @@
-"""What a trial keeps of every step, as arrays; truth and estimate side by side."""
+"""Arrays over the steps of a trial, with truth and estimate side by side."""
 
 import sys
 from dataclasses import dataclass, field, replace
@@ -17,17 +17,17 @@ from ..scenario import WitnessedRobot
 from .association import Votes
 
 EVERY_M = 1.0
-"""Metres driven between two sketches of the map."""
+"""Path length between two samples of the map."""
 
 
 @dataclass(frozen=True)
 class Route:
-    """A sequence of walls that was planned."""
+    """A planned sequence of walls."""
 
     step: int = 0
-    """At which it was planned first."""
+    """Step at which it was planned first."""
     walls: tuple[int, ...] = ()
-    """Ids, in order; a wall that was merged since has the id of what is left of it."""
+    """Ids, in order; a wall that was merged since has the id of the merged one."""
 
 
 @dataclass(frozen=True)
@@ -36,28 +36,28 @@ class Log:
 
     time_s: Float[np.ndarray, " s"]
     scan_start_s: Float[np.ndarray, " s"]
-    """When the first beam of each scan was taken; NaN where nobody told."""
+    """Time of the first beam of each scan; NaN if unknown."""
     bearings_rad: Float[np.ndarray, " k"]
-    """Of the scan with the most beams."""
+    """Bearings of the scan with most beams."""
     ranges_m: Float[np.ndarray, "s k"]
-    """NaN after the last beam of a scan that has fewer."""
+    """NaN after the last beam of a scan with fewer."""
     sigma_m: Float[np.ndarray, " k"]
     sigma_share: float
     resolution_m: float
     range_max_m: float
     odometry: Float[np.ndarray, "s 3"]
-    """Motion that led to each step as the wheels reported it, robot frame before the motion, m m rad."""
+    """Motion before each step by the odometry, in the robot frame before the motion, m m rad."""
     odometry_cov: Float[np.ndarray, "s 3 3"]
     heard: Float[np.ndarray, "s 3"]
-    """The same motions as the mapper heard of them: from the wheels, or from the scans."""
+    """The same motions as the mapper received them: from odometry, or from scan matching."""
     heard_cov: Float[np.ndarray, "s 3 3"]
     touched: Bool[np.ndarray, " s"]
-    """Whether the body met something on the way to each step."""
+    """Whether the body touched something before each step."""
     estimated_world: Float[np.ndarray, "s 3"]
-    """The estimate available at that step."""
+    """Estimate available at that step."""
     estimated_cov: Float[np.ndarray, "s 3 3"]
     from_start_world: Float[np.ndarray, "s 3"]
-    """The estimate as it would be had the start been known (`from_start.py`); NaN where that could not be told."""
+    """Estimate as if the start had been known (`from_start.py`); NaN if it could not be computed."""
     from_start_cov: Float[np.ndarray, "s 3 3"]
     true_world: Float[np.ndarray, "s 3"]
     face_of_beam: Int[np.ndarray, "s k"]
@@ -71,28 +71,28 @@ class Log:
     seconds: Float[np.ndarray, " s"]
     """Wall-clock time of each step, sense to command."""
     planning_seconds: Float[np.ndarray, " s"]
-    """Processor time of each step's decisions."""
+    """Processor time of each step's planning."""
     nis: Float[np.ndarray, " s"]
     """Normalised innovation squared of the matches that localised the robot."""
     nis_dof: Int[np.ndarray, " s"]
-    """Its degrees of freedom; 0 where nothing localised it."""
+    """Its degrees of freedom; 0 if no match localised the robot."""
     unstated_motion: Bool[np.ndarray, " s"]
     """Whether the scan showed a motion that the odometry had not reported."""
     is_lost: Bool[np.ndarray, " s"]
-    """Whether the scan fitted nowhere and was not taken in."""
+    """Whether the scan fitted nowhere and was not used."""
     wheel_noise_factor: Float[np.ndarray, " s"]
-    """How many times as large as stated the wheels' noise was taken to be."""
+    """Factor on the stated noise of the wheels."""
     curved_beams: Int[np.ndarray, " s"]
-    """How many beams of each scan lie on something curved."""
+    """Number of beams of each scan on something curved."""
     own_beams: Int[np.ndarray, " s"]
-    """How many beams of each scan ended on the robot itself."""
+    """Number of beams of each scan that hit the robot itself."""
     route_walls: Int[np.ndarray, " s"]
-    """How many walls the planned sequence holds; 0 without one."""
+    """Number of walls in the planned sequence; 0 without one."""
     behaviours: tuple[str, ...]
-    """What the robot was doing, a word a step."""
+    """Behaviour of the robot, one word for each step."""
     reasons: tuple[str, ...]
     longest_route: Route = Route()
-    """The first one of the most walls."""
+    """The first route with the most walls."""
     fans: Float[np.ndarray, "s 3"] | None = None
     """As `Recording.fans`: the beams of each scan, where they differ."""
 
@@ -102,7 +102,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Sketch:
-    """The walls of the map when the robot had driven so far."""
+    """The walls of the map at a given path length."""
 
     path_length_m: float
     ends_world: Float[np.ndarray, "n 2 2"]
@@ -111,14 +111,14 @@ class Sketch:
 
 @dataclass
 class Recorder:
-    """Gathers a run while it goes on, so that whatever ends it leaves everything up to then."""
+    """Collects a run while it goes on, so that everything is kept however it ends."""
 
     robot: WitnessedRobot
     votes: Votes
     from_start: FromStart = as_it_is
     last: Step | None = None
     joint: Joint | None = None
-    """Pose and all lines at the last step; None where the back end could no longer tell."""
+    """Pose and all lines at the last step; None if the back end could not compute them."""
     sketches: list[Sketch] = field(default_factory=list)
     """Of the map, every `EVERY_M` metres and at the last step."""
     longest_route: Route = Route()
@@ -130,7 +130,7 @@ class Recorder:
         return len(self._columns)
 
     def add(self, step: Step) -> None:
-        """Keep one step and the truth of the same moment; raises ValueError if scans and steps have parted."""
+        """Record one step and the truth at the same time; raises ValueError if scans and steps do not correspond."""
         record = self.robot.record
         if len(record.poses_world) != len(self) + 1:
             raise ValueError(
@@ -188,13 +188,13 @@ class Recorder:
         )
 
     def close(self) -> None:
-        """Ask the last belief for its joint covariance, while its back end has not moved on."""
+        """Ask the last belief for its joint covariance, while it is still valid."""
         if self.last is None:
             return
         self.sketches.append(_sketch(self.last))
         try:
             self.joint = self.last.map.belief.joint(self.last.map.ids)
-        except Exception:  # whatever a failing back end raises must not cost the results so far
+        except Exception:  # errors of the back end must not cost the results so far
             self.joint = None
 
     def log(self) -> Log:

@@ -1,8 +1,8 @@
-"""Intervals and tests that count runs, not steps, and buildings where a statement is to hold for others.
+"""Intervals and tests over runs, not steps; and over buildings, for statements about other buildings.
 
 By run: a studentised bootstrap of whole runs within each building (Efron and Tibshirani, An Introduction to the
 Bootstrap, 1993, section 12.5). By building: Student's t over the buildings' means. Both hold their level with ten
-skewed values (`studies.results.levels`); below five values there is none.
+skewed values (`studies.results.levels`); with fewer than five values there is no interval.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,9 @@ Clustered = Mapping[tuple[str, int], float]
 DRAWS = 4000
 LEVEL = 0.95
 LEAST = 5
-"""Fewer runs, or fewer buildings, than this make no interval."""
+"""Below this number of runs or buildings there is no interval."""
 FEW_RUNS = 10
-"""Nothing is concluded from fewer runs than this, though an interval is told."""
+"""No conclusion is drawn from fewer runs, even though an interval is computed."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def _studentised(
     t[flat] = np.copysign(np.inf, shift[flat])
     t[flat & (shift == 0.0)] = 0.0
     tails = np.quantile(t, [0.5 * (1 - LEVEL), 0.5 * (1 + LEVEL)], method="inverted_cdf")
-    # Of values most of which are one and the same, many resamples have no spread and so no t.
+    # If most values are identical, many resamples have no spread and hence no t.
     student = float(stdtrit(stated.dof, 0.5 * (1 + LEVEL)))
     low, high = np.where(np.isfinite(tails), tails, [-student, student])
     middle = float(np.concatenate(groups).mean())

@@ -90,12 +90,12 @@ def nees_of_poses(
 
 
 def odometry_path(log: Log) -> Float[np.ndarray, "s 3"]:
-    """Return where the odometry alone, from the true start on, say the robot was."""
+    """Return the path of the odometry alone, from the true start."""
     return odometry_poses(log.true_world[0], log.odometry)
 
 
 def odometry_poses(start_world: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "s 3"]:
-    """Return the poses from a start on by the wheels' motions alone; the first motion led to the start."""
+    """Return the poses from a start by the odometry alone; the first motion ends at the start."""
     poses = [start_world]
     for motion in odometry[1:]:
         poses.append(compose(poses[-1], motion))
@@ -152,7 +152,7 @@ def summarise(
 
 
 def range_scores(step: Step, log: Log) -> dict[str, Any]:
-    """Return what the robot found out about its ranges, and what share of them is of its own body, or curved."""
+    """Return the calibration of the ranges, and the shares of beams on the robot's own body and on curves."""
     errors, returns = step.range_errors, np.count_nonzero(np.isfinite(log.ranges_m[:SCANS]))
     return {
         "range_bias_m": errors.bias_m,
@@ -165,7 +165,7 @@ def range_scores(step: Step, log: Log) -> dict[str, Any]:
 
 
 def _return(log: Log, home_m: float) -> dict[str, Any]:
-    """Return how far from its start the robot is at the end, m: as it believes, and truly."""
+    """Return the distance from the start at the end, m: estimated and true."""
     believed, true = (float(np.hypot(*(p[-1] - p[0])[:2])) for p in (log.estimated_world, log.true_world))
     return {"reached": believed <= home_m, "distance_m": believed, "distance_true_m": true}
 
@@ -234,10 +234,10 @@ def _map_scores(
 def map_error(
     votes: Votes, ids: Int[np.ndarray, " n"], joint: Joint | None, among: Bool[np.ndarray, " n"]
 ) -> OwnGauge | None:
-    """Return the error of the chosen walls in their own gauge; None where there is none to tell.
+    """Return the error of the chosen walls after gauge alignment; None if it cannot be computed.
 
-    Each wall is held against the true face from which most of its beams came; duplicates stay, and a covariance that
-    is not positive definite gives None instead of a pseudo-inverse.
+    Each wall is compared with the true face from which most of its beams came. Duplicates are kept, and a covariance
+    that is not positive definite gives None instead of a pseudo-inverse.
     """
     rows = np.flatnonzero(among)
     if joint is None or not len(rows):

@@ -1,4 +1,4 @@
-"""The true walls of a world as scores need them; built once per world."""
+"""The true walls of a world for the scores, computed once per world."""
 
 from dataclasses import dataclass
 from functools import lru_cache

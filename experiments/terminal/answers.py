@@ -1,4 +1,4 @@
-"""What a command found, as data beside what it prints: `--json` prints it in place of the words, `--quiet` nothing."""
+"""Results of a command as data, next to its printed output: `--json` prints them instead, `--quiet` prints nothing."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class Output(Enum):
-    """What of a command goes to standard output."""
+    """What a command writes to standard output."""
 
     WORDS = "words"
     JSON = "json"
@@ -21,18 +21,18 @@ _QUIET: list[bool] = [False]
 
 
 def found(**values: Any) -> None:
-    """Keep what a command found, by name."""
+    """Record results of a command, by name."""
     _FOUND.update(values)
 
 
 def is_quiet() -> bool:
-    """Return whether nothing but errors is to be shown."""
+    """Return whether only errors are to be shown."""
     return _QUIET[0]
 
 
 @contextmanager
 def answering(output: Output, encode: Callable[[dict[str, Any]], bytes]) -> Iterator[None]:
-    """Show on standard output what is asked for of what a command prints and finds while the block runs."""
+    """Select what reaches standard output while the block runs: printed text, the results as JSON, or nothing."""
     _FOUND.clear()
     if output is Output.WORDS:
         yield

@@ -1,4 +1,4 @@
-"""Where tables, progress and single lines go: what a terminal shows is what was meant, whatever a name holds."""
+"""Output to the terminal, safe for any characters in names."""
 
 import sys
 
@@ -13,5 +13,5 @@ def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
 
 
 def say(words: str, *, stderr: bool = False) -> None:
-    """Print one line, with letters in place of what would steer the terminal: file names are the user's, too."""
+    """Print one line, with control characters replaced, since file names are the user's too."""
     print(one_line(words), file=sys.stderr if stderr else sys.stdout)

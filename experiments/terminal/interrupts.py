@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP as a wish to stop: the step in hand is finished, so that all results belong together."""
+"""Ctrl-C, SIGTERM and SIGHUP as requests to stop: the current step is finished, so that all results are consistent."""
 
 import gc
 import signal
@@ -12,16 +12,15 @@ from typing import Any
 INTERRUPTED = 130
 """The exit status of a command that was asked to stop."""
 STOPS = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP"}
-"""The signals that ask a command to stop, and what a person calls them."""
+"""The signals that request a stop, and their names for the user."""
 
 
 @contextmanager
 def first_interrupt_waits() -> Iterator[Callable[[], None]]:
-    """Keep the first of the signals until the yielded function is called, which raises it as KeyboardInterrupt.
+    """Defer the first signal until the yielded function is called, which raises it as KeyboardInterrupt.
 
-    A second one does what it did before, wherever the program is: it stops at once. Outside the main thread nothing
-    is changed, nor where a signal is ignored: a shell script starts so what is to run in the background, whatever is
-    stopped in front of it, and `nohup` what is to outlive its terminal.
+    A second signal acts at once, as usual. Nothing is changed outside the main thread, nor for signals that are
+    ignored: shell scripts ignore SIGINT for background jobs, and `nohup` ignores SIGHUP.
     """
     asked: list[int] = []
 
@@ -45,10 +44,10 @@ def first_interrupt_waits() -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def nothing_half_built_speaks() -> Iterator[None]:
-    """Let the signals leave objects half built in silence: what their finalizers then raise, Python would print.
+    """Suppress messages from finalizers of objects that a signal left half built, which Python would print.
 
-    SIGTERM and SIGHUP raise KeyboardInterrupt, too, as long as the block runs. Outside the main thread nothing is
-    changed, nor where a signal does something else than it does by itself.
+    While the block runs, SIGTERM and SIGHUP also raise KeyboardInterrupt. Nothing is changed outside the main thread,
+    nor for signals with a handler of their own.
     """
     hook, interrupted = sys.unraisablehook, False
 
@@ -74,7 +73,7 @@ def nothing_half_built_speaks() -> Iterator[None]:
 
 
 def too_late() -> None:
-    """Ignore the signals from now on: all is done, and one that comes while Python ends would change the status."""
+    """Ignore the signals from now on: everything is finished, and a late signal would change the exit status."""
     _set(dict.fromkeys(STOPS, signal.SIG_IGN))
 
 

@@ -1,4 +1,4 @@
-"""From the words of a command line to one command, with types and defaults as people read them."""
+"""Parse a command line into a command, with types and defaults as users read them."""
 
 import ast
 import inspect
@@ -19,26 +19,26 @@ from .answers import Output
 from .word_order import in_order, swallowed
 
 FOLDERS = ("out", "resume", "merge", "against")
-"""Options whose path is a folder's."""
+"""Options whose path is a folder."""
 WORDS = {int: "N", float: "NUMBER", str: "NAME", Path: "FILE"}
-"""What stands in the help for a value of each type."""
+"""Placeholder in the help for a value of each type."""
 NAMED = {"robot": "ROBOT", "start": "X Y [HEADING]", "scale": "METRES", "threshold": "LIGHTNESS", "dask": "ADDRESS"}
-"""The same, for options that want more than their type tells."""
+"""Placeholders of options that need more than their type says."""
 NO_NUMBER = re.compile(
     r"Error parsing (\S+): (?:no type matching \{None\}\|)?(INT|FLOAT|invalid literal for int|could not convert string)"
     r".*?(?:: |\[)'(.*)'\]?\.?$"
 )
-"""How tyro says that a value is no number."""
+"""tyro's message for a value that is not a number."""
 BOX = " |│╭╮╰╯─+\n"
-"""What tyro draws boxes with; where there are no letters for them, it draws lines of dashes."""
+"""Characters of tyro's boxes; where they are not available, it draws lines of dashes."""
 HELP = "-h", "--help"
 COMMON = "--json", "--quiet", "--plugin"
 MISSING = re.compile(r"Missing from [^:]*: (--\S+ \S+|\S+)|Missing value for argument '(\w+)'")
-"""How tyro says that a word is not there."""
+"""tyro's message for a missing word."""
 
 
 def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> tuple[Any, Output]:
-    """Return the command that some words name, and what it is to print; raises UsageError, in one line."""
+    """Return the command in a command line, and what to print; raises UsageError."""
     known: dict[str, Callable[..., Any]] = {name: typed(command) for name, command in commands.items()}
     asked = commands.get(words[0]) if words else None
     said = io.StringIO()
@@ -62,7 +62,7 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> tu
 
 
 def typed(command: type) -> type:
-    """Return a command as it is typed: its readable class, with the options that every command has."""
+    """Return the class that the command line is parsed into: readable, with the common options."""
     told = {"json": "Print the results as JSON only.", "quiet": "Print nothing but errors."}
     flag = cast(Any, tyro.conf.FlagCreatePairsOff)[bool]
     common: list[tuple[str, Any, Any]] = [
@@ -80,19 +80,19 @@ def typed(command: type) -> type:
 
 
 def _as(kind: type, made: Any) -> Any:
-    """Return a command, or a group of its options, as its own class in place of the readable one."""
+    """Convert a command, or a group of its options, from the readable class to its own."""
     groups, values = _groups(kind), {each.name: getattr(made, each.name) for each in fields(kind)}
     return kind(**{name: _as(groups[name], value) if name in groups else value for name, value in values.items()})
 
 
 def _groups(command: type) -> dict[str, type]:
-    """Return the fields of a command that are options of their own, which stand beside its others."""
+    """Return the fields of a command that are groups of options."""
     hints = get_type_hints(command)
     return {each.name: hints[each.name] for each in fields(command) if is_dataclass(hints[each.name])}
 
 
 def readable(command: type) -> type:
-    """Return a class of the same command whose help has N for a whole number, and no word for what is not set."""
+    """Return a class of the same command whose help has N for integers and no default for unset values."""
     hints, groups = get_type_hints(command, include_extras=True), _groups(command)
     about = _about(command) if hints else {}
     shown: list[tuple[str, Any, Any]] = [
@@ -103,13 +103,13 @@ def readable(command: type) -> type:
     for name, group in groups.items():
         kind, beside = readable(group), cast(Any, tyro.conf.OmitArgPrefixes)
         shown.append((name, beside[kind], field(default=kind())))
-    # What a group checks when it is made is told by the group itself, in our form.
+    # A group reports invalid values itself, in our format.
     own = {"__doc__": command.__doc__, "__post_init__": lambda self: None}
     return make_dataclass(command.__name__, shown, bases=(command,), frozen=True, namespace=own)
 
 
 def _about(command: type) -> dict[str, str]:
-    """Return what stands below each field; tyro itself would keep some of the source's line breaks."""
+    """Return the docstring of each field; tyro itself would keep some line breaks of the source."""
     body = cast(ast.ClassDef, ast.parse(inspect.getsource(command)).body[0]).body
     return {
         field.target.id: " ".join(words.value.value.split())
@@ -120,7 +120,7 @@ def _about(command: type) -> dict[str, str]:
 
 
 def _shown(field: Field[Any], hint: Any, about: str | None) -> Any:
-    """Return the annotation of a field with its words, that for its value and that for its default."""
+    """Return the annotation of a field with its help, placeholder and default."""
     parts: tuple[Any, ...] = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     if tyro.conf.Suppress in parts:
         return hint
@@ -135,7 +135,7 @@ def _shown(field: Field[Any], hint: Any, about: str | None) -> Any:
 
 
 def _word(name: str, kind: Any) -> str | None:
-    """Return what stands in the help for a value; None where tyro's own word is the one to read."""
+    """Return the placeholder in the help for a value; None to keep tyro's own."""
     if name in NAMED:
         return NAMED[name]
     if get_origin(kind) in (Union, types.UnionType):
@@ -166,7 +166,7 @@ def options_of(command: Any) -> list[str]:
 
 
 def _told(message: str, words: Sequence[str], command: type | None) -> str:
-    """Return tyro's message in our own form: what was expected, what was found, what is near to it."""
+    """Return tyro's message in our format: what was expected, what was found, a similar name."""
     if command is None:
         return (
             "expected a command, found none: see `chainslam --help`"
@@ -178,7 +178,7 @@ def _told(message: str, words: Sequence[str], command: type | None) -> str:
         rest = message.removeprefix("Unrecognized options: ").split(", ")
         options = [word.partition("=")[0] for word in rest if word.startswith("-")]
         if not options:
-            return f"expected no more words for {name}, found {rest[0]!r}: {see}"
+            return f"expected no further arguments for {name}, found {rest[0]!r}: {see}"
         near = did_you_mean(options[0], [*options_of(command), *COMMON, *HELP])
         return f"expected an option of {name}, found {options[0]}{near}: {see}"
     if missing := MISSING.match(message):
@@ -199,7 +199,7 @@ def _told(message: str, words: Sequence[str], command: type | None) -> str:
 
 
 def _first_words(boxed: str) -> str:
-    """Return the first words of a boxed message of tyro."""
+    """Return the first words of one of tyro's boxed messages."""
     title, *lines = [line.strip(BOX) if line.strip(f"{BOX}-") else "" for line in boxed.splitlines()]
     words = list(takewhile(bool, dropwhile(lambda line: not line, lines)))
     return " ".join(" ".join(words).split()) or title or "bad usage"

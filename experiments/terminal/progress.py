@@ -46,7 +46,7 @@ def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step]
                 bar.console.print(words)
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
             clock = timedelta(seconds=int(step.time_s))
-            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, robot's clock {clock}"
+            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, robot clock {clock}"
             bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch

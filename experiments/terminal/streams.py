@@ -1,4 +1,4 @@
-"""Standard output and standard error that last: whoever stops reading them, or a full disk, ends no command."""
+"""Output streams that never end a command: neither a closed pipe nor a full disk raises an error."""
 
 import errno
 import io
@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from typing import TextIO
 
 MOST_LETTERS = 600
-"""A message of more than this is cut in its middle: a name may have thousands of letters."""
+"""Longer messages are shortened in the middle, since a name may have thousands of characters."""
 
 
 class Lasting(io.RawIOBase):
-    """Writes to a file descriptor until that fails, and from then on to nobody."""
+    """Writes to a file descriptor until that fails, and then discards everything."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -32,7 +32,7 @@ class Lasting(io.RawIOBase):
         return os.isatty(self._descriptor)
 
     def write(self, content) -> int:  # type: ignore[no-untyped-def]
-        """Write what can be written, and say of all of it that it was."""
+        """Write as much as possible, and report all of it as written."""
         if self.problem is None:
             try:
                 return os.write(self._descriptor, content)
@@ -43,10 +43,10 @@ class Lasting(io.RawIOBase):
 
 @contextmanager
 def lasting_streams() -> Iterator[Lasting | None]:
-    """Give the process streams that take whatever is printed, and yield what became of standard output.
+    """Give the process streams that accept any output, and yield the state of standard output.
 
-    Streams that were closed lead nowhere, so that no file which is opened later gets their place. Those that somebody
-    else has put there are left alone; then None is yielded.
+    Closed streams are replaced by the null device, so that no file opened later takes their place. Streams that were
+    replaced by others are left alone; then None is yielded.
     """
     for descriptor in range(3):
         try:
@@ -72,13 +72,13 @@ def lasting_streams() -> Iterator[Lasting | None]:
 
 
 def _text(raw: Lasting, like: TextIO | None) -> io.TextIOWrapper:
-    # A name may hold bytes that are no letters, which a terminal still has to be told.
+    # A name may contain bytes that are not valid characters; the terminal shows them escaped.
     encoding = getattr(like, "encoding", None) or "utf-8"
     return io.TextIOWrapper(io.BufferedWriter(raw), encoding, "backslashreplace", line_buffering=True)
 
 
 def one_line(message: object) -> str:
-    """Return a message as a line of bounded length, with letters in place of what would move a cursor."""
+    """Return a message as one line of bounded length, with control characters escaped."""
     words = " ".join(str(message).split())
     words = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in words)
     half = MOST_LETTERS // 2
@@ -86,5 +86,5 @@ def one_line(message: object) -> str:
 
 
 def is_full(error: OSError) -> bool:
-    """Whether an error says that a device takes no more, rather than that something is not there."""
+    """Return whether an error means that a device is full, rather than that a file is missing."""
     return error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG, errno.EPIPE)

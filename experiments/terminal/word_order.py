@@ -1,4 +1,4 @@
-"""Words of a command line where people put them: a file after an option of many values, a run's folder for its file."""
+"""Forgiving word order: a file after an option with many values, and a run's folder in place of its file."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -10,13 +10,13 @@ import tyro
 
 MANY = 10**6
 FILES = {"log": "log.npz", "config": "config.json"}
-"""The file of a run that is meant where its folder is named."""
+"""The file of a run that is used if its folder is given."""
 
 
 def in_order(words: Sequence[str], command: type) -> list[str]:
-    """Return the words of a command with its file first, where an option of many values would take it for one more.
+    """Return the words of a command with its file first, if an option with many values would take it.
 
-    Of `replay --backend full-ekf graph run.log` the last word is the log: it is there, and nothing else names one.
+    In `replay --backend full-ekf graph run.log` the last word is the log: it exists, and no other word names one.
     """
     name, taken = _positional(command), list(_taken(words, command))
     if not name or any(not option for option, _ in taken):
@@ -29,15 +29,15 @@ def in_order(words: Sequence[str], command: type) -> list[str]:
 
 
 def swallowed(words: Sequence[str], command: type) -> str:
-    """Return in words what took the last word, where nothing is left for the command's file; nothing else."""
+    """Return a note on the option that took the last word, if the command's file is missing; else an empty one."""
     for option, places in _taken(words, command):
         if places and _is_many(command, option):
-            return f" ({option} takes {words[places[-1]]!r}, too)"
+            return f" ({option} takes {words[places[-1]]!r} as well)"
     return ""
 
 
 def with_files(command: Any) -> Any:
-    """Return a command with a run's file where its folder is named."""
+    """Return a command with a run's file where its folder was given."""
     found = {}
     for name, file in FILES.items():
         path = getattr(command, name, None)
@@ -47,12 +47,12 @@ def with_files(command: Any) -> Any:
 
 
 def file_in(path: Path, name: str) -> Path:
-    """Return a run's file, if a path is that of its folder, and else the path."""
+    """Return a run's file if the path is its folder, otherwise the path."""
     return path / name if path.is_dir() and (path / name).is_file() else path
 
 
 def _taken(words: Sequence[str], command: type) -> Iterator[tuple[str, list[int]]]:
-    """Yield each option with the places of its values; "" for what stands outside of all."""
+    """Yield each option with the positions of its values; "" for words outside of options."""
     kinds = _values(command)
     at = 1
     while at < len(words):
@@ -70,7 +70,7 @@ def _taken(words: Sequence[str], command: type) -> Iterator[tuple[str, list[int]
 
 
 def _values(command: type) -> dict[str, int]:
-    """Return how many values each option takes at most."""
+    """Return the largest number of values of each option."""
     hints, most = get_type_hints(command, include_extras=True), dict[str, int]()
     for each in fields(command):
         inner = _plain(hints[each.name])
@@ -98,7 +98,7 @@ def _plain(hint: Any) -> Any:
 
 
 def _positional(command: type) -> str:
-    """Return the field of a command's file or world; nothing for a command that has none, or many."""
+    """Return the field of a command's file or world; empty for a command with none or many."""
     hints = get_type_hints(command, include_extras=True)
     marks = {each.name: getattr(hints[each.name], "__metadata__", ()) for each in fields(command)}
     named = [name for name, mark in marks.items() if tyro.conf.Positional in mark]

@@ -1,1 +1,1 @@
-"""Pictures, pages and timelines of what runs left."""
+"""Pictures, pages and timelines of results."""

@@ -1,4 +1,4 @@
-"""A run's folder as an animated GIF: its log is replayed as it was made, so that nothing is driven again."""
+"""A run as an animated GIF, made by replaying its log in the same way, so that nothing is driven again."""
 
 from pathlib import Path
 
@@ -19,11 +19,11 @@ from ..terminal.progress import progress
 from ..usage import UsageError
 
 EVERY_SCAN = 2
-"""Of these scans one is drawn into the floor that was seen."""
+"""Every n-th scan is drawn into the seen floor."""
 
 
 def gif_of(folder: Path) -> bytes:
-    """Return the GIF of the run in a folder; raises UsageError where there is none."""
+    """Return the GIF of the run in a folder; raises UsageError without one."""
     log = folder / LOG
     if not log.is_file():
         raise UsageError(f"expected a run with a {LOG}, found none in {folder}: name the folder of one run")
@@ -48,7 +48,7 @@ def gif_of(folder: Path) -> bytes:
 
 
 class _Film:
-    """Keeps what is drawn of the steps that are shown."""
+    """Keeps what is drawn of the selected steps."""
 
     def __init__(self, count: int) -> None:
         self.frames: list[Frame] = []

@@ -1,4 +1,4 @@
-"""Truth meets timeline: runs become recordings, and whatever happens to a recording, the run goes on."""
+"""Recordings of runs with the truth; problems of a recording never affect the run."""
 
 import gc
 import os
@@ -28,7 +28,7 @@ Watch = Callable[[Step], None]
 
 
 class TimelineOutput:
-    """A timeline of one or several back ends on its way to a file or a viewer; its troubles are told at the end."""
+    """A timeline of one or several back ends on its way to a file or a viewer; problems are reported at the end."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class TimelineOutput:
         rrd: Path | None,
         view: bool = False,
     ) -> None:
-        """Begin it; with neither a file nor a viewer asked for it does nothing and costs nothing."""
+        """Start it; without a file or a viewer it does nothing and costs nothing."""
         self._rrd = rrd
         self._problem = ""
         self._timeline: Timeline | None = None
@@ -54,14 +54,14 @@ class TimelineOutput:
         also: Watch = lambda step: None,
         wheels_pose_of: PoseOf | None = None,
     ) -> Watch:
-        """Return what takes in each step of one back end, beside whatever else watches."""
+        """Return a function that records each step of one back end and passes it on."""
 
         def add(step: Step) -> None:
             if (timeline := self._timeline) is not None:
                 self._try(lambda: timeline.add(backend, step, _told(true_pose_of, step), _told(wheels_pose_of, step)))
 
         def watch(step: Step) -> None:
-            # Recorded first: what else watches may stop the run here, and this step belongs to it.
+            # Recorded first: the other observer may stop the run here, and this step belongs to it.
             add(step)
             also(step)
 
@@ -73,25 +73,25 @@ class TimelineOutput:
         return self._timeline is not None
 
     def add_campaign(self, trials: Sequence[Mapping[str, Any]], steps: Sequence[Mapping[str, Any]]) -> None:
-        """Add the summary of a campaign from its tables, a mapping a row."""
+        """Add the summary of a campaign from its tables, one mapping for each row."""
         if (timeline := self._timeline) is not None:
             self._try(lambda: timeline.add_campaign(trials, steps))
 
     def close(self) -> list[str]:
-        """Write what was recorded, and return, in words, what could not be."""
+        """Write the recording, and return the problems, in words."""
         self._try(self._finish)
         return [self._problem] if self._problem else []
 
     def _begin(self, title: str, backends: Sequence[str], world: World | None, errorless: bool, view: bool) -> None:
         if self._rrd is not None:
-            # Tried before the run, so that nobody waits for a recording that cannot be.
+            # Tried before the run, so that nobody waits for a recording that cannot be written.
             probe(self._rrd)
         viewer_url = Viewer().url if view else None
-        # Rerun's own words on a viewer that went would come between ours; what matters it raises, too.
+        # Rerun's own messages about a closed viewer would mix with ours; it also raises whatever matters.
         os.environ.setdefault("RUST_LOG", "off")
-        from chainslam.viz.timeline import Timeline  # imports rerun: only where a recording is asked for
+        from chainslam.viz.timeline import Timeline  # imports rerun, only if a recording is wanted
 
-        # Its modules stay till the end: looked through at every collection, they would cost as much as the drawing.
+        # Its modules stay to the end: scanned at every garbage collection, they would cost as much time as the drawing.
         gc.freeze()
         nees_of = None if errorless else nees_of_poses
         self._timeline = Timeline(title, backends, () if world is None else true_rings(world), nees_of, viewer_url)
@@ -105,13 +105,13 @@ class TimelineOutput:
             if self._rrd is not None:
                 raise
             raise ViewerError(
-                "expected the viewer to stay open till the end, found it closed: `chainslam view DIR` shows the run"
+                "expected the viewer to stay open until the end, found it closed: `chainslam view DIR` shows the run"
             ) from error
         if self._rrd is not None:
             write_anywhere(self._rrd, content)
 
     def drop(self) -> None:
-        """Throw away what was recorded."""
+        """Discard the recording."""
         timeline, self._timeline = self._timeline, None
         if timeline is not None:
             timeline.discard()
@@ -119,7 +119,7 @@ class TimelineOutput:
     def _try(self, act: Callable[[], None]) -> None:
         try:
             act()
-        except Exception as error:  # a recording's trouble must cost neither the run nor its other results
+        except Exception as error:  # problems of a recording must cost neither the run nor its other results
             self.drop()
             what = "the viewer" if self._rrd is None else str(self._rrd)
             why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)

@@ -206,7 +206,7 @@ class Explorer:
         """Set aside what lies on something round: each look at it finds another short wall with two more ends."""
         for end in self._candidates(ends):
             if is_round(end, around.walls, self._config.round_things):
-                self._ledger.put_aside(end, "on something round")
+                self._ledger.put_aside(end, "on a curved obstacle")
 
     def _set_out(self, choice: Choice, situation: Situation, is_sweep: bool) -> _Task:
         target, following = choice.target, self._config.following

@@ -19,10 +19,10 @@ Key = tuple[int, int]
 class Event(Enum):
     """What happened at a place."""
 
-    SET_ASIDE = "the robot was about an end here, and it was set aside"
-    GONE = "the robot was about an end here, and it was none any longer"
-    VISITED = "the robot was to visit unseen floor or an unmapped obstacle here"
-    VIEWED = "the robot was to look at unseen floor here from afar"
+    SET_ASIDE = "an open end here was blacklisted"
+    GONE = "an open end here that the robot was exploring was gone"
+    VISITED = "the robot was sent to unseen floor or an unmapped obstacle here"
+    VIEWED = "the robot was sent to look at unseen floor here from a distance"
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ def make_strategy(words: str) -> Strategy:
     for index, word in enumerate(words.split(",")):
         name, at, step = word.partition("@")
         if name not in STRATEGIES:
-            raise ValueError(f"expected a strategy out of {', '.join(STRATEGIES)}, found {name!r}: choose one of these")
+            raise ValueError(f"expected a strategy from {', '.join(STRATEGIES)}, found {name!r}: choose one of these")
         first = 0 if index == 0 and not at else int(step) if step.isascii() and step.isdigit() else -1
         if first < 0 or (index == 0 and first > 0) or (parts and first <= parts[-1][0]):
             raise ValueError(

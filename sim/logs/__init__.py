@@ -1,1 +1,1 @@
-"""Recorded robots."""
+"""Logs of recorded robots."""

@@ -1,4 +1,4 @@
-"""Arrays from an .npz file that anybody may have made: its headers are judged before a number is read."""
+"""Arrays from an untrusted .npz file: its headers are checked before any number is read."""
 
 import math
 import os
@@ -15,19 +15,19 @@ from typing import Any
 import numpy as np
 
 LIMIT_BYTES = 2**30
-"""An archive whose arrays take more than this is not read: 100,000 scans of 180 beams take a third of it."""
+"""Larger archives are not read: 100,000 scans of 180 beams take a third of this."""
 KINDS = {"float": "fiu", "int": "iu", "bool": "b", "text": "U"}
-"""For each word of a layout, the kinds of numpy's types that are taken for it."""
+"""Accepted kinds of numpy types for each word of a layout."""
 TYPES = {"float": np.float64, "int": np.int64, "bool": np.bool_}
 
 
 BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError)
-"""What zipfile raises: for other files and wrong sums, for what cannot be inflated, for contents cut short, for
-encrypted members and unknown compressions, for places before the file's beginning."""
+"""Errors of zipfile: other files, wrong checksums, broken or truncated data, encryption, unknown compressions, offsets
+before the beginning of the file."""
 
 
 class ArchiveError(ValueError):
-    """A file that holds other arrays than it should, told in words: what was found."""
+    """A file with other arrays than it should have; the message says what was found."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class _Header:
 
 
 def regular(path: Path) -> Path:
-    """Return a path that leads to a plain file; raises OSError for none and for devices, pipes and folders."""
+    """Return the path to a regular file; raises OSError for devices, pipes, folders and missing files."""
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(21, "a folder", str(path))
     if not stat.S_ISREG(mode):
-        raise OSError(22, "no plain file", str(path))
+        raise OSError(22, "not a regular file", str(path))
     return path
 
 
@@ -66,7 +66,7 @@ def read_archive(
     except ArchiveError:
         raise
     except BROKEN as error:
-        raise ArchiveError("no archive of arrays, or one that was cut short") from error
+        raise ArchiveError("an invalid or truncated archive of arrays") from error
 
 
 def _read(
@@ -101,7 +101,7 @@ def _read(
 
 
 def _header(stream: Any, name: str) -> _Header:
-    """Return what an array says of itself; raises ArchiveError, without reading it, where that cannot be."""
+    """Return the header of an array; raises ArchiveError, without reading the array, if it is invalid."""
     try:
         version = np.lib.format.read_magic(stream)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -114,7 +114,7 @@ def _header(stream: Any, name: str) -> _Header:
 
 
 def _agree(name: str, header: _Header, layout: str, sizes: dict[str, int]) -> None:
-    """Raise ArchiveError where an array has another layout; `sizes` learns the dimensions by name."""
+    """Raise ArchiveError if an array has another layout; `sizes` collects the dimensions by name."""
     kind, *dims = layout.split()
     if header.dtype.kind not in KINDS[kind]:
         raise ArchiveError(f"{name} of type {header.dtype}, not {kind}")
@@ -137,7 +137,7 @@ def _array(stream: Any, name: str, header: _Header, layout: str | None) -> np.nd
             text = np.array(array.tolist())
             "".join(text.ravel().tolist()).encode()
         except (SystemError, UnicodeEncodeError) as error:
-            raise ArchiveError(f"{name} of letters that do not exist") from error
+            raise ArchiveError(f"{name} of invalid characters") from error
         return text
     if kind == "int" and array.size and array.max() > np.iinfo(np.int64).max:
         raise ArchiveError(f"{name} with numbers beyond 64 bits")

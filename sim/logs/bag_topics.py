@@ -1,4 +1,4 @@
-"""Which topics of a bag are read, told where there is more than one to read."""
+"""Selection of the topics to read from a bag."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,7 @@ TF_OLD = "tf/msg/tfMessage"
 
 @dataclass(frozen=True)
 class TopicsWanted:
-    """The topics that a user asks for; None for the reader's own choice."""
+    """The topics chosen by the user; None for the reader's choice."""
 
     scan: str | None = None
     odometry: str | None = None
@@ -19,23 +19,23 @@ class TopicsWanted:
 
 @dataclass(frozen=True)
 class BagTopics:
-    """What is read of a bag."""
+    """The topics that are read."""
 
     scan: str
     odometry: str | None
-    """None where tf tells the odometry, or nobody."""
+    """None if tf provides the odometry, or if there is none."""
     tells_motion: bool
-    """Whether the bag tells the motion at all."""
+    """Whether the bag contains the motion at all."""
     chosen: list[Any]
     tf: list[Any]
 
     def first(self, reader: Any, kind: str) -> Any:
-        """Return the first message of a kind on the topics chosen; None where there is none."""
+        """Return the first message of a type on the chosen topics; None without any."""
         return _first(reader, [c for c in self.chosen if c.msgtype == kind])
 
 
 def topics_of(reader: Any, wanted: TopicsWanted, notes: list[str]) -> BagTopics:
-    """Return the topics to read; raises LogError where there are none, or not those that are asked for."""
+    """Return the topics to read; raises LogError if there are none, or not the requested ones."""
     told = "the bag has " + (", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})) or "no topic")
     by_kind = {kind: [c for c in reader.connections if c.msgtype == kind] for kind in (SCAN, ODOMETRY)}
     tf = [c for c in reader.connections if c.msgtype in (TF, TF_OLD)]
@@ -50,14 +50,14 @@ def topics_of(reader: Any, wanted: TopicsWanted, notes: list[str]) -> BagTopics:
     has_motion = odometry is not None or _tells_odometry(reader, tf)
     if not has_motion:
         notes.append(
-            f"expected odometry, or a tf from an odom frame, found none: the scans alone tell the motion; {told}"
+            f"expected odometry, or a tf from an odom frame, found none: scan matching alone gives the motion; {told}"
         )
     chosen = [c for c in reader.connections if c.topic in (scan, odometry)] + tf
     return BagTopics(scan, odometry, has_motion, chosen, tf)
 
 
 def _one_of(connections: list[Any], wanted: str | None, kind: str, told: str) -> str | None:
-    """Return the topic that is asked for; raises LogError where it is none of these."""
+    """Return the requested topic; raises LogError if it does not exist."""
     if wanted is None:
         return None
     for topic in {c.topic for c in connections}:
@@ -67,7 +67,7 @@ def _one_of(connections: list[Any], wanted: str | None, kind: str, told: str) ->
 
 
 def _widest(reader: Any, connections: list[Any], told: str) -> str:
-    """Return the topic whose scans look around the farthest, the first by name of several."""
+    """Return the topic of the scans with the widest view, the first by name of several."""
     topics = sorted({c.topic for c in connections})
     if not topics:
         raise LogError(f"expected a topic of LaserScan, found none: {told}")
@@ -87,7 +87,7 @@ def _first(reader: Any, connections: list[Any]) -> Any:
 
 
 def _tells_odometry(reader: Any, tf: list[Any]) -> bool:
-    """Return whether tf tells the body's pose in an odom frame."""
+    """Return whether tf contains the body's pose in an odom frame."""
     for connection, _, raw in reader.messages(connections=tf) if tf else ():
         message = reader.deserialize(raw, connection.msgtype)
         if any("odom" in transform.header.frame_id for transform in message.transforms):

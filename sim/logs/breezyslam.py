@@ -1,8 +1,8 @@
 """BreezySLAM's logs (`.dat`): a line of whole numbers for each scan of a Hokuyo URG-04LX.
 
 The format is that of its examples and of CoreSLAM (Steux and El Hamzaoui, "CoreSLAM: a SLAM algorithm in less than 200
-lines of C code", ICARCV 2010): a time in microseconds, the counts of two wheels, and from word 25 on the ranges in
-millimetres. Neither the wheels nor the place of the scanner stand in it.
+lines of C code", ICARCV 2010): a time in microseconds, the encoder counts of two wheels, and from word 25 on the ranges
+in millimetres. It contains neither the geometry of the wheels nor the place of the scanner.
 """
 
 from collections.abc import Iterator
@@ -19,15 +19,15 @@ BEAMS = 682
 BEARINGS_RAD = np.deg2rad(np.linspace(-120.0, 120.0, BEAMS))
 RANGE_M = 4.0
 CODES_M = 0.02
-"""The scanner says why it measured nothing by numbers below this."""
+"""Values below this are error codes of the scanner."""
 NOTE = (
-    "the wheels of a BreezySLAM log are counts of wheels that it does not describe: the scans alone tell the motion;"
-    " the scanner is taken for a URG-04LX, 682 beams over 240 degrees, 4 m"
+    "a BreezySLAM log holds encoder counts without the geometry of the wheels: scan matching alone gives the motion;"
+    " the scanner is assumed to be a URG-04LX, 682 beams over 240 degrees, 4 m"
 )
 
 
 def is_breezyslam(path: Path) -> bool:
-    """Return whether the first line of a file is one of whole numbers, more than a scan's."""
+    """Return whether the first line of a file consists of more whole numbers than a scan has ranges."""
     try:
         words = next(text_lines(path), (0, []))[1]
     except (OSError, LogError):
@@ -36,7 +36,7 @@ def is_breezyslam(path: Path) -> bool:
 
 
 def read_breezyslam(path: Path, notes: list[str]) -> Iterator[RawScan | LogError]:
-    """Yield the scans of a log, and an error in place of each that cannot be read; raises OSError and LogError."""
+    """Yield the scans of a log, and an error for each unreadable scan; raises OSError and LogError."""
     notes.append(NOTE)
     for number, words in text_lines(path):
         place = f"line {number}"
@@ -48,7 +48,7 @@ def read_breezyslam(path: Path, notes: list[str]) -> Iterator[RawScan | LogError
 
 def _scan(words: list[str], place: str) -> RawScan:
     count = len(words) - BEFORE
-    if count not in (BEAMS, BEAMS + 1):  # one more word ends each line
+    if count not in (BEAMS, BEAMS + 1):  # each line ends with one more word
         raise LogError(f"{place}: expected {BEAMS} ranges of a URG-04LX after {BEFORE} words, found {count}")
     try:
         time_us, *ranges_mm = (float(word) for word in (words[0], *words[BEFORE : BEFORE + BEAMS]))

@@ -19,25 +19,25 @@ from .raw_scan import LogError, RawScan, as_returns
 from .text_lines import text_lines
 
 SICK_STEP = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
-"""Degrees between two beams, by the number of beams. CARMEN guesses so, and 180 degrees for any other number."""
+"""Degrees between two beams, by the number of beams, as in CARMEN, which assumes 180 degrees for any other number."""
 SICK_RANGE_M = 40.0
-"""`FLASER` lines do not tell the scanner's range. SICK's scanners say 50 m or 81.8 m where nothing came back."""
+"""`FLASER` lines do not contain the scanner's range. SICK scanners report 50 m or 81.8 m without a return."""
 SICK_CODES_M = (8.1825, 8.1915)
-"""In its mode of 8 m the same scanner says 8183 to 8191 mm where it measured nothing, and no range is larger."""
+"""In its mode of 8 m the same scanner reports 8183 to 8191 mm as error codes, and no larger range."""
 SCANS = ("FLASER", "ROBOTLASER1", "Laser", "RLASER", *(f"ROBOTLASER{k}" for k in range(2, 6)))
-"""Kinds of lines that hold a scan; of several scanners the first one of these is read."""
+"""Kinds of lines that contain a scan; of several scanners, the first one in this order is read."""
 KNOWN = (*SCANS, "ODOM", "Odometry")
 FIRST_LINES = 1000
-"""By so many lines it is known which scanners a log has."""
+"""The scanners of a log are known after this many lines."""
 EVERY_S = 1.0
-"""Between two scans of a log without times."""
+"""Time between two scans of a log without times."""
 MOST_BEAMS = 10_000
 
 
 def read_carmen(path: Path, notes: list[str] | None = None) -> Iterator[RawScan | LogError]:
-    """Yield the scans of a log, and an error in place of each that cannot be read; raises OSError and LogError.
+    """Yield the scans of a log, and an error for each unreadable scan; raises OSError and LogError.
 
-    `notes` gets what was assumed, in words.
+    `notes` receives the assumptions that were made, in words.
     """
     said = [] if notes is None else notes
     read = _first_kind(path)
@@ -65,22 +65,22 @@ def read_carmen(path: Path, notes: list[str] | None = None) -> Iterator[RawScan 
     guessed = sorted(set(beams) - set(SICK_STEP)) if not read.startswith("ROBOT") else []
     if guessed:
         said.append(
-            f"expected {', '.join(map(str, SICK_STEP))} beams, found {', '.join(map(str, guessed))}: taken to be spread"
-            " over 180 degrees, as CARMEN takes them"
+            f"expected {', '.join(map(str, SICK_STEP))} beams, found {', '.join(map(str, guessed))}: assumed to cover"
+            " 180 degrees, as in CARMEN"
         )
 
 
 def _first_kind(path: Path) -> str:
-    """Return the kind of the scans to read; nothing where the first lines have none."""
+    """Return the kind of the scans to read; empty if the first lines have none."""
     found = set()
-    with suppress(LogError):  # told where it is met again
+    with suppress(LogError):  # reported when the scans are read
         for _, words in islice(text_lines(path), FIRST_LINES):
             found.add(words[0])
     return next((kind for kind in SCANS if kind in found), "")
 
 
 def _scan(words: list[str], odom: LogError | Float[np.ndarray, "3"], time_s: float, place: str) -> RawScan:
-    """Return what a line of any scanner tells; raises LogError."""
+    """Return the scan in a line of any scanner; raises LogError."""
     if words[0] != "Laser":
         return _MESSAGES[words[0][:6]](words, place)
     if isinstance(odom, LogError):
@@ -89,7 +89,7 @@ def _scan(words: list[str], odom: LogError | Float[np.ndarray, "3"], time_s: flo
 
 
 def _odometry(words: list[str], place: str) -> LogError | Float[np.ndarray, "3"]:
-    """Return the pose of an `Odometry` line, or why it is none: the scan after it has none, either."""
+    """Return the pose in an `Odometry` line, or the error: the scan after it has no pose either."""
     try:
         return _pose(_numbers(words[1:], 3, place, "Odometry"), place)
     except LogError as error:
@@ -107,7 +107,7 @@ def _flaser(words: list[str], place: str) -> RawScan:
 
 
 def _rlaser(words: list[str], place: str) -> RawScan:
-    """`RLASER`, as `FLASER`: a scanner that looks back, whether its pose says so or not."""
+    """`RLASER`, like `FLASER`, from a scanner that faces backwards, whether its pose says so or not."""
     scan = _flaser(words, place)
     assert scan.robot_odom is not None
     assert scan.scanner_odom is not None
@@ -153,7 +153,7 @@ _MESSAGES: dict[str, Callable[[list[str], str], RawScan]] = {
 
 
 def _sick(words: list[str], place: str) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], list[str]]:
-    """Return bearings, ranges and the words behind them of a line that tells only the number of beams."""
+    """Return bearings, ranges and the remaining words of a line that only contains the number of beams."""
     count = _count(words[1] if len(words) > 1 else "nothing", place)
     step = SICK_STEP.get(count, 180.0 / (count - 1))
     bearings = -0.5 * np.pi + np.deg2rad(step) * np.arange(count)
@@ -161,7 +161,7 @@ def _sick(words: list[str], place: str) -> tuple[Float[np.ndarray, " k"], Float[
 
 
 def _without_codes(ranges: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-    """Return ranges with NaN where a scanner in its mode of 8 m says why it measured nothing."""
+    """Return ranges with NaN for the error codes of a scanner in its mode of 8 m."""
     low, high = SICK_CODES_M
     return np.where(ranges >= low, np.nan, ranges) if ranges.max(initial=0.0) < high else ranges
 

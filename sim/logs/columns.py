@@ -1,4 +1,4 @@
-"""Rows of numbers while a run goes on, in a file without a name."""
+"""Rows of numbers, stored in an unnamed file during a run."""
 
 import tempfile
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Columns:
-    """Rows of numbers, of the names, kinds and shapes of the first, in a file without a name: they take no memory."""
+    """Rows of numbers, with names, types and shapes of the first, in an unnamed file: they use no memory."""
 
     def __init__(self) -> None:
         self._rows: IO[bytes] = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115, closed when the columns are gone
@@ -23,7 +23,7 @@ class Columns:
         return self._count
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Add a row; a disk that is full moves all of them into memory."""
+        """Add a row; if the disk is full, all rows move to memory."""
         if not self._count:
             kinds = [(name, (first := np.asarray(value)).dtype, first.shape) for name, value in row.items()]
             self._row = np.zeros((), dtype=kinds)
@@ -47,7 +47,7 @@ class Columns:
         self._count += 1
 
     def _widen(self, row: Mapping[str, Any]) -> None:
-        """Make room in all rows for longer ones: a scanner may give a reading more in one turn than in the next."""
+        """Make room for longer rows: a scanner may give one more reading in one turn than in the next."""
         kinds = self._row.dtype
         names = kinds.names or ()
         longer = {
@@ -73,7 +73,7 @@ class Columns:
         self._rows.write(new.tobytes())
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return each column, in rows' order."""
+        """Return each column, in the order of the rows."""
         rows = np.frombuffer(self._content(), dtype=self._row.dtype)
         return {name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()}
 
@@ -85,5 +85,5 @@ class Columns:
 
 
 def _nothing(kind: np.dtype) -> float | int:
-    """Return what fills up a row: NaN, or -1 where the kind has none."""
+    """Return the padding of a row: NaN, or -1 if the type has none."""
     return float("nan") if kind.kind == "f" else -1

@@ -1,4 +1,4 @@
-"""From the scans of a log to those that are mapped: one wherever the wheels have moved far enough since the last."""
+"""Selection of the scans of a log that are mapped: one whenever the odometry has moved far enough since the last."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ from .recorded_robot import Recording, differing, fan_of, padded
 from .units import Measures
 
 FIRST_M, FIRST_SCANS = 2.0, 300
-"""The scanner's place on the robot is read from the first scans: as many, or as many metres."""
+"""The scanner's place on the robot is estimated from the first scans: this many, or this many metres."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +27,17 @@ class KeyframesConfig:
     """
 
     least_m: Size = 0.1
-    """A scan is mapped where the robot has moved so far since the last one, or turned by `least_rad`."""
+    """A scan is mapped if the robot has moved this far since the last one, or turned by `least_rad`."""
     least_rad: Turn = float(np.deg2rad(5.0))
     every: Count = 1
-    """Of these only each so many."""
+    """Only every n-th of these."""
     sigma_m: Deviation = 0.02
-    """Range noise that is assumed: logs do not state it, and scans of real walls scatter more than the scanner does."""
+    """Assumed range noise: logs do not state it, and scans of real walls scatter more than the scanner does."""
     wheels_m: Deviation = 0.02
-    """Standard deviation of the wheels' motion between two keyframes, with `wheels_share` of the way."""
+    """Standard deviation of the odometry between two keyframes, plus `wheels_share` of the distance."""
     wheels_share: Weight = 0.1
     wheels_rad: Spread = float(np.deg2rad(3.0))
-    """The same for the turn, with `turn_share` of the turn."""
+    """The same for the turn, plus `turn_share` of the turn."""
     turn_share: Weight = 0.15
 
 
@@ -46,28 +46,28 @@ class RecordedLog:
     """A log as it is mapped: s keyframes out of n scans."""
 
     recording: Recording
-    """Of the scanner: odometry and poses are those of the scanner, not of the middle of the robot."""
+    """Recording of the scanner: odometry and poses are those of the scanner, not of the middle of the robot."""
     scan_time_s: Float[np.ndarray, " n"]
-    """All scans, by the log's own clock."""
+    """Times of all scans, on the log's own clock."""
     keyframe_of_scan: Int[np.ndarray, " n"]
     """The last keyframe at or before each scan."""
     motion_since: Float[np.ndarray, "n 3"]
-    """By the wheels, from that keyframe to the scan, m m rad."""
+    """Odometry from that keyframe to the scan, m m rad."""
     share_since: Float[np.ndarray, " n"]
-    """Of the wheels' way from that keyframe to the next one, turns counted as `KeyframesConfig` does; 0 to 1."""
+    """Share of the odometry from that keyframe to the next one, turns counted as in `KeyframesConfig`; 0 to 1."""
     scanner_on_robot: Float[np.ndarray, "3"]
     """The scanner's pose on the robot, m m rad."""
     trouble: str = ""
-    """Why the log ends before its end, in words with the place."""
+    """Why the log ends early, in words with the position in the file."""
     notes: tuple[str, ...] = ()
-    """What was assumed of the log, in words."""
+    """Assumptions that were made about the log, in words."""
     left_out: LeftOut = field(default_factory=LeftOut)
     """Scans that could not be read, or whose time goes back."""
 
     def poses_of_scans(self, keyframes_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "n 3"]:
-        """Return where all scans were taken, given where the keyframes were; `s` may be less where a run ended early.
+        """Return the poses of all scans, given those of the keyframes; `s` may be smaller if a run ended early.
 
-        Scans after the last keyframe given are left out.
+        Scans after the last given keyframe are left out.
         """
         of = self.keyframe_of_scan[self.keyframe_of_scan < len(keyframes_world)]
         return _moved(keyframes_world[of], self.motion_since[: len(of)])
@@ -87,15 +87,15 @@ class RecordedLog:
 
 
 def _moved(poses: Float[np.ndarray, "n 3"], motions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Return each pose after the motion beside it."""
+    """Return each pose followed by its motion."""
     return np.array([compose(pose, motion) for pose, motion in zip(poses, motions, strict=True)]).reshape(-1, 3)
 
 
 def gather(scans: Iterator[RawScan | LogError], config: KeyframesConfig, notes: list[str] | None = None) -> RecordedLog:
-    """Read scans to their end and return the log; raises LogError where not even one can be used.
+    """Read all scans and return the log; raises LogError if not one of them can be used.
 
-    A scan that cannot be used is left out, `trouble` says why no more came, and `notes` get what was assumed. Raises
-    LogError as well where the numbers cannot be in metres, radians and seconds.
+    Unusable scans are left out, `trouble` says why no more were read, and `notes` lists the assumptions. Raises
+    LogError as well if the numbers cannot be metres, radians and seconds.
     """
     found, measures, trouble, broken = _Gathered(config), Measures(), "", list[str]()
     try:
@@ -112,7 +112,7 @@ def gather(scans: Iterator[RawScan | LogError], config: KeyframesConfig, notes: 
             raise
         trouble = str(error)
     if len(broken) == 1 and found.read:
-        trouble = trouble or broken.pop()  # cut short within its last scan
+        trouble = trouble or broken.pop()  # truncated within its last scan
     found.left_out.add(*broken)
     found.place_scanner()
     if not found.keyframes:
@@ -122,7 +122,7 @@ def gather(scans: Iterator[RawScan | LogError], config: KeyframesConfig, notes: 
 
 
 class _Gathered:
-    """Takes scans one by one; only keyframes keep their ranges."""
+    """Processes scans one by one; only keyframes keep their ranges."""
 
     def __init__(self, config: KeyframesConfig) -> None:
         self.config = config
@@ -132,10 +132,10 @@ class _Gathered:
         self._of_scan: list[int] = []
         self._since: list[np.ndarray] = []
         self._ways: list[float] = []
-        """By the wheels up to each scan, in keyframes' worth of way and turn."""
+        """Distance of the odometry up to each scan, in units of keyframes."""
         self._before: np.ndarray | None = None
         self._moved: np.ndarray | None = None
-        """Where the wheels were at the last scan that had moved far enough; `every` counts these."""
+        """Odometry at the last scan that had moved far enough; `every` counts these."""
         self._until_next = 1
         self._head: list[RawScan] | None = []
         """The first scans, until the scanner's place on the robot is known."""
@@ -145,18 +145,18 @@ class _Gathered:
 
     @property
     def read(self) -> int:
-        """How many scans there are so far."""
+        """Number of scans so far."""
         return len(self._times) + len(self._head or ())
 
     def takes(self, scan: RawScan) -> bool:
-        """Take in the next scan, or leave it out where it does not follow the one before; raises LogError when full."""
+        """Process the next scan, or leave it out if it does not follow the one before; raises LogError when full."""
         last_s = self._last_s
         if not scan.time_s >= last_s:
             self.left_out.add(f"{scan.place}: expected time to go on from {last_s:.6f} s, found {scan.time_s:.6f} s")
             return False
         if scan.robot_odom is None:
             self.left_out.add(
-                f"{scan.place}: expected odometry, found none: take one that holds it, or let scans tell it"
+                f"{scan.place}: expected odometry, found none: use a log with odometry, or --odometry scans"
             )
             return False
         self._last_s = scan.time_s
@@ -176,7 +176,7 @@ class _Gathered:
             self.place_scanner()
 
     def place_scanner(self) -> None:
-        """Settle where the scanner sits on the robot by the scans so far, and take these in."""
+        """Estimate the scanner's place on the robot from the scans so far, and process these."""
         head, self._head = self._head, None
         if head:
             self._on_robot = scanner_on_robot(head)
@@ -207,7 +207,7 @@ class _Gathered:
         return bool(np.hypot(*off[:2]) >= self.config.least_m or abs(wrap(off[2])) >= self.config.least_rad)
 
     def log(self, trouble: str) -> RecordedLog:
-        """Return what was taken in."""
+        """Return the log of the processed scans."""
         first, c = self.keyframes[0], self.config
         fans = np.array([fan_of(scan.bearings_rad) for scan in self.keyframes])
         widest = self.keyframes[int(np.argmax(fans[:, 0]))]
@@ -236,13 +236,13 @@ def _odom(scan: RawScan) -> Float[np.ndarray, "3"]:
 
 
 def _shares(ways: Float[np.ndarray, " n"], of: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return how far along the way to the next keyframe each scan was taken; 0 after the last one."""
+    """Return the position of each scan between two keyframes, 0 to 1; 0 after the last one."""
     at = np.append(ways[np.searchsorted(of, np.arange(of[-1] + 1))], np.inf)
     return np.asarray((ways - at[of]) / (at[of + 1] - at[of]))
 
 
 def wheels_cov(odometry: Float[np.ndarray, "s 3"], config: KeyframesConfig) -> Float[np.ndarray, "s 3 3"]:
-    """Return how far the wheels are believed; zero for the first motion, which is none."""
+    """Return the covariance of the odometry; zero for the first motion, which does not exist."""
     sigma_m = config.wheels_m + config.wheels_share * np.hypot(*odometry[:, :2].T)
     sigma_rad = config.wheels_rad + config.turn_share * np.abs(odometry[:, 2])
     sigmas = np.stack([sigma_m, sigma_m, sigma_rad], axis=1)

@@ -1,4 +1,4 @@
-"""What readers of recorded logs hand on: one scan after another, with the wheels' pose of the scanner."""
+"""The output of readers of recorded logs: one scan after another, each with the odometry."""
 
 from dataclasses import dataclass
 
@@ -8,20 +8,20 @@ from jaxtyping import Float
 from chainslam.slam.geometry.poses import compose, inverse, wrap
 
 SAME_M, SAME_RAD = 0.01, 0.01
-"""A scanner that is fixed to the body is at one place of it, to within rounding."""
+"""A scanner that is fixed to the body stays at one place on it, up to rounding."""
 FARTHEST_M = 2.0
-"""No scanner sits farther from the middle of its robot."""
+"""No scanner is farther from the middle of its robot."""
 
 
 class LogError(ValueError):
-    """A log that cannot be read on, in words: the place, what was expected there, and what was found.
+    """A log that cannot be read further: the position, what was expected there, and what was found.
 
-    Readers raise it where they cannot go on, and yield it in place of a scan that cannot be read.
+    Readers raise it if they cannot continue, and yield it for a scan that cannot be read.
     """
 
 
 class ClockError(LogError):
-    """Two kinds of messages of one log, told by clocks that have no time in common: nothing of it can be used."""
+    """Scans and odometry of one log on clocks without any time in common: nothing of it can be used."""
 
 
 @dataclass
@@ -30,45 +30,45 @@ class LeftOut:
 
     count: int = 0
     first: str = ""
-    """Why the first of them was not, in words with the place."""
+    """Why the first of them was left out, in words with its position."""
 
     def add(self, *why: str) -> None:
-        """Count one more for each of the reasons."""
+        """Count one more of a reason."""
         self.count, self.first = self.count + len(why), self.first or "".join(why[:1])
 
     def words(self, read: int) -> str:
-        """How many scans are left out beside those that were read, and why; nothing where none is."""
+        """Return how many scans are left out and why; empty if there are none."""
         return f"{self.count} of {read + self.count} scans are left out: {self.first}" if self.count else ""
 
 
 @dataclass(frozen=True)
 class RawScan:
-    """One scan of k beams as a log has it."""
+    """One scan of k beams, as in the log."""
 
     time_s: float
-    """By the log's own clock."""
+    """On the log's own clock."""
     bearings_rad: Float[np.ndarray, " k"]
     ranges_m: Float[np.ndarray, " k"]
-    """+inf where nothing came back, NaN where a beam tells nothing."""
+    """+inf without a return, NaN for an invalid beam."""
     range_max_m: float
     robot_odom: Float[np.ndarray, "3"] | None
-    """The robot by its wheels alone, m m rad; None where the log tells no motion."""
+    """Pose of the robot by odometry alone, m m rad; None if the log has none."""
     scanner_odom: Float[np.ndarray, "3"] | None = None
-    """The scanner, as far as the log tells it beside the robot; corrected logs tell another path here."""
+    """Pose of the scanner, if the log contains it next to the robot's; corrected logs contain another path here."""
     place: str = ""
-    """Where in the file it stands."""
+    """Position in the file."""
 
 
 def as_returns(ranges_m: Float[np.ndarray, " k"], none_from_m: float) -> Float[np.ndarray, " k"]:
-    """Return ranges with +inf where nothing came back (`none_from_m` and more), and NaN where a beam tells nothing."""
+    """Return ranges with +inf for `none_from_m` and more, and NaN for invalid beams."""
     far = np.where(ranges_m >= none_from_m, np.inf, ranges_m)
     return np.where(far > 0.0, far, np.nan)
 
 
 def scanner_on_robot(scans: list[RawScan]) -> Float[np.ndarray, "3"]:
-    """Return the scanner's pose on the robot, from scans of the first metres; zero where the log tells none.
+    """Return the scanner's pose on the robot, from scans of the first metres; zero if the log does not contain it.
 
-    A log that was corrected tells the scanner's corrected pose: that one does not stay at one place of the robot.
+    A corrected log contains the scanner's corrected pose, which does not stay at one place on the robot.
     """
     told = [(s.robot_odom, s.scanner_odom) for s in scans if s.robot_odom is not None and s.scanner_odom is not None]
     if not told or len(told) < len(scans):

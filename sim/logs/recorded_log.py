@@ -1,4 +1,4 @@
-"""Recorded logs of real robots, whatever their format: told by their contents."""
+"""Recorded logs of real robots, in any format, recognised by their content."""
 
 import gzip
 import zipfile
@@ -28,14 +28,14 @@ PACKED = {
     b"%PDF": PDF,
     b"\x89PNG": PICTURE,
 }
-"""What is no log, or is packed, by how it begins."""
+"""Formats that are not logs, or are packed, by their first bytes."""
 UNPACK = "unpack it, and name a log in it"
 TAR_AT, TAR = 257, b"ustar"
 LONGEST_HEAD = TAR_AT + len(TAR)
 
 
 def is_own_log(path: Path) -> bool:
-    """Return whether a file is a run's own `log.npz`, by its name or as an archive of arrays."""
+    """Return whether a file is a run's own `log.npz`, by its name or because it is an archive of arrays."""
     try:
         if path.suffix == ".npz":
             return True
@@ -48,7 +48,7 @@ def is_own_log(path: Path) -> bool:
 
 
 def _refuse_packed(path: Path) -> None:
-    """Raise LogError, with its name, for an archive and for what else is no log."""
+    """Raise LogError, with the name of the format, for archives and other files that are not logs."""
     if path.is_dir():
         return
     head = first_bytes(path, LONGEST_HEAD)
@@ -60,7 +60,7 @@ def _refuse_packed(path: Path) -> None:
             with gzip.open(path) as file:
                 head = file.read(LONGEST_HEAD)
         except (EOFError, zlib.error, gzip.BadGzipFile):
-            return  # its reader says where
+            return  # its reader reports the position
     if head[TAR_AT:] == TAR:
         raise LogError(f"a tar archive: {UNPACK}")
 
@@ -75,9 +75,9 @@ def read_recorded_log(
     wanted: TopicsWanted = ANY_TOPICS,
     motion_of: Callable[[Iterator[RawScan | LogError]], Iterator[RawScan | LogError]] = iter,
 ) -> RecordedLog:
-    """Return a CARMEN or BreezySLAM log or a ROS bag; raises RecordingError where not one scan can be used.
+    """Return a CARMEN or BreezySLAM log or a ROS bag; raises RecordingError if no scan can be used.
 
-    `wanted` names the topics of a bag, and `motion_of` tells the odometry of scans that have none.
+    `wanted` names the topics of a bag, and `motion_of` computes the odometry of scans without any.
     """
     notes: list[str] = []
     try:

@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags: laser scans with the odometry that a bag holds beside them, read by `rosbags` (an extra)."""
+"""ROS 1 and ROS 2 bags: laser scans with the odometry in the bag, read by `rosbags` (an extra)."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -26,14 +26,14 @@ MAGIC = b"#ROSBAG"
 METADATA = "metadata.yaml"
 SUFFIXES = (".bag", ".db3", ".mcap")
 MOST_WAITING = 1000
-"""Scans that wait for odometry that comes after them."""
+"""Number of scans that may wait for odometry that comes later."""
 GAP_S = 1.0
-"""A scan so long after the last odometry is without it."""
+"""A scan this long after the last odometry has none."""
 INSTALL = "install it: pip install 'chainslam[ros]'"
 
 
 def is_bag(path: Path) -> bool:
-    """Return whether a path is that of a ROS bag: a ROS 1 file, or the folder of a ROS 2 bag or a file in it."""
+    """Return whether a path is that of a ROS bag: a ROS 1 file, the folder of a ROS 2 bag, or a file in it."""
     if path.is_dir():
         return (path / METADATA).is_file()
     try:
@@ -71,14 +71,14 @@ def read_bag(
         raise
     except RobotError as error:
         raise LogError(f"after scan {at}: {error}") from error
-    except Exception as error:  # a damaged bag makes the reader fail in any way
+    except Exception as error:  # the reader may raise anything for a damaged bag
         words = " ".join(str(error).split())[:120] or type(error).__name__
         raise LogError(f"after scan {at}: expected more of the bag, found it damaged ({words})") from error
 
 
 @contextmanager
 def _by_another_name(path: Path) -> Iterator[Path]:
-    """Yield a path to the same bag; rosbags takes all that is named `*.bag` for a file of ROS 1, a folder too."""
+    """Yield a path to the same bag; rosbags treats everything named `*.bag` as a ROS 1 file, even a folder."""
     if not (path.is_dir() and path.suffix == ".bag"):
         yield path
         return
@@ -115,14 +115,15 @@ def _scans(reader: Any, wanted: TopicsWanted, notes: list[str]) -> Iterator[RawS
         yield _raw(message, odometry, frames)
     if covered:
         notes.append(
-            f"expected a scanner among things, found it inside something in {len(covered)} scans, {covered[0]:.3f} s to"
-            f" {covered[-1]:.3f} s: nearer than its least range on opposite sides; they are left out"
+            f"expected a scanner with free space around it, found it inside an object in {len(covered)} scans,"
+            f" {covered[0]:.3f} s to {covered[-1]:.3f} s: returns nearer than its minimum range"
+            " on opposite sides; these scans are left out"
         )
     clocks.tell(topics.tells_motion, notes)
 
 
 class _Clocks:
-    """The times of scans and of odometry, which have to be of one clock."""
+    """The times of scans and odometry, which must be on one clock."""
 
     def __init__(self) -> None:
         self._scans: list[float] = []
@@ -130,7 +131,7 @@ class _Clocks:
         self._unstamped = 0
 
     def stamped(self, message: Any, recorded_ns: int) -> Any:
-        """Return a message that says a time: that of its recording where its own is zero."""
+        """Return a message with a time stamp: that of the recording if its own is zero."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         if stamp is None or seconds(stamp) != 0.0 or recorded_ns <= 0:
             return message
@@ -139,21 +140,21 @@ class _Clocks:
         return replace(message, header=replace(message.header, stamp=replace(stamp, sec=sec, nanosec=nanosec)))
 
     def told(self, time_s: float) -> float:
-        """Take note of the time of odometry, and return it."""
+        """Record the time of odometry, and return it."""
         self._odometry = min(self._odometry[0], time_s), max(self._odometry[1], time_s)
         return time_s
 
     def scanned(self, time_s: float) -> None:
-        """Take note of the time of a scan."""
+        """Record the time of a scan."""
         self._scans.append(time_s)
 
     def tell(self, has_motion: bool, notes: list[str]) -> None:
-        """Say what was assumed; raises ClockError where no scan is of a time with odometry."""
+        """Report assumptions; raises ClockError if no scan has a time with odometry."""
         first_s, last_s = self._odometry
         if self._unstamped:
             notes.append(
-                f"expected messages that say their time, found {self._unstamped} that say 0: the time of their"
-                " recording is taken"
+                f"expected messages with a time stamp, found {self._unstamped} that say 0: the time of"
+                " recording is used"
             )
         late = sum(time_s > last_s + GAP_S for time_s in self._scans)
         early = sum(time_s < first_s - GAP_S for time_s in self._scans)
@@ -161,24 +162,24 @@ class _Clocks:
             return
         if late + early == len(self._scans):
             raise ClockError(
-                f"expected scans and odometry by one clock, found scans from {min(self._scans):.3f} to"
-                f" {max(self._scans):.3f} s and odometry from {first_s:.3f} to {last_s:.3f} s: record both by one clock"
-                " (use_sim_time), or leave out the odometry"
+                f"expected scans and odometry on one clock, found scans from {min(self._scans):.3f} to"
+                f" {max(self._scans):.3f} s and odometry from {first_s:.3f} to {last_s:.3f} s: record both with one"
+                " clock (use_sim_time), or leave out the odometry"
             )
-        for count, words in ((early, "before its beginning: they stand where it begins"),
-                             (late, "after its end: they stand where it ends")):  # fmt: skip
+        for count, words in ((early, "before its beginning: its first pose is used"),
+                             (late, "after its end: its last pose is used")):  # fmt: skip
             if count:
                 notes.append(f"expected odometry for all scans, found {count} scans {words}")
 
 
 def _is_covered(message: Any, odometry: OdometryBuffer, topics: BagTopics) -> bool:
-    """Return whether all is known that the bag tells of the motion during a scan."""
+    """Return whether the odometry during a scan is complete."""
     last_s = seconds(message.header.stamp) + max(beam_s(message) * len(message.ranges), 0.0)
     return odometry.newest_s >= last_s or not topics.tells_motion
 
 
 def _frames(reader: Any, topics: BagTopics, notes: list[str]) -> Frames:
-    """Return the frames, read ahead until they tell where the scanner sits: a bag may tell it late."""
+    """Return the frames, read until they contain the scanner's place, which may come late in a bag."""
     frames, scan = Frames(), topics.first(reader, SCAN)
     if topics.odometry and (first := topics.first(reader, ODOMETRY)) is not None:
         frames.body = first.child_frame_id
@@ -190,8 +191,8 @@ def _frames(reader: Any, topics: BagTopics, notes: list[str]) -> Frames:
     if topics.tells_motion and not frames.tells(frame):
         body = frames.body or "the body"
         notes.append(
-            f"expected a transform from {body} to {frame or 'the scanner'}, found none: the scanner is taken to sit"
-            " at the middle of the robot, looking ahead; record /tf_static with the bag"
+            f"expected a transform from {body} to {frame or 'the scanner'}, found none: the scanner is assumed to"
+            " be at the middle of the robot, facing ahead; record /tf_static with the bag"
         )
     return frames
 
@@ -219,5 +220,5 @@ def _rests(_: float, __: float) -> Odometry:
 
 
 def _at_scanner(motion: Float[np.ndarray, "3"], place: Float[np.ndarray, "3"]) -> Odometry:
-    """Return the motion of a scanner that sits at a place of the robot."""
+    """Return the motion of a scanner, given its place on the robot and the motion of the robot."""
     return Odometry(compose(compose(inverse(place), motion), place), np.zeros((3, 3)))

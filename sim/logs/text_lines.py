@@ -1,4 +1,4 @@
-"""Lines of a text file, plain or gzip, one at a time: a file that breaks off says where."""
+"""Lines of a text file, plain or gzip, one at a time; an error contains the line number."""
 
 import gzip
 import zlib
@@ -9,18 +9,18 @@ from .archive import regular
 from .raw_scan import LogError
 
 LONGEST = 2**20
-"""Bytes; no line of a log is as long."""
+"""In bytes; no line of a log is as long."""
 GZIP = b"\x1f\x8b"
 
 
 def first_bytes(path: Path, count: int) -> bytes:
-    """Return how a file begins; raises OSError where there is no plain file."""
+    """Return the beginning of a file; raises OSError if there is no regular file."""
     with regular(path).open("rb") as file:
         return file.read(count)
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the words of each line that has some; raises OSError, and LogError where it breaks off."""
+    """Yield number and words of each line that is not empty; raises OSError, and LogError for a truncated file."""
     is_packed = first_bytes(path, 2) == GZIP
     number = 0
     with gzip.open(path, "rb") if is_packed else path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""Numbers of a log that cannot be in metres, radians and seconds are refused with the likely unit."""
+"""Plausibility of units: numbers that cannot be metres, radians or seconds are refused with the likely unit."""
 
 from itertools import pairwise
 
@@ -10,20 +10,20 @@ from chainslam.slam.geometry.poses import wrap
 from .raw_scan import LogError, RawScan
 
 CLOCKS = {1e11: ("milliseconds", "1000"), 1e14: ("microseconds", "1e6"), 1e17: ("nanoseconds", "1e9")}
-"""No clock says so many seconds: the units that do, and by what to divide."""
+"""Larger clock values are not seconds: the likely units and their divisors."""
 SLOW_S, SLOWEST_S = 10.0, 600.0
-"""A scan so seldom is told, and refused: a drive has one every second or so."""
+"""Longer times between scans are reported, and refused: a drive has a scan every second or so."""
 LONG_RANGE_M, FEW = 20.0, 0.02
-"""A scanner that sees so far gets more than this share of its beams back."""
+"""A scanner with this range gets more than this share of its beams back."""
 RANGES_M = 0.03, 100.0
-"""What the middle one of all returns lies within."""
+"""Upper limit of the median range."""
 FASTEST_M_S, FASTEST_RAD_S, FARTHEST_M = 30.0, 6.0, 20.0
-"""Mean speeds while it moves that no robot in a building has, and its way from scan to scan where no clock goes on."""
+"""Upper limits of mean speeds while moving, and of the distance between scans if the clock stands still."""
 ENOUGH = 3
 
 
 class Measures:
-    """What the scans of a log have in common, gathered one by one."""
+    """Statistics of a log's scans, collected one by one."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
@@ -32,7 +32,7 @@ class Measures:
         self._returned, self._beams, self._reach_m = 0, 0, 0.0
 
     def see(self, scan: RawScan) -> None:
-        """Take in a scan."""
+        """Add a scan."""
         returns = scan.ranges_m[np.isfinite(scan.ranges_m)]
         self._times.append(scan.time_s)
         if scan.robot_odom is not None:
@@ -44,7 +44,7 @@ class Measures:
         self._reach_m = max(self._reach_m, scan.range_max_m)
 
     def check(self, notes: list[str]) -> None:
-        """Raise LogError for a unit that cannot be; `notes` gets what is strange only."""
+        """Raise LogError for an impossible unit; `notes` receives what is only unusual."""
         times = np.array(self._times)
         seconds = np.diff(times)
         self._check_clock(times, seconds, notes)
@@ -67,7 +67,7 @@ class Measures:
         equal = int(np.count_nonzero(seconds == 0.0))
         if equal:
             notes.append(
-                f"expected times that go on, found {equal} of {len(times)} scans at the time of the one before"
+                f"expected increasing times, found {equal} of {len(times)} scans with the time of the one before"
             )
 
     def _check_ranges(self) -> None:
@@ -85,7 +85,7 @@ class Measures:
 
 
 def _check_motions(motions: Float[np.ndarray, "m 3"], seconds: Float[np.ndarray, " m"]) -> None:
-    """Raise LogError for motions from scan to scan that no robot makes."""
+    """Raise LogError for impossible motions between scans."""
     ways, turns = np.hypot(*motions[:, :2].T), np.abs(wrap(motions[:, 2]))
     moves, turning = ways > 1e-6, turns > 1e-3
     if np.count_nonzero(moves) >= ENOUGH:

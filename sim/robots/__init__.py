@@ -1,4 +1,4 @@
-"""Robots by name: what each states of itself, and the devices that a simulated one has."""
+"""Robots by name: their descriptions and simulated devices."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The reachable contour: the parts of faces that a robot can see from places that it can reach."""
+"""The reachable contour: the parts of faces that are visible from reachable positions."""
 
 from dataclasses import dataclass
 
@@ -7,19 +7,19 @@ import shapely
 from jaxtyping import Bool, Float, Int
 
 PITCH_M = 0.03
-"""Spacing of the points at which faces are tested; the ends of what is seen are then refined."""
+"""Spacing of the points at which visibility is tested; the ends of visible parts are then refined."""
 HALVINGS = 6
 FAN_RAD = np.deg2rad(1.0)
 COARSE = 12
-"""Every so manyth ray of the fan is tried first."""
+"""Every n-th ray of the fan is tried first."""
 BESIDE_RAD = 1e-6
 REACH_M = 0.002
-"""Arcs of the reachable region are polygons: a point this much farther than the radius is still touched."""
+"""Arcs of the reachable region are polygons; a point this much farther than the radius still counts as touched."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contour:
-    """What can be seen of each face."""
+    """The visible part of each face."""
 
     face: Int[np.ndarray, " m"]
     """Index of the face on which each interval lies, ascending."""
@@ -28,7 +28,7 @@ class Contour:
     segments: Float[np.ndarray, "m 2 2"]
     """The intervals as points, m, world frame, free side on the left."""
     rings: Int[np.ndarray, " c"]
-    """Rings of which a part worth speaking of is seen: 0.1 m, or half of a shorter ring."""
+    """Rings with a visible part of at least 0.1 m, or half of a shorter ring."""
 
     @property
     def length_m(self) -> float:
@@ -37,13 +37,13 @@ class Contour:
 
     @property
     def contours(self) -> int:
-        """Number of rings of which a part worth speaking of is seen."""
+        """Number of rings with a visible part of at least 0.1 m, or half of a shorter ring."""
         return len(self.rings)
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """Faces that hide, edges of the reachable region that see, and how far."""
+    """Occluding faces, edges of the reachable region as viewpoints, and the range."""
 
     faces: Float[np.ndarray, "n 2 2"]
     lookouts: Float[np.ndarray, "l 2 2"]
@@ -97,7 +97,7 @@ def _scene(faces: Float[np.ndarray, "n 2 2"], reachable: shapely.Polygon, radius
 
 
 def _seen(scene: _Scene, face: Int[np.ndarray, " k"], share: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
-    """Return which points, given as a share of the way along their faces, the reachable region sees."""
+    """Return which points, given as shares along their faces, are visible from the reachable region."""
     ends = scene.faces[face]
     points = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
     touched = scene.lookouts_tree.query(shapely.points(points), predicate="dwithin", distance=scene.radius_m + REACH_M)
@@ -135,14 +135,14 @@ def _sees(
     range_m: float,
 ) -> bool:
     """Return whether some ray from a face point, bearings in (base, base + pi), meets the region before a wall."""
-    # Most points look out along some ray of a few: the whole fan is for the others.
+    # Most points see the region along one of a few rays; the whole fan is for the others.
     few = fan[::COARSE]
     if np.any(_reach(point, few, lookouts, range_m) < _reach(point, few, walls, np.inf)):
         return True
     depth = _reach(point, fan, walls, np.inf)
     if np.any(_reach(point, fan, lookouts, range_m) < depth):
         return True
-    # A gap narrower than the fan's step lies between corners, so rays just beside each corner in sight find it.
+    # A gap narrower than the fan's step lies between corners, so rays just beside each visible corner find it.
     corner = walls.reshape(-1, 2) - point
     bearing = (np.arctan2(corner[:, 1], corner[:, 0]) - base) % (2 * np.pi)
     slot = np.clip((bearing / FAN_RAD - 0.5).astype(int), 0, len(fan) - 2)
@@ -162,7 +162,7 @@ def _in_front(
 def _reach(
     point: Float[np.ndarray, "2"], bearings: Float[np.ndarray, " r"], edges: Float[np.ndarray, "n 2 2"], limit_m: float
 ) -> Float[np.ndarray, " r"]:
-    """Return how far each ray runs from `point` before it meets an edge; infinite beyond `limit_m`."""
+    """Return the length of each ray from `point` to the first edge; infinite beyond `limit_m`."""
     ray_x, ray_y = np.cos(bearings)[:, None], np.sin(bearings)[:, None]
     (x, y), (along_x, along_y) = (edges[:, 0] - point).T, (edges[:, 1] - edges[:, 0]).T
     cross = ray_x * along_y - ray_y * along_x
@@ -180,7 +180,7 @@ def _refine(
     high: Float[np.ndarray, " t"],
     low_seen: Bool[np.ndarray, " t"],
 ) -> Float[np.ndarray, " t"]:
-    """Return where sight begins or ends between two neighbouring points, by halving."""
+    """Return where visibility begins or ends between two neighbouring points, by bisection."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         same = _seen(scene, face, middle) == low_seen

@@ -1,4 +1,4 @@
-"""What every reader of drawn maps hands on: walls as lines, solids as polygons, perhaps a start and named points."""
+"""The output of every reader of drawings: walls as lines, solids as polygons, an optional start and named points."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,11 +10,11 @@ from jaxtyping import Float
 from .text import printable
 
 SMALLEST_M, LARGEST_M = 1.0, 1000.0
-"""A drawing outside these extents has the wrong scale."""
+"""A drawing outside of these extents has the wrong scale."""
 
 
 class WorldError(ValueError):
-    """A map that cannot be used, told in one line: what was expected, what was found, what to do."""
+    """A map that cannot be used. The message is one line: what was expected, what was found, what to do."""
 
     def __init__(self, message: str) -> None:
         super().__init__(printable(message))
@@ -22,7 +22,7 @@ class WorldError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A map as drawn, metres in the world frame (x right, y up), before walls become solid."""
+    """A map as drawn, in metres in the world frame (x right, y up), before walls get a thickness."""
 
     lines: tuple[shapely.LineString, ...] = ()
     """Walls drawn as lines, each without thickness."""
@@ -33,17 +33,17 @@ class Drawing:
     labels: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Named points."""
     openings: tuple[shapely.Polygon, ...] = ()
-    """Doors: what is solid there opens, unless the building would open to its outside."""
+    """Doors: solid parts there are removed, unless that would open the building to its outside."""
     sheet: shapely.Polygon | None = None
-    """The border of a picture: nothing is known beyond it, so it bounds the free space."""
+    """The border of a picture: it bounds the free space, since nothing is known beyond it."""
     simplify_m: float = 0.012
-    """Deviations from straight below this are not drawn on purpose."""
+    """Smaller deviations from straight lines are considered unintended."""
     understood: str = ""
-    """What was taken for what, in words."""
+    """How parts were interpreted, in words."""
     notes: tuple[str, ...] = ()
-    """What was left out or not understood, each in words."""
+    """Parts that were left out or not understood, in words."""
     scale: str = ""
-    """What a unit is, and who said so, in words."""
+    """The unit and its source, in words."""
 
 
 def numbers(value: Any, counts: tuple[int, ...], what: str, example: str) -> Float[np.ndarray, " k"]:

@@ -1,4 +1,4 @@
-"""How large a drawing may be: what comes in below this is a world within 20 s and 1 GB."""
+"""Size limits of drawings: any drawing within them becomes a world within 20 s and 1 GB."""
 
 from collections.abc import Collection, Sequence
 
@@ -12,13 +12,13 @@ from .drawing import LARGEST_M, SMALLEST_M, WorldError
 WALLS_MAX = 20_000
 """Straight pieces of all lines and outlines."""
 MEETINGS_MAX = 200_000
-"""How often pieces may touch or cross another, ends that meet included."""
+"""How often pieces may touch or cross each other, including shared ends."""
 FARTHEST_M = 1e7
-"""Distance from the origin: any projected frame fits, and a micrometre is still a number there."""
+"""Distance from the origin: enough for any projected frame, with micrometres still resolved."""
 CLOSE_MAX = 150_000
-"""Pairs of pieces that do not meet, nearer than what they are widened by: each costs some 70 microseconds and 6 kB."""
+"""Pairs of separate pieces closer than their widening: each costs about 70 microseconds and 6 kB."""
 LABELS_MAX = 200
-"""Each pair of labels is measured."""
+"""The distances of all pairs of labels are computed."""
 CLOSE_M = 0.1
 """Walls are this thick."""
 AT_ONCE = 100
@@ -37,7 +37,7 @@ def check_size(lines: Sequence[shapely.LineString], polygons: Sequence[shapely.P
     check_count(sum(len(path) - 1 for path in paths))
     if not paths:
         return
-    # Not written as a comparison with the largest: NaN is too far, too.
+    # Not written as a comparison with the maximum: NaN is too far as well.
     if not all(np.all(np.abs(path) <= FARTHEST_M) for path in paths):
         raise WorldError(
             f"expected walls at most {FARTHEST_M:g} m from the origin, found farther ones: move the drawing, or correct"
@@ -52,15 +52,13 @@ def check_size(lines: Sequence[shapely.LineString], polygons: Sequence[shapely.P
         some = walls[first : first + AT_ONCE]
         meetings += tree.query(some, predicate="intersects").shape[1] - len(some)
         if meetings > MEETINGS_MAX:
-            raise WorldError(
-                f"expected walls that meet at most {MEETINGS_MAX} times, found more: this is a scribble; draw fewer"
-            )
+            raise WorldError(f"expected walls that meet at most {MEETINGS_MAX} times, found more: simplify the drawing")
 
     check_apart(lines, CLOSE_M)
 
 
 def check_extent(points: Float[np.ndarray, "n 2"]) -> None:
-    """Raise WorldError for points of a building, m, that say that its scale is wrong."""
+    """Raise WorldError if the extent of a building, m, shows that its scale is wrong."""
     extent = float(np.max(np.ptp(points, axis=0)))
     if not SMALLEST_M <= extent <= LARGEST_M:
         raise WorldError(
@@ -70,7 +68,7 @@ def check_extent(points: Float[np.ndarray, "n 2"]) -> None:
 
 
 def check_apart(shapes: Sequence[BaseGeometry], distance_m: float) -> None:
-    """Raise WorldError where too many pieces of lines or outlines lie closer together than they are widened by."""
+    """Raise WorldError if too many pieces of lines or outlines are closer than they are widened by."""
     parts = shapely.get_parts(shapely.get_parts(np.array([*shapes, shapely.LineString()], dtype=object)))
     rings = shapely.get_rings(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON])
     lines = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
@@ -93,4 +91,4 @@ def check_apart(shapes: Sequence[BaseGeometry], distance_m: float) -> None:
 def check_labels(names: Collection[str]) -> None:
     """Raise WorldError for more named points than a world may have."""
     if len(names) > LABELS_MAX:
-        raise WorldError(f"expected at most {LABELS_MAX} named points, found {len(names)}: take names away")
+        raise WorldError(f"expected at most {LABELS_MAX} named points, found {len(names)}: remove some")

@@ -44,7 +44,7 @@ def _lazily(module: str, name: str) -> Callable[..., Drawing]:
 
 @dataclass(frozen=True)
 class Family:
-    """Worlds without number: NAME:WHICH."""
+    """A family of worlds without a list: NAME:WHICH."""
 
     read: Callable[[str], Drawing]
     """From WHICH to a drawing."""
@@ -56,7 +56,7 @@ FAMILIES: dict[str, Family] = {
     "random": Family(
         _lazily("random.random_building", "read_seed"),
         "random:1",
-        "rooms, corridors, halls and slanted walls by chance; any seed after the colon",
+        "a randomly generated building; any seed after the colon",
     ),
 }
 
@@ -71,13 +71,13 @@ READERS: dict[str, Callable[[Path, DrawingOptions], Drawing]] = {
     ),
     **dict.fromkeys((".yaml", ".yml"), _lazily("readers.ros_map", "read_ros_map")),
 }
-"""Reader by file name extension; each takes the path and what the caller says of the drawing."""
+"""Reader by file name extension; each takes the path and the drawing options."""
 BUILT_IN = frozenset(READERS)
-"""What comes along; other readers are a user's own, of which the processes of a campaign are told."""
+"""The readers of chainslam itself; others are plug-ins, which the workers of a campaign need to load."""
 
 
 def listing() -> dict[str, str]:
-    """Return what each world is, by a name that `load` takes; a family is listed by an example."""
+    """Return a description of each world by a name that `load` accepts; a family is listed by an example."""
     families = {family.example: family.about for family in FAMILIES.values()}
     return {name: world.about for name, world in WORLDS.items()} | families
 
@@ -87,13 +87,12 @@ def load(
     start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
     options: DrawingOptions = AS_DRAWN,
 ) -> World:
-    """Return a bundled world, one of a family, or one drawn in a file.
+    """Return a bundled world, one of a family, or one from a file; raises WorldError.
 
-    `start` (x m, y m, heading rad; heading may be left out) overrides the drawing's own. `options` say what the file
-    leaves open. Raises WorldError, in one line.
+    `start` (x m, y m, and optionally the heading rad) replaces the drawing's own. `options` say how the file is read.
     """
     pose = None if start is None else as_pose(numbers(list(start), (2, 3), "start", "(x, y, heading)"))
-    # Degenerate shapes raise flags of floating point inside GEOS on the way to a sound result.
+    # Degenerate shapes raise floating-point flags inside GEOS on the way to a valid result.
     with np.errstate(all="ignore"):
         try:
             name, drawing = _read(str(name_or_path), options)
@@ -102,7 +101,7 @@ def load(
         try:
             return build(name, drawing, pose)
         except WorldError as error:
-            # What was not understood is most often why.
+            # What was not understood is usually the reason.
             raise WorldError(
                 f"{error} (the file: {'; '.join(drawing.notes)})" if drawing.notes else str(error)
             ) from None
@@ -120,10 +119,10 @@ def _read(text: str, options: DrawingOptions) -> tuple[str, Drawing]:
         return text, _read_svg((HERE / WORLDS[text].file).read_bytes(), options)
     family, colon, which = text.partition(":")
     if colon and family in FAMILIES:
-        options.check_only((), "a world by chance")
+        options.check_only((), "a random world")
         return text, FAMILIES[family].read(which)
     if not text.isprintable():
-        # Results name their world in many files, which are to be read again.
+        # Results contain the name of their world in many files, which must be readable.
         raise WorldError(f"expected a file name of letters that can be shown, found {shorten(text)}: rename the file")
     path = Path(text)
     check_foreign(path)

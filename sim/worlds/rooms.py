@@ -1,12 +1,11 @@
-"""Polygons drawn as rooms, as walls, or as things that stand in a room: which is which, and what of it is solid.
+"""Interpretation of polygons as rooms, walls or objects in a room, and which of their parts are solid.
 
-A polygon says nothing about its inside: some draw the floor of a room, others the walls around it. What the file says
-of a polygon decides. Where it says nothing, where the polygon lies decides, and how broad it is:
+A polygon may be the floor of a room or the wall around it. If the file does not say which, position and width decide:
 
-- inside another polygon, or inside what walls enclose with floor beside it, it stands there: it is solid;
-- else, together with those that it touches, it is a room if most of it is broader than any wall, and a wall if not.
+- inside another polygon, or inside an area that walls enclose and that has other floor, it is a solid object;
+- otherwise, together with those that it touches, it is a room if most of it is wider than any wall, else a wall.
 
-A room is free up to its outline; its holes, and all around it, are solid.
+A room is free up to its outline; its holes, and everything around it, are solid.
 """
 
 from collections.abc import Sequence
@@ -29,7 +28,7 @@ SHUT_M = 0.02
 NEAR_M = 1e-3
 MITRE = 10.0
 APART_MAX = 300
-"""Each is held against all others."""
+"""Every polygon is compared with all others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ def plan_of(outlines: Sequence[Outline], lines: Sequence[shapely.LineString]) ->
     pieces = areas(shapely.union_all(outer))
     if len(pieces) > APART_MAX:
         raise WorldError(
-            f"expected at most {APART_MAX} polygons apart from each other that do not say what they are, found"
+            f"expected at most {APART_MAX} separate polygons that do not say what they are, found"
             f" {len(pieces)}: give them a property kind, room or solid"
         )
     drawn_all = shapely.union_all([walls, *pieces])

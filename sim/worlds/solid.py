@@ -1,4 +1,4 @@
-"""From a drawing to a world: lines become thick walls, slits are sealed, the free space around the start is kept."""
+"""From a drawing to a world: lines become thick walls, slits are closed, the free space around the start is kept."""
 
 import numpy as np
 import shapely
@@ -14,14 +14,14 @@ from .text import name_of
 from .world import ROBOT_RADIUS_M, Reading, World
 
 SLIT_M = 0.06
-"""Free gaps narrower than this are artefacts of drawing: no beam should pass."""
+"""Narrower free gaps are artefacts of the drawing: no beam should pass."""
 MITRE = 10.0
 OUTSIDE_RATIO = 8.0
-"""A picture's margin is taken for the outside unless it is this much larger than all that the drawing encloses."""
+"""A picture's margin is outside, unless it is this much larger than everything that the drawing encloses."""
 
 
 def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = None) -> World:
-    """Return the world of a drawing, `start` overriding its own; raise WorldError where no robot could drive in it."""
+    """Return the world of a drawing, `start` replacing its own; raise WorldError if no robot could drive in it."""
     solid = _with_doors(solid_of(drawing), drawing.openings)
     check_extent(np.reshape(solid.bounds, (2, 2)))
     enclosed, open_parts = _free_parts(solid, drawing.sheet)
@@ -39,9 +39,9 @@ def build(name: str, drawing: Drawing, start: Float[np.ndarray, "3"] | None = No
 
 
 def solid_of(drawing: Drawing) -> BaseGeometry:
-    """Return all that is solid: walls 0.1 m thick around the lines, and filled polygons, mended where they cross."""
+    """Return everything solid: walls 0.1 m thick around the lines, and filled polygons, repaired where they cross."""
     if not drawing.lines and not drawing.solids:
-        raise WorldError("expected walls, found nothing drawn: draw dark lines or filled shapes")
+        raise WorldError("expected walls, found none: draw dark lines or filled shapes")
     lines, solids = _on_grid(drawing.lines), _on_grid(drawing.solids)
     merged = shapely.line_merge(shapely.union_all(lines)) if len(lines) else shapely.LineString()
     check_apart([merged], WALL_M)
@@ -51,7 +51,7 @@ def solid_of(drawing: Drawing) -> BaseGeometry:
 
 
 def _with_doors(solid: BaseGeometry, openings: tuple[shapely.Polygon, ...]) -> BaseGeometry:
-    """Return what is solid once the doors are open, but for those from which a robot could leave the building."""
+    """Return what is solid once the doors are open, except for those through which a robot could leave the building."""
     if not openings:
         return solid
     page = shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
@@ -62,7 +62,7 @@ def _with_doors(solid: BaseGeometry, openings: tuple[shapely.Polygon, ...]) -> B
 
 
 def _on_grid(shapes: tuple[shapely.LineString, ...] | tuple[shapely.Polygon, ...]) -> NDArray[np.object_]:
-    """Return shapes on a grid of 1 micrometre, without those that vanish: finer steps upset the algebra of polygons."""
+    """Return shapes on a grid of 1 micrometre, without those that vanish: smaller steps break polygon operations."""
     rounded: NDArray[np.object_] = shapely.transform(np.array(shapes, dtype=object), lambda at: np.round(at, 6))
     return rounded[shapely.length(rounded) > 0]
 
@@ -72,7 +72,7 @@ def _free_parts(
 ) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
     """Return the free parts that walls enclose, and those that end at the border of a picture."""
     page = sheet if sheet is not None else shapely.box(*solid.bounds).buffer(1.0, join_style="mitre")
-    # Slits are sealed first: two walls that all but touch keep the outside out.
+    # Slits are closed first: walls that almost touch keep the outside out.
     free = areas(page.difference(solid))
     check_apart(free, 0.5 * SLIT_M)
     parts = [piece for part in free for piece in _opened(part, SLIT_M)]
@@ -85,7 +85,7 @@ def _free_parts(
 
 
 def _behind_leaks(part: shapely.Polygon, page: shapely.Polygon) -> list[shapely.Polygon]:
-    """Return what is cut off from the outside if the gaps of the outer wall that no robot can pass are closed."""
+    """Return what is cut off from the outside once gaps of the outer wall that no robot can pass are closed."""
     roomy = _opened(part, 2 * ROBOT_RADIUS_M)
     outside = [piece for piece in roomy if shapely.distance(piece, page.exterior) < 1e-6]
     if len(outside) == len(roomy):
@@ -108,7 +108,7 @@ def _opened(part: shapely.Polygon, width_m: float) -> list[shapely.Polygon]:
 def _choose(
     enclosed: list[shapely.Polygon], open_parts: list[shapely.Polygon]
 ) -> tuple[shapely.Polygon, Float[np.ndarray, "3"]]:
-    """Return the part where a robot has most room to drive, and its place farthest from all walls."""
+    """Return the part with the most room for a robot, and its position farthest from all walls."""
     (inside_m2, inside), (outside_m2, outside) = (_roomiest(parts) for parts in (enclosed, open_parts))
     drivable_m2, part = (inside_m2, inside) if OUTSIDE_RATIO * inside_m2 >= outside_m2 else (outside_m2, outside)
     if drivable_m2 == 0:
@@ -131,7 +131,7 @@ def _roomiest(parts: list[shapely.Polygon]) -> tuple[float, shapely.Polygon]:
 
 
 def _drivable(part: shapely.Polygon) -> float:
-    """Return the area m2 of the largest piece that the robot's centre can roam."""
+    """Return the area m2 of the largest piece that the robot's centre can reach."""
     return max((piece.area for piece in areas(part.buffer(-ROBOT_RADIUS_M))), default=0.0)
 
 
@@ -143,7 +143,7 @@ def _part_with(start: Float[np.ndarray, "3"], solid: BaseGeometry, parts: list[s
     if solid.distance(at) < ROBOT_RADIUS_M:
         found = "inside a wall" if solid.contains(at) else "too near a wall"
     else:
-        found = "outside all that walls enclose"
+        found = "outside the area that walls enclose"
     raise WorldError(
         f"expected a start in the free space, found ({start[0]:.6g}, {start[1]:.6g}) {found}:"
         " move the start, or close the outer wall around it"

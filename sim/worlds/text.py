@@ -1,4 +1,4 @@
-"""Text that comes with a world, made fit for wherever it goes: a terminal, a file name, JSON, XML, a picture."""
+"""Text that comes with a world, made safe for terminals, file names, JSON, XML and pictures."""
 
 LONGEST = 80
 """Longest name or label, in characters."""
@@ -18,6 +18,6 @@ def printable(text: str) -> str:
 
 
 def name_of(text: str) -> str:
-    """Return text as a name: printable, not empty, and no longer than 80 characters."""
+    """Return text as a name: printable, not empty, and at most 80 characters."""
     name = printable(text)
     return "unnamed" if not name else name if len(name) <= LONGEST else name[: LONGEST - 1] + "…"

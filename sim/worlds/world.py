@@ -1,4 +1,4 @@
-"""A drawn building: its free space, its faces, what a robot can reach and see of it."""
+"""A building: its free space, its faces, and what a robot can reach and see of it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,30 +18,30 @@ SENSOR_RANGE_M = 4.0
 
 @dataclass(frozen=True)
 class Reading:
-    """How a drawing was read, in words: what was taken for what, and who said what was not drawn."""
+    """How a drawing was read, in words: the interpretation of its parts, and the source of scale and start."""
 
     understood: str
     scale: str
     start: str
     notes: tuple[str, ...] = ()
-    """What was left out or not understood, each in words."""
+    """Parts that were left out or not understood, in words."""
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """A building as it truly is; walls are solid."""
+    """The true building; walls are solid."""
 
     name: str
     free: shapely.Polygon
-    """The connected free region that holds the start, free side on the left of every directed edge."""
+    """The connected free region that contains the start; the free side is on the left of every directed edge."""
     start: Float[np.ndarray, "3"]
     """Pose (x m, y m, heading rad) in the world frame."""
     labels: dict[str, tuple[float, float]]
     """Named points, m, world frame."""
     reading: Reading | None = None
-    """None for a world that was not drawn."""
+    """None for a world without a drawing."""
     fence: shapely.Polygon | None = None
-    """Where the robot is to stay; None where it may go anywhere."""
+    """Where the robot must stay; None without a limit."""
 
     @cached_property
     def faces(self) -> Float[np.ndarray, "n 2 2"]:
@@ -61,11 +61,11 @@ class World:
 
     @cached_property
     def floor(self) -> BaseGeometry:
-        """The free region, what of it lies within the fence."""
+        """The free region within the fence."""
         return self.free if self.fence is None else shapely.intersection(self.free, self.fence)
 
     def reachable(self, radius_m: float = ROBOT_RADIUS_M) -> shapely.Polygon:
-        """Return where the centre of a disc of this radius can be driven from the start."""
+        """Return the positions that the centre of a disc of this radius can reach from the start."""
         room = self.free.buffer(-radius_m, quad_segs=16)
         floor = room if self.fence is None else shapely.intersection(room, self.fence.buffer(-radius_m))
         inner = shapely.get_parts(floor)
@@ -76,14 +76,14 @@ class World:
     def reachable_contour(
         self, radius_m: float = ROBOT_RADIUS_M, range_m: float = SENSOR_RANGE_M, scanner_m: float = 0.0
     ) -> Contour:
-        """Return the parts of the faces in line of sight within range of some place that the scanner can reach.
+        """Return the parts of the faces in line of sight within range of a reachable scanner position.
 
-        It sits so far from the middle of the disc, `scanner_m`, which turns to any side.
+        The scanner is `scanner_m` from the middle of the disc, in any direction.
         """
         lookouts, off_m = self.lookouts(radius_m, scanner_m), min(scanner_m, radius_m)
         return visible_contour(self.faces, self.face_rings, lookouts, radius_m - off_m, range_m)
 
     def lookouts(self, radius_m: float, scanner_m: float) -> shapely.Polygon:
-        """Return where a scanner so far from the middle of a disc can be; one beyond its rim counts as on it."""
+        """Return the possible positions of a scanner this far from the middle of a disc, at most on its rim."""
         reachable, off_m = self.reachable(radius_m), min(scanner_m, radius_m)
         return reachable if off_m <= 0.0 or reachable.is_empty else reachable.buffer(off_m, quad_segs=16)

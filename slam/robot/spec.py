@@ -76,7 +76,7 @@ class RobotSpec:
             object.__setattr__(self, "outline_m", _convex(self.outline_m))
             object.__setattr__(self, "radius_m", of_outline(np.array(self.outline_m)))
         if wrong := fault(self):
-            raise RobotError(f"expected what a robot states of itself, found {wrong}: correct it")
+            raise RobotError(f"expected a description of a robot, found {wrong}: correct it")
 
     @property
     def half_width_m(self) -> float:

@@ -28,10 +28,10 @@ def clocks(rng: Rng, folder: Path) -> Case:
             bag.odometry(time_s + off_s if how == 1 else time_s, pose)
             if k % 5 == 0:
                 bag.scan(time_s, seen_from(pose, low + step * np.arange(count)), low, step)
-    notes = {0: "expected a transform", 2: "that say 0: the time of their recording"}
+    notes = {0: "expected a transform", 2: "that say 0: the time of recording"}
     read = RealOptions(odometry="wheels")
     return Case(
         lambda: read_real_run(path, read, None, {}, {}),
         holds(SCANS, 0, notes.get(how, "")),
-        "expected scans and odometry by one clock" if how == 1 else "",
+        "expected scans and odometry on one clock" if how == 1 else "",
     )

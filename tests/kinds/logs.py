@@ -102,7 +102,7 @@ def times_back(rng: Rng, folder: Path) -> Case:
     newest = np.maximum.accumulate(times)
     left_out = int(np.count_nonzero(times < newest))
     equal = np.any(np.diff(times[times >= newest]) == 0.0)
-    note = "at the time of the one before" if equal else ""
+    note = "with the time of the one before" if equal else ""
     return Case(read(folder, replace(plain, time_s=times).flaser()), holds(SCANS - left_out, left_out, note))
 
 
@@ -113,7 +113,7 @@ def times_equal(rng: Rng, folder: Path) -> Case:
     low, high = sorted(int(k) for k in rng.choice(SCANS + 1, 2, replace=False))
     times[low:high] = times[low]
     times[low:high] = times[max(low - 1, 0)] if high - low == 1 and low else times[low]
-    note = "at the time of the one before" if np.any(np.diff(times) == 0.0) else ""
+    note = "with the time of the one before" if np.any(np.diff(times) == 0.0) else ""
     return Case(read(folder, replace(plain, time_s=times).flaser()), holds(SCANS, 0, note))
 
 
@@ -167,7 +167,7 @@ def beams(rng: Rng, folder: Path) -> Case:
     made = drive(rng, np.deg2rad(-90.0 + step * np.arange(count)))
 
     def check(run: RealRun) -> str:
-        wrong = holds(SCANS, 0, "" if count in known else f"found {count}: taken to be spread over 180")(run)
+        wrong = holds(SCANS, 0, "" if count in known else f"found {count}: assumed to cover 180")(run)
         off = np.abs(run.log.recording.bearings_rad - made.bearings).max()
         return wrong or ("" if off < 1e-9 else f"bearings {off:g} rad off")
 

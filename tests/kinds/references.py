@@ -26,7 +26,7 @@ def reference(rng: Rng, folder: Path) -> Case:
         case 1:
             times, refused = times - times[0], "its times count from its beginning"
         case 2:
-            times, refused = times + pick(rng, (-1.0, 1.0)) * rng.uniform(100.0, 1e6), "take one of this drive"
+            times, refused = times + pick(rng, (-1.0, 1.0)) * rng.uniform(100.0, 1e6), "use one of this drive"
         case 3:
             unit = pick(rng, sorted(LENGTHS))
             poses, refused = poses * [LENGTHS[unit], LENGTHS[unit], 1.0], f"{unit}? divide it"

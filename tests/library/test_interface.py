@@ -83,7 +83,7 @@ def test_distances_are_those_of_the_command(run, capsys):
     assert main(["measure", str(run.folder), str(first), str(second), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert run.measure(first, second).value == pytest.approx(told["distance_m"])
-    with pytest.raises(chainslam.UsageError, match="expected a corner out of"):
+    with pytest.raises(chainslam.UsageError, match="expected a corner from"):
         run.measure(0, 999)
 
 

@@ -1,4 +1,4 @@
-"""Figures, drawn by matplotlib with its own defaults: no MPLBACKEND and no matplotlibrc of a user changes them."""
+"""Figures, drawn by matplotlib with its own defaults: a user's MPLBACKEND or matplotlibrc does not change them."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ BACKEND, HOME = "MPLBACKEND", "MPLCONFIGDIR"
 
 
 def _loaded() -> None:
-    """Import matplotlib, which a backend of another environment keeps from it: that of a notebook's kernel."""
+    """Import matplotlib, even if the environment names a backend that does not exist here, such as a notebook's."""
     if not is_users_own():
         os.environ.setdefault(HOME, str(cache() / "matplotlib"))
     wanted = os.environ.pop(BACKEND, None)
@@ -29,7 +29,7 @@ _loaded()
 
 @contextmanager
 def own_look() -> Iterator[None]:
-    """Draw with matplotlib's defaults while the block, or the function, runs."""
+    """Draw with matplotlib's defaults in a block or a function."""
     import matplotlib as mpl
 
     with mpl.rc_context():

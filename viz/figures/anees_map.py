@@ -1,4 +1,4 @@
-"""Where consistency ends: the ANEES over two quantities that are swept, a field for each estimator."""
+"""Where consistency ends: the ANEES over a grid of two parameters, one panel for each estimator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from ..text import literal
 from . import own_look
 
 WORST = 100.0
-"""From here on all is one colour."""
+"""Larger values all have one colour."""
 COLOURS = "cividis_r"
-"""Told apart by lightness alone, and made for eyes that cannot tell red from green."""
+"""Distinguishable by lightness alone, also with red-green blindness."""
 DARK = 6.0
-"""Numbers above this stand on a dark field."""
+"""Numbers above this have a dark background."""
 
 
 @dataclass(frozen=True)
@@ -27,16 +27,16 @@ class Field:
 
     title: str
     anees: Float[np.ndarray, "r c"]
-    """1 is ideal; NaN where there is none."""
+    """1 is ideal; NaN where it is missing."""
     notes: tuple[tuple[str, ...], ...]
-    """A few words below each number."""
+    """A short text below each number."""
 
 
 @own_look()
 def anees_map(
     fields: Sequence[Sequence[Field]], rows: Sequence[str], columns: Sequence[str], labels: tuple[str, str]
 ) -> Figure:
-    """Draw fields (lines of them) over rows and columns named by words; `labels` says what rows and columns are."""
+    """Draw rows of panels over parameters named in words; `labels` names rows and columns."""
     high, wide = len(fields), max(len(line) for line in fields)
     size = max(1.6 + wide * (0.2 + 0.62 * len(columns)), 4.0), max(1.1 + high * (0.45 + 0.5 * len(rows)), 3.0)
     figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE, layout="constrained")

@@ -1,4 +1,4 @@
-"""A run as an animated GIF: the map as it was known at each moment, over the true floor."""
+"""A run as an animated GIF: the map as known at each moment, over the true floor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from ..text import literal
 from . import own_look
 
 FRAMES = 90
-"""A run of more steps shows this many of them, evenly spread."""
+"""Number of evenly spaced steps that are shown of a longer run."""
 FRAME_MS, LAST_MS = 90, 2500
 LONGER_SIDE_PX, HEAD_PX, FOOT_PX = 480, 46, 34
 LEAST_WIDTH_PX = 420
@@ -38,11 +38,11 @@ DPI = 100
 
 @dataclass(frozen=True)
 class Frame:
-    """What is drawn of one moment, all in the estimate's world frame."""
+    """The content of one frame, in the estimate's world frame."""
 
     step: int
     time_s: float
-    """By the robot's clock."""
+    """On the robot's clock."""
     path_length_m: float
     path_world: Float[np.ndarray, "s 3"]
     """The estimated poses up to now."""
@@ -51,17 +51,17 @@ class Frame:
     ends_world: Float[np.ndarray, "n 2 2"]
     chains: tuple[Chain, ...]
     hits_world: Float[np.ndarray, "h 2"]
-    """Where the beams of the scan ended."""
+    """Ends of the beams of the scan."""
     seen: Bool[np.ndarray, "r c"]
-    """Cells of the floor that were seen free so far; row is y."""
+    """Floor cells seen free so far; rows are y."""
     seen_origin_world: Float[np.ndarray, "2"]
     cell_m: float
     radius_m: float = RobotSpec.radius_m
-    """Of the body."""
+    """Radius of the body."""
 
 
 def shown_steps(count: int) -> list[int]:
-    """Return which steps of a run are drawn: the last one always among them."""
+    """Return which steps of a run are drawn, always including the last one."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, FRAMES))}) if count else []
 
 
@@ -80,7 +80,7 @@ def animated(frames: Sequence[Frame], true_floor: Sequence[Float[np.ndarray, "_ 
         images.append(_image(figure))
         for artist in drawn:
             artist.remove()
-    # One palette for all lets a frame hold nothing but what changed.
+    # With one palette for all frames, a frame only stores what changed.
     colours = _beside(images[len(images) // 2], images[-1]).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
     small = [image.quantize(palette=colours, dither=Image.Dither.NONE) for image in images]
     buffer = BytesIO()
@@ -98,7 +98,7 @@ def _words(frame: Frame) -> str:
 def _stage(
     frames: Sequence[Frame], true_floor: Sequence[Float[np.ndarray, "_ 2"]], title: str
 ) -> tuple[Figure, Axes, Text]:
-    """Return the figure with all that stays, its axes, and the words that change."""
+    """Return the figure with its static parts, its axes, and the text that changes."""
     last = frames[-1]
     points = np.concatenate([last.path_world[:, :2], last.ends_world.reshape(-1, 2), *true_floor])
     low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M

@@ -1,4 +1,4 @@
-"""Where nodes and edges of a visibility graph are drawn: beside the walls, round their corners, across the floor."""
+"""Positions of nodes and edges of a visibility graph: beside the walls, around their corners, across the floor."""
 
 from dataclasses import dataclass
 
@@ -6,22 +6,22 @@ import numpy as np
 from jaxtyping import Float, Int
 
 CURVED = 0.07
-"""How far a sight bends out of the straight line, over its length."""
+"""Curvature of an edge across the floor, as a share of its length."""
 ROUNDS = 60
-"""Nodes are moved apart so often at most."""
+"""Largest number of rounds in which nodes are moved apart."""
 POINTS = 17
-"""Of a curve."""
+"""Number of points of a curve."""
 STRAIGHT = 0.1
-"""Walls that turn by less, as a sine, go on straight."""
+"""Walls that turn by less, as a sine, continue straight."""
 FAR = 6.0
-"""No line goes round a corner farther out than so many times its distance from a wall."""
+"""Limit of the distance at which an edge passes a corner, as a multiple of its distance from the wall."""
 CLEAR = 1.3
-"""So many radii from the middle of a circle a sight ends."""
+"""Distance from the centre of a circle at which an edge ends, in radii."""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Circles of one size beside the middles of walls, on the free side, moved apart where they would overlap."""
+    """Equal circles beside the middles of walls, on the free side, moved apart where they would overlap."""
 
     at: Float[np.ndarray, "n 2"]
     radius_m: float
@@ -32,21 +32,21 @@ class Nodes:
         a, b = self.at[pairs[:, 0]], self.at[pairs[:, 1]]
         way = b - a
         middle = 0.5 * (a + b) + CURVED * np.stack([way[:, 1], -way[:, 0]], axis=-1)
-        # The curve is flat enough for its parameter to be the way along it.
+        # The curve is flat enough to treat its parameter as arc length.
         cut = np.minimum(CLEAR * self.radius_m / np.maximum(np.hypot(*way.T), 1e-9), 0.45)
         return bezier(a, middle, b, cut[:, None] + np.linspace(0.0, 1.0, POINTS) * (1.0 - 2.0 * cut[:, None]))
 
     def round_corner(self, first: int, second: int) -> Float[np.ndarray, "p 2"]:
-        """Return the way from one wall's circle round their corner, on the free side, to its neighbour's.
+        """Return the curve from a wall's circle around the corner, on the free side, to its neighbour's circle.
 
-        Where the first wall ends, the free side on its left, the second one begins.
+        The second wall begins where the first one ends; the free side is on the left of both.
         """
         meet = np.stack([self.ends_world[first, 1], self.ends_world[second, 0]])
         normals, gap_m = free_normals(self.ends_world[[first, second]]), beside_m(self.radius_m)
         turn = meet.mean(axis=0) + gap_m * normals[0]
         if abs(np.linalg.det(normals)) > STRAIGHT:
             crossing = np.linalg.solve(normals, np.sum(normals * meet, axis=1) + gap_m)
-            if np.hypot(*(crossing - turn)) <= FAR * gap_m:  # not far beyond a sharp tooth
+            if np.hypot(*(crossing - turn)) <= FAR * gap_m:  # not far beyond a sharp corner
                 turn = crossing
         a, b = self.at[first], self.at[second]
         legs = [_towards(turn, end, self.radius_m) for end in (a, b)]
@@ -66,7 +66,7 @@ def bezier(
 
 
 def beside_m(radius_m: float) -> float:
-    """Return how far from its wall the middle of a circle is."""
+    """Return the distance of each circle's centre from its wall."""
     return 1.45 * radius_m
 
 
@@ -83,7 +83,7 @@ def nodes_of(ends_world: Float[np.ndarray, "n 2 2"], radius_m: float) -> Nodes:
 
 
 def _apart(at: Float[np.ndarray, "n 2"], least_m: float) -> Float[np.ndarray, "n 2"]:
-    """Push places apart until no two are nearer than this, or for so many rounds."""
+    """Move positions apart until no two are closer than this, or for a number of rounds."""
     at = at.copy()
     for _ in range(ROUNDS):
         between = at[:, None] - at[None]
@@ -103,7 +103,7 @@ def _apart(at: Float[np.ndarray, "n 2"], least_m: float) -> Float[np.ndarray, "n
 
 
 def _towards(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], most_m: float) -> Float[np.ndarray, "2"]:
-    """Return the place so far on the way from one place to another, half the way at most."""
+    """Return the point at this distance along the line from one place to another, at most half of it."""
     way = end - start
     length = float(np.hypot(*way))
     return start + way * (min(most_m, 0.5 * length) / max(length, 1e-9))
@@ -112,7 +112,7 @@ def _towards(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], most_m:
 def heads(
     tips: Float[np.ndarray, "e 2"], before: Float[np.ndarray, "e 2"], size_m: float
 ) -> Float[np.ndarray, "e 3 2"]:
-    """Return arrow heads, triangles, at the ends of curves, given each end and the point before it."""
+    """Return arrow heads (triangles) at the ends of curves, given each end and the point before it."""
     way = tips - before
     along = size_m * way / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
     across = 0.42 * np.stack([-along[:, 1], along[:, 0]], axis=-1)

@@ -1,4 +1,4 @@
-"""Pictures of a map, in the manner of the paper's figures: a grid of one metre, open ends circled."""
+"""Pictures of a map, in the style of the paper's figures: a grid of one metre, open ends circled."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -29,30 +29,30 @@ from ..text import literal
 from . import own_look
 
 WALL_M = 0.1
-"""How thick true walls are drawn around the floor, m."""
+"""Line width of the true walls around the floor, m."""
 MARGIN_M = 0.6
 ENLARGED = 10.0
-"""How much ellipses are enlarged that could not be seen else."""
+"""Magnification of ellipses that would otherwise be invisible."""
 GRID_ORDER = 1.2
-"""Between the true floor and what is drawn on it."""
+"""Offset between the true floor and what is drawn on it."""
 LETTER_INCH = 0.072
-"""Mean width of a letter of the subtitle ..."""
+"""Mean width of a character of the subtitle ..."""
 TITLE_LETTER_INCH = 0.115
 """... and of the title."""
 LEAST_WIDTH_INCH = 5.0
 LARGEST_INCH = 30.0
-"""The longer side of a map of hundreds of metres, 4,500 pixels."""
+"""Longer side of the map in the picture of a map of hundreds of metres, 4,500 pixels."""
 GRID_M = (1.0, 5.0, 10.0, 50.0, 100.0, 500.0, 1e3, 5e3, 1e4, 5e4, 1e5)
-"""Distances of the lines of the grid ..."""
+"""Possible spacings of the grid lines ..."""
 GRID_LINES = 45
-"""... of which the first is taken that needs at most so many."""
+"""... the smallest of which is used that needs at most this many lines."""
 LEGEND_INCH = 2.3
 """Width of a column of the legend."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a picture of a map shows, all in one world frame."""
+    """The content of a picture of a map, all in one world frame."""
 
     map: StochasticMap
     chains: tuple[Chain, ...]
@@ -62,17 +62,17 @@ class Picture:
     subtitle: str = ""
     set_aside: tuple[SetAside, ...] = ()
     was_explored: bool = True
-    """Whether the robot chose its way; open ends of a drive that others chose are of no use to anybody."""
+    """Whether the robot chose its path; otherwise open ends are not drawn."""
     true_path_world: Float[np.ndarray, "s 3"] | None = None
     corners_world: Float[np.ndarray, "c 2"] = field(default_factory=lambda: np.zeros((0, 2)))
-    """Corners whose covariance is known, m."""
+    """Corners with known covariance, m."""
     corner_covs: Float[np.ndarray, "c 2 2"] = field(default_factory=lambda: np.zeros((0, 2, 2)))
     true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
-    """Rings of the true floor, the exterior first; empty where the truth is not known."""
+    """Rings of the true floor, the exterior first; empty without ground truth."""
     odometry_path_world: Float[np.ndarray, "s 3"] | None = None
-    """Where wheel odometry puts the robot."""
+    """Path of the wheel odometry."""
     radius_m: float = RobotSpec.radius_m
-    """Of the body."""
+    """Radius of the body."""
 
 
 @own_look()
@@ -113,17 +113,17 @@ def _write(axes: Axes, lines: list[str], above: float, **look: Any) -> None:
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as the bytes of a PNG file, the same for the same figure."""
+    """Return a figure as a PNG file, the same bytes for the same figure."""
     return saved(figure, "png")
 
 
 @own_look()
 def saved(figure: Figure, kind: Literal["png", "svg", "pdf"]) -> bytes:
-    """Return a figure as the bytes of a file, the same for the same figure; svg and pdf stay sharp at any size."""
+    """Return a figure as a file, the same bytes for the same figure; svg and pdf are sharp at any size."""
     buffer = BytesIO()
     unsaid = {"png": "Software", "svg": "Date", "pdf": "CreationDate"}
     with mpl.rc_context({"svg.hashsalt": "chainslam"}), warnings.catch_warnings():
-        # A letter that the font lacks is drawn as a box.
+        # Missing glyphs are drawn as boxes.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(buffer, format=kind, metadata={unsaid[kind]: None})
     return buffer.getvalue()
@@ -147,7 +147,7 @@ def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2
         axis.set_major_formatter(lambda value, _: f"{value:.0f}" if round(value / step) % 2 == 0 else "")
     axes.grid(color=palette.GRID, linewidth=0.6)
     for axis in (axes.xaxis, axes.yaxis):
-        # Above the floor, below all else; `axisbelow` knows only below the floor and above the paths.
+        # Above the floor and below everything else; `axisbelow` cannot place it between floor and paths.
         axis.set_zorder(GRID_ORDER)
     axes.tick_params(length=0, labelsize=7, labelcolor="#8A8A8A")
     for spine in axes.spines.values():
@@ -159,7 +159,7 @@ def _grid_m(span_m: float) -> float:
 
 
 def _floor(axes: Axes, picture: Picture, points_per_m: float) -> list[Patch | Line2D]:
-    """Fill the true floor and draw the true walls around it: a broad line, then the floor over its inner half."""
+    """Fill the true floor and draw the true walls around it: a wide line, then the floor over its inner half."""
     if not picture.true_floor:
         return []
     vertices = np.concatenate([np.concatenate([ring, ring[:1]]) for ring in picture.true_floor])
@@ -201,7 +201,7 @@ def _walls(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     for row in np.flatnonzero(picture.map.crooked):
         axes.plot(*ends[row].T, color=palette.CROOKED, linewidth=3.4, solid_capstyle="round", zorder=4.2)
     if picture.map.crooked.any():
-        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="not straight (crooked): unreliable"))
+        handles.append(Line2D([], [], color=palette.CROOKED, linewidth=3.4, label="wall with lack of fit: unreliable"))
     handles.append(_marker("o", palette.PAGE, palette.INK, 4, "corner"))
     return handles
 
@@ -228,7 +228,7 @@ def _ends(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     aside = {(end.wall, end.side) for end in picture.set_aside}
     handles: list[Patch | Line2D] = []
     ends = [end for chain in picture.chains for end in chain.open_ends if picture.was_explored]
-    kinds = ((False, palette.ALARM, "open end"), (True, palette.TENTATIVE, "open end, set aside"))
+    kinds = ((False, palette.ALARM, "open end"), (True, palette.TENTATIVE, "open end, blacklisted"))
     for set_aside, colour, label in kinds:
         places = [end.position_world for end in ends if ((end.wall, end.side) in aside) == set_aside]
         if places:
@@ -238,7 +238,7 @@ def _ends(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
 
 
 def _corner_ellipses(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
-    """Draw three standard deviations of the corners, enlarged where most could not be seen; the few large ones pale."""
+    """Draw 3 sigma ellipses of the corners, enlarged if most would be invisible; the few large ones are pale."""
     if not len(picture.corners_world):
         return []
     radii = 3.0 * np.sqrt(np.maximum(np.trace(picture.corner_covs, axis1=1, axis2=2), 0.0))
@@ -263,7 +263,7 @@ def _times_words(times: float) -> str:
 
 
 def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
-    """Draw the body, and the ellipse of three standard deviations, ten times as large where it could not be seen."""
+    """Draw the body and its 3 sigma ellipse, ten times as large if it would be invisible."""
     (x, y, heading), radius_m = picture.path_world[-1], picture.radius_m
     axes.add_patch(
         Circle((x, y), radius_m, facecolor="#FFFFFFCC", edgecolor=palette.PATH_ESTIMATED, linewidth=1.3, zorder=6.5)
@@ -285,7 +285,7 @@ def _robot(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
 
 
 def _start_sign() -> Path:
-    """Return a cross in a circle: the letter for it would load the setting of formulas, a tenth of a second."""
+    """Return a cross in a circle as a path: as a character it would load the formula engine, a tenth of a second."""
     cross = Path([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], [Path.MOVETO, Path.LINETO] * 2)
     return Path.make_compound_path(Path.unit_circle(), cross)
 

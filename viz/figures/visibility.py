@@ -1,4 +1,4 @@
-"""A map with its partial visibility graph, in the manner of the paper's figure 4: walls as numbered circles."""
+"""A map with its partial visibility graph, in the style of the paper's figure 4: walls as numbered circles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,18 +27,18 @@ from .graph_shapes import Nodes, heads, nodes_of
 
 MARGIN_M = 0.5
 RADIUS_POINTS = 7.5
-"""Of a node's circle ..."""
+"""Radius of a node's circle ..."""
 LEAST_POINTS = 3.2
 """... and in a map of hundreds of walls."""
 HEAD_POINTS = 5.5
 LONGER_INCH = 8.5
-"""The longer side of the map; that of a large one is larger, so that its circles have room."""
+"""Longer side of the map in the picture; that of a large map is larger, to have room for its circles."""
 LARGEST_INCH = 20.0
 EDGE_INCH = 0.15
 LETTER_INCH = 0.072
-"""Mean width of a letter of the subtitle."""
+"""Mean width of a character of the subtitle."""
 WALLS = 60
-"""A map of more walls is a large one."""
+"""A map with more walls is a large one."""
 
 
 @dataclass(frozen=True)
@@ -52,23 +52,23 @@ class GraphPicture:
     title: str
     subtitle: str = ""
     names: Mapping[int, str] = field(default_factory=dict)
-    """What stands in the circle of a wall, where it is not its id."""
+    """Labels of walls, where they are not the ids."""
     route: tuple[int, ...] = ()
-    """Ids of walls to be followed, in order, drawn boldly."""
+    """Ids of the walls to follow, in order, drawn with wide lines."""
     true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = ()
-    """Rings of the true floor, the exterior first; empty where the truth is not known."""
+    """Rings of the true floor, the exterior first; empty without ground truth."""
 
 
 @dataclass(frozen=True)
 class _Edges:
-    """Of a graph, as rows of the walls that are drawn."""
+    """Edges of a graph, as rows of the drawn walls."""
 
     neighbours: Int[np.ndarray, "n 2"]
     """Each pair once; the second follows the first in its chain."""
     mutual: Int[np.ndarray, "m 2"]
-    """Each was seen from the other."""
+    """Pairs that were seen from each other."""
     single: Int[np.ndarray, "s 2"]
-    """The second was seen from the first, and not the first from the second."""
+    """The second was seen from the first, but not the first from the second."""
 
 
 @own_look()
@@ -98,7 +98,7 @@ def draw_graph(picture: GraphPicture) -> Figure:
 
 
 def extent_of(picture: GraphPicture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
-    """Return the lower left and the upper right corner of what is drawn, m."""
+    """Return the lower left and the upper right corner of the picture's content, m."""
     points = np.concatenate([picture.map.ends_world.reshape(-1, 2), *picture.true_floor])
     return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
 
@@ -111,7 +111,7 @@ def paint_graph(
     inch_per_m: float,
     largest_points: float = RADIUS_POINTS,
 ) -> list[Line2D]:
-    """Paint map and graph, and return what the legend tells.
+    """Draw map and graph, and return the legend.
 
     `inch_per_m` is the scale of the axes, `largest_points` the radius of a circle in a map of few walls.
     """

@@ -1,4 +1,4 @@
-"""Steps to a Rerun recording; this package is the only importer of rerun, and is imported only when one is asked for.
+"""Steps to a Rerun recording. This is the only package that imports rerun, and it is only imported for a recording.
 
 World entities are in metres under `/world`, whose transform turns y up; `/model` is the plane of (alpha, r).
 """

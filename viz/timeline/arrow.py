@@ -1,4 +1,4 @@
-"""Keeps pyarrow from importing pandas, which it does at its first conversion and no recording needs."""
+"""Prevents pyarrow from importing pandas at its first conversion; no recording needs it."""
 
 import sys
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import pyarrow as pa
 
 
 class _NoPandas:
-    """An import hook under which pandas is not installed."""
+    """An import hook that hides pandas."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         if name == "pandas":
@@ -18,10 +18,10 @@ class _NoPandas:
 
 
 def settle() -> None:
-    """Let pyarrow make its first conversion without pandas, which saves 0.3 s of a run.
+    """Let pyarrow make its first conversion without pandas, which saves 0.3 s per run.
 
-    Nothing is changed where pandas is there already. What uses pandas later does so as ever: pyarrow looks again when a
-    DataFrame is handed to it or asked of it.
+    Nothing changes if pandas is imported already, and later uses of pandas work as usual: pyarrow looks for it again
+    when a DataFrame is passed to it or requested.
     """
     if "pandas" in sys.modules:
         return

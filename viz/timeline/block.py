@@ -1,4 +1,4 @@
-"""Some steps of one back end, with what several layers draw of them computed once for all."""
+"""Some steps of one back end, with shared computations of several layers."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -12,7 +12,7 @@ from .drawn_step import DrawnStep
 from .recording import Timestamps
 
 UNUSED, FUSED, NEW, REFUSED = 0, 1, 2, 3
-"""What became of a segment."""
+"""Fate of a segment."""
 
 
 class Block:
@@ -28,7 +28,7 @@ class Block:
         return len(self.rows)
 
     def walls_at(self, row: int) -> slice:
-        """Return where the walls of one row stand in the arrays over all walls."""
+        """Return the slice of one row's walls in the arrays over all walls."""
         return slice(int(self._first[row]), int(self._first[row + 1]))
 
     @cached_property
@@ -60,16 +60,16 @@ class Block:
 
     @cached_property
     def row_of_segment(self) -> Int[np.ndarray, " s"]:
-        """The row in which each segment was seen."""
+        """The row of each segment."""
         return np.repeat(np.arange(len(self)), [len(row.segments) for row in self.rows])
 
     def count(self, chosen: Int[np.ndarray, " m"] | np.ndarray) -> Int[np.ndarray, " n"]:
-        """Return how many of the chosen segments each row has."""
+        """Return the number of selected segments in each row."""
         return np.bincount(self.row_of_segment[chosen], minlength=len(self))
 
     @cached_property
     def verdicts(self) -> tuple[Int[np.ndarray, " s"], list[str]]:
-        """What became of each segment, and words about it."""
+        """Fate of each segment, and its description."""
         kinds = np.zeros(len(self.row_of_segment), dtype=np.int64)
         words = [""] * len(kinds)
         first = 0

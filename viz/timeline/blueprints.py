@@ -1,4 +1,4 @@
-"""How the viewer arranges a recording: one run, several back ends side by side, a campaign's summary."""
+"""Layout of a recording in the viewer: one run, several back ends side by side, a campaign's summary."""
 
 from collections.abc import Sequence
 
@@ -21,13 +21,13 @@ TRACE_NAME = "trace of the pose covariance, m² + rad²"
 
 
 Bounds = tuple[tuple[float, float], tuple[float, float]]
-"""From and to along x and along y of a view, y down."""
+"""Ranges of a view along x and y, y down."""
 
 
 def one_run(
     backend: str, seen_world: Float[np.ndarray, "n 2"], plane: Bounds, knows_truth: bool = True
 ) -> rrb.Horizontal:
-    """Return the layout of one run: the map large, the estimate's insides beside it, the reasons below."""
+    """Return the layout of one run: a large map, the state of the estimator beside it, the reasons below."""
     below = rrb.Horizontal(_decisions(backend), _legend(), column_shares=[1.2, 1])
     left = rrb.Vertical(map_view(backend, seen_world, knows_truth), below, row_shares=[2.1, 1])
     right = rrb.Vertical(
@@ -49,7 +49,7 @@ def one_run(
 def comparison(
     backends: Sequence[str], seen_world: Float[np.ndarray, "n 2"], plane: Bounds, knows_truth: bool = True
 ) -> rrb.Vertical:
-    """Return the layout of several back ends side by side, and their curves in common plots."""
+    """Return the layout of several back ends side by side, with their curves in common plots."""
     columns = rrb.Horizontal(
         *(
             rrb.Vertical(
@@ -79,7 +79,7 @@ def comparison(
 
 
 def map_view(backend: str, seen_world: Float[np.ndarray, "n 2"], knows_truth: bool = True) -> rrb.Spatial2DView:
-    """Return the map of one back end, over the truth where that is known."""
+    """Return the map of one back end, over the truth if it is known."""
     over = " over the truth" if knows_truth else ""
     start, end = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     so_far = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=end) for line in (STEP, SIM_TIME)])
@@ -113,7 +113,7 @@ def graph_view(backend: str, seen_world: Float[np.ndarray, "n 2"]) -> rrb.GraphV
 
 
 def nees_view(legend: bool = False) -> rrb.TimeSeriesView:
-    """Return the pose's NEES with its band; what leaves the scale is far from consistent, however far."""
+    """Return the pose's NEES with its band; values beyond the scale are inconsistent in any case."""
     high = 2.5 * POSE_BAND[1]
     return curve_view(NEES, f"NEES of the pose, its 95 % band in grey (cut at {high:.0f})", (-1.0, high), legend)
 
@@ -132,7 +132,7 @@ def curve_view(
 
 
 def _bounds(seen: Float[np.ndarray, "n 2"], margin: float) -> rrb.VisualBounds2D | None:
-    """Return the part of the plane that holds all points, y up; None where there are none."""
+    """Return the part of the plane that contains all points, y up; None without points."""
     if not len(seen):
         return None
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
@@ -144,7 +144,7 @@ def _legend() -> rrb.TextDocumentView:
 
 
 def _decisions(backend: str) -> rrb.TextLogView:
-    # The lines begin with their step: the viewer would show the times in a column too narrow for them.
+    # The lines start with their step, because the viewer's column for times is too narrow.
     hidden = [rrb.encodings.TimelineColumn(timeline, visible=False) for timeline in (STEP, SIM_TIME)]
     return rrb.TextLogView(
         origin=f"/decisions/{backend}", name="decisions and their reasons",
@@ -153,7 +153,7 @@ def _decisions(backend: str) -> rrb.TextLogView:
 
 
 def blueprint(*uses: rrb.Horizontal | rrb.Vertical) -> rrb.Blueprint:
-    """Return the whole layout: one use, or a tab for each, the panels aside."""
+    """Return the whole layout: a single view, or a tab for each, without side panels."""
     return rrb.Blueprint(
         uses[0] if len(uses) == 1 else rrb.Tabs(*uses), rrb.TimePanel(state="collapsed", timeline="step"),
         rrb.SelectionPanel(state="collapsed"),

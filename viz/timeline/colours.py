@@ -1,4 +1,4 @@
-"""The palette's colours as Rerun counts them."""
+"""The palette in Rerun's colour format."""
 
 import numpy as np
 from jaxtyping import Int, UInt32
@@ -27,7 +27,8 @@ _TENTATIVE, _CROOKED = packed(palette.TENTATIVE), packed(palette.CROOKED)
 
 
 class WallColours:
-    """Red for a crooked wall, else a colour for each chain, warm while it is open and cool once it is closed.
+    """Red for a wall with lack of fit, otherwise a colour for each chain: warm while it is open, cool once it is
+    closed.
 
     A chain keeps its colour as long as its oldest wall.
     """

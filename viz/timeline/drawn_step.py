@@ -1,4 +1,4 @@
-"""What a timeline keeps of one step: small arrays and references, cheap while the robot drives."""
+"""The part of one step that a timeline keeps: small arrays and references, cheap while the robot drives."""
 
 from dataclasses import dataclass
 
@@ -20,19 +20,19 @@ from chainslam.slam.robot import RobotSpec, Scan
 from .colours import WallColours
 
 EVERY_ALL, EVERY_SEEN = 50, 3
-"""The covariance of every wall is asked for once in so many steps, that of walls just seen once in so many."""
+"""Steps between two queries of the covariance of every wall, and of walls just seen."""
 EVERY_GRAPH = 20
 EVERY_SWEPT = 20
 EVERY_OWN_SCAN = 4
-"""Without a grid of the mission's own (a replay plans nothing), every so many scans are drawn into one."""
+"""If the mission has no grid (a replay plans nothing), every n-th scan is drawn into one."""
 OWN_CELL_M = 0.1
 OWN_REACH_M = 15.0
-"""What scanners of a longer reach do not see again is not drawn as floor."""
+"""Farther floor is not drawn, since scanners with a longer reach do not see it again."""
 
 
 @dataclass(frozen=True)
 class Ellipses:
-    """Walls whose covariance was asked for at a step."""
+    """Walls whose covariance was queried at a step."""
 
     ids: Int[np.ndarray, " m"]
     means: Float[np.ndarray, "m 2"]
@@ -55,11 +55,11 @@ class Sights:
 
 @dataclass(frozen=True)
 class Swept:
-    """What had been seen free at a step."""
+    """The floor seen free at a step."""
 
     free: Bool[np.ndarray, "h w"]
     corner_world: Float[np.ndarray, "2"]
-    """Of the lowest row and first column, m."""
+    """Corner of the lowest row and first column, m."""
     cell_m: float
 
 
@@ -72,14 +72,14 @@ class DrawnWalls:
     anchors: Float[np.ndarray, "n 2"]
     extents: Float[np.ndarray, "n 2"]
     colours: UInt32[np.ndarray, " n"]
-    """Of each wall, by its chain."""
+    """Colour of each wall, by its chain."""
     ellipses: Ellipses | None
     chains: tuple[Chain, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnStep:
-    """One step, as much of it as is drawn."""
+    """The drawn part of one step."""
 
     index: int
     time_s: float
@@ -103,7 +103,7 @@ class DrawnStep:
 
 
 class Keeper:
-    """Keeps of the steps of one back end what is drawn."""
+    """Keeps the drawn part of the steps of one back end."""
 
     def __init__(self) -> None:
         self._own: FreeSpace | None = None
@@ -112,7 +112,7 @@ class Keeper:
         self._coloured = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint32))
 
     def keep(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> DrawnStep:
-        """Return what is drawn of a step; it asks the step's belief, so before the back end moves on."""
+        """Return the drawn part of a step; it queries the step's belief, so call it before the back end continues."""
         belief, walls = step.map.belief, step.map
         last = step.ended is not None
         ids, colours = walls.ids.copy(), self._colours.of_walls(walls, step.chains)
@@ -172,7 +172,7 @@ class Keeper:
 
 
 def _ellipses(step: Step, last: bool, recoloured: Bool[np.ndarray, " n"]) -> Ellipses | None:
-    """Ask for the covariance of the walls to be drawn anew: just seen, recoloured, now and then all; None for none."""
+    """Query the covariance of the walls to draw again: just seen, recoloured, at intervals all; None for none."""
     belief = step.map.belief
     ids = belief.ids
     if not last and step.index % EVERY_ALL:

@@ -1,4 +1,4 @@
-"""One back end's part of a recording: steps in, and every so often columns out, layer by layer."""
+"""One back end's part of a recording: it receives steps and regularly sends columns, layer by layer."""
 
 from typing import Protocol
 
@@ -19,15 +19,15 @@ from .recording import RerunRecording
 
 
 class Layer(Protocol):
-    """One kind of thing in a recording; it sends what changed of it and remembers what it sent."""
+    """One kind of thing in a recording; it sends its changes and remembers what it has sent."""
 
     def send(self, block: Block) -> None:
-        """Send some steps, in order, none twice."""
+        """Send some steps, in order and only once."""
         ...
 
 
 class Lane:
-    """Gathers the steps of one back end."""
+    """Collects the steps of one back end."""
 
     def __init__(self, recording: RerunRecording, backend: str, truth: TruthLayer, nees_of: NeesOf | None) -> None:
         self._keeper = Keeper()
@@ -56,11 +56,11 @@ class Lane:
 
     @property
     def r_span(self) -> tuple[float, float]:
-        """Least and largest r of the lines so far, m."""
+        """Smallest and largest r of the lines so far, m."""
         return self._r_span
 
     def add(self, step: Step, true_pose_world: Float[np.ndarray, "3"] | None) -> None:
-        """Keep a step; its belief is asked at once, before the back end moves on."""
+        """Keep a step; its belief is queried at once, before the back end continues."""
         self.seen_world = step.map.ends_world.reshape(-1, 2)
         self._kept.append(self._keeper.keep(step, true_pose_world))
 

@@ -1,6 +1,6 @@
 """A Rerun recording written by columns: many moments of one entity in one call, from flat arrays without copies.
 
-Colours are packed 0xRRGGBBAA numbers; a negative radius means points of the screen, whatever the zoom.
+Colours are packed 0xRRGGBBAA numbers; a negative radius is in screen points, independent of the zoom.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ from .arrow import settle
 APPLICATION = "chainslam"
 STEP, SIM_TIME = "step", "sim_time"
 PATIENCE_S = 30.0
-"""So long a viewer may take over what it was sent last."""
+"""Time limit for a viewer to take what it was sent last."""
 _VEC2 = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
 _STRIP = pa.list_(pa.field("item", _VEC2, nullable=False))
 
 
 @dataclass(frozen=True)
 class Timestamps:
-    """When each row of some columns holds."""
+    """Times of the rows of some columns."""
 
     step: Int[np.ndarray, " n"]
     seconds: Float[np.ndarray, " n"]
@@ -52,19 +52,19 @@ class RerunRecording:
         self._stream.send_recording_name(name)
 
     def layout(self, blueprint: rrb.Blueprint) -> None:
-        """Say how the viewer arranges what it shows."""
+        """Set the layout in the viewer."""
         self._stream.send_blueprint(blueprint, make_active=True, make_default=True)
 
     def finish(self) -> bytes:
-        """Wait until all that was sent has arrived, and return the bytes of an .rrd file; none with a viewer.
+        """Wait until everything has arrived, and return the bytes of an .rrd file; none with a viewer.
 
-        Raises RuntimeError where a viewer has gone, or does not answer.
+        Raises RuntimeError if a viewer was closed or does not answer.
         """
         self._stream.flush(timeout_sec=PATIENCE_S)
         return b"" if self._memory is None else self._memory.drain_as_bytes()
 
     def fixed(self, entity: str, *archetypes: Any) -> None:
-        """Log what holds at all times: styles, texts, frames, true walls."""
+        """Log static data: styles, texts, frames, true walls."""
         self._stream.log(entity, *archetypes, static=True)
 
     def strips(
@@ -132,7 +132,7 @@ class RerunRecording:
         corners: Float[np.ndarray, "n 2"],
         cell: float,
     ) -> None:
-        """Send grids of classes whose first row lies lowest, with their lower left corner and the size of a cell, m."""
+        """Send grids of classes, lowest row first, with their lower left corner and the size of a cell, m."""
         corner = np.column_stack([corners, np.zeros(len(corners))])
         scale = np.tile([cell, cell, 1.0], (len(corners), 1))
         columns = [
@@ -180,7 +180,7 @@ class RerunRecording:
 
 @dataclass(frozen=True)
 class _Times:
-    """A column of times as Rerun's own `TimeColumn` holds it, made without a detour over Python objects."""
+    """A column of times as in Rerun's own `TimeColumn`, but made without Python objects."""
 
     name: str
     values: Int[np.ndarray, " n"]
@@ -200,7 +200,7 @@ def _nanoseconds(seconds: Float[np.ndarray, " n"]) -> _Times:
 
 
 def _plain(values: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """Return an arrow array over the same memory."""
+    """Return an arrow array that shares the memory."""
     flat = np.ascontiguousarray(values)
     return pa.Array.from_buffers(kind, flat.size, [None, pa.py_buffer(flat)])
 

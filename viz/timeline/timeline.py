@@ -22,12 +22,12 @@ from .recording import RerunRecording
 from .words import legend
 
 BLOCK = 500
-"""So many steps are kept before they are sent."""
+"""Steps that are collected before they are sent."""
 LIVE_BLOCK = 10
 
 
 class Timeline:
-    """Steps in, one recording out. The truth comes as plain geometry."""
+    """Receives steps and writes one recording. The truth comes as plain geometry."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Timeline:
         true_pose_world: Float[np.ndarray, "3"] | None = None,
         wheels_pose_world: Float[np.ndarray, "3"] | None = None,
     ) -> None:
-        """Take in one step of one back end, before that back end moves on; the wheels' path is drawn where given."""
+        """Add one step of one back end, before it continues; `wheels_pose_world` is by odometry."""
         lane = self._lanes[backend]
         if wheels_pose_world is not None:
             self._wheels.add(step, wheels_pose_world)
@@ -73,7 +73,7 @@ class Timeline:
         self._summary = Summary(self._out, trials, steps)
 
     def close(self) -> bytes:
-        """Send what is left, and return the bytes of the .rrd file; none where a viewer has it all."""
+        """Send the rest, and return the bytes of the .rrd file; none if a viewer received everything."""
         for lane in self._lanes.values():
             lane.flush()
         self._wheels.flush()
@@ -82,12 +82,12 @@ class Timeline:
         return self._out.finish()
 
     def discard(self) -> None:
-        """Throw away what was recorded; without this, Rerun would complain of it in its own words."""
+        """Discard the recording; without this, Rerun would print a complaint."""
         if not self._is_live:
             self._out.finish()
 
     def _fixtures(self, title: str) -> None:
-        """Log what holds at all times: frames, words, classes of floor."""
+        """Log static data: frames, texts, classes of floor."""
         self._out.fixed("/world", rr.Transform3D(scale=[1.0, -1.0, 1.0]))
         classes: list[tuple[int, str, tuple[int, ...] | int]] = [
             (0, "not seen", (255, 255, 255, 0)),
@@ -113,7 +113,7 @@ class Timeline:
         return blueprint(*uses, *([] if self._summary is None else [self._summary.layout()]))
 
     def _plane(self) -> Plane:
-        """Return the plane that holds the true lines, or what the maps hold where the truth is not known."""
+        """Return the plane that contains the true lines, or those of the maps without ground truth."""
         spans = [lane.r_span for lane in self._lanes.values()]
         for ring in self._rings:
             r = through(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1))[:, 1]

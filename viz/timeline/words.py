@@ -1,4 +1,4 @@
-"""What a newcomer reads beside the picture."""
+"""The legend of a recording."""
 
 from .layers.model_layer import TIMES
 from .layers.robot_layers import POSE_TIMES
@@ -11,13 +11,13 @@ NIS = """**NIS**: how far each scan's segments lie from where the belief puts th
 
 
 def legend(title: str, plans: bool, knows_truth: bool = True) -> str:
-    """Return, in Markdown, what is shown and how to move through it; a replay `plans` nothing."""
+    """Return, in Markdown, the meaning of what is shown and how to navigate it; a replay `plans` nothing."""
     goal = " Yellow: the goal, and the walls to follow there." if plans else ""
     return f"""**{title}**. Drag the time cursor below: everything moves together.
 
 **Map**, {TRUTH if knows_truth else NO_TRUTH}
-Estimated walls: orange and brown in chains still open, blue and violet in closed ones, grey not yet trusted,
-red crooked; black dots: corners. Red circles: open ends, to be explored; grey circles: given up.{goal}
+Estimated walls: orange and brown in chains still open, blue and violet in closed ones, grey tentative,
+red with lack of fit; black dots: corners. Red circles: open ends, to be explored; grey circles: blacklisted.{goal}
 Robot with its 3σ ellipse, {POSE_TIMES:.0f} times enlarged; small dots: the scan;
 its segments: green fused, blue new, red refused (and why), grey unused.
 Pale blue: floor seen so far. Thin lines: the visibility graph.

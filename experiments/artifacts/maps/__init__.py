@@ -1,1 +1,1 @@
-"""The map of a run as files: written, and read again."""
+"""The map of a run as files, written and read again."""

@@ -44,7 +44,7 @@ def _area(mapped: MappedCorners, room: Room, islands: list[shapely.Geometry]) ->
 
 
 def _polygon(mapped: MappedCorners, room: Room) -> shapely.Geometry:
-    if len(room.corners) < 3:  # two faces of one thin thing, seen all around
+    if len(room.corners) < 3:  # the two faces of one thin object, seen from all sides
         return shapely.Polygon()
     return shapely.make_valid(shapely.Polygon(mapped.points.positions_world[list(room.corners)]))
 

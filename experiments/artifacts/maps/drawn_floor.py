@@ -1,4 +1,4 @@
-"""The floor that the scans of a recorded drive show, drawn once the drive is over and its poses are known."""
+"""The floor seen in a recorded drive, computed at its end, when all poses are known."""
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +9,7 @@ from chainslam.slam.odometry.config import ScanMatchingConfig
 
 
 def drawn_floor(recording: Recording, poses_world: Float[np.ndarray, "s 3"], config: FreeSpaceConfig) -> FreeSpace:
-    """Return the free floor by a recording's scans at these poses; none of it where no grid is large enough."""
+    """Return the floor that a recording's scans show from these poses; empty if no grid is large enough."""
     floor = FreeSpace(config)
     try:
         for index, pose_world in enumerate(poses_world):

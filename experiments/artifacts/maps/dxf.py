@@ -21,16 +21,16 @@ LAYERS = {
     OPEN_ENDS: (1, 18, "Continuous"),
     NOTES: (8, 13, "Continuous"),
 }
-"""Colour (of the CAD palette), width of lines in 0.01 mm, and line type of each layer."""
+"""Colour (in the CAD palette), line width in 0.01 mm, and line type of each layer."""
 DASH_M = 0.2, -0.1
 LETTERS = "CHAINSLAM"
-"""Style of the letters; by it the reader of worlds knows a drawing of ours."""
+"""Text style; by its name the reader of worlds recognises a drawing written by chainslam."""
 CAPITALS = 0.72
-"""Height of a capital, which a drawing states, as a share of the letters' height, which the floor plan states."""
+"""Height of capitals, which DXF states, as a share of the letter height, which the floor plan states."""
 RING_M, START_M, NOTE_M = 0.2, 0.12, 0.2
-"""Radius of the rings around open ends and around the start, and height of the letters of a note."""
+"""Radius of the rings around open ends and the start, and letter height of notes."""
 VERSION = "R2000"
-"""The oldest format that states its unit: all that read DXF read it."""
+"""The oldest format that states its unit, which every DXF reader supports."""
 
 
 def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimension], title: str) -> bytes:
@@ -53,7 +53,7 @@ def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimensio
 
 @contextmanager
 def _without_time() -> Iterator[None]:
-    """Let a drawing not tell when it was made, and have no identity of its own."""
+    """Remove time stamps and identifiers, so that the same map gives the same bytes."""
     from ezdxf import options  # type: ignore[attr-defined]
 
     before, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
@@ -64,16 +64,16 @@ def _without_time() -> Iterator[None]:
 
 
 class _Plan:
-    """Gathers shapes in a drawing, and keeps how far they reach."""
+    """Collects the shapes of a drawing and their extent."""
 
     def __init__(self) -> None:
-        # To import it takes longer than ten steps, and most commands write no drawing.
+        # Importing it takes longer than ten steps, and most commands write no drawing.
         from ezdxf import units
         from ezdxf.filemanagement import new
 
         with _without_time():
             self._document = new(VERSION, units=units.M)
-        self._document.linetypes.add(DASHED, [sum(map(abs, DASH_M)), *DASH_M], description="not seen well enough yet")
+        self._document.linetypes.add(DASHED, [sum(map(abs, DASH_M)), *DASH_M], description="not confirmed yet")
         self._document.styles.add(LETTERS, font="arial.ttf")
         for name, (colour, width, line) in LAYERS.items():
             self._document.layers.add(name, color=colour, lineweight=width, linetype=line)
@@ -82,12 +82,12 @@ class _Plan:
 
     @property
     def bounds(self) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
-        """The lower left and the upper right corner around all shapes, m; zeros where there are none."""
+        """Lower left and upper right corner of all shapes, m; zeros without shapes."""
         points = np.concatenate(self._corners) if self._corners else np.zeros((1, 2))
         return points.min(axis=0), points.max(axis=0)
 
     def drawing(self, low_world: Float[np.ndarray, "2"], high_world: Float[np.ndarray, "2"]) -> bytes:
-        """Return the file, which a program opens with all between two corners in sight."""
+        """Return the file, with a view that shows everything between two corners."""
         size = high_world - low_world
         for name, at in (("EXT", (low_world, high_world)), ("LIM", (low_world, high_world))):
             for end, corner in zip(("MIN", "MAX"), at, strict=True):
@@ -103,7 +103,7 @@ class _Plan:
         return self._document.encode(text.getvalue())
 
     def feature(self, feature: Mapping[str, Any]) -> None:
-        """Draw a feature of `map.geojson`, of the kinds that a floor plan has."""
+        """Draw a feature of `map.geojson` of a kind that a floor plan shows."""
         properties, coordinates = feature["properties"], feature["geometry"]["coordinates"]
         match properties["kind"]:
             case "chain" if properties["closed"]:
@@ -120,12 +120,12 @@ class _Plan:
                 self._ring(coordinates, RING_M, OPEN_ENDS)
 
     def dimension(self, told: Dimension) -> None:
-        """Write a length beside its wall, or an area into its room, as the floor plan does."""
+        """Write a length beside its wall, or an area in its room, as in the floor plan."""
         if told.letters_m is not None:
             self._text(told.words, told.beside_world, CAPITALS * told.letters_m, -told.clockwise_deg, DIMENSIONS)
 
     def note(self, words: str, corner_world: Float[np.ndarray, "2"]) -> None:
-        """Write a line of words that begins at a place."""
+        """Write a line of text that starts at a point."""
         self._text(words, corner_world, NOTE_M, 0.0, NOTES, is_centred=False)
 
     def _way(self, points_world: Any, layer: str, closed: bool = False) -> None:
@@ -156,7 +156,7 @@ class _Plan:
     ) -> None:  # fmt: skip
         from ezdxf.enums import TextEntityAlignment
 
-        # A line of the file is a value: a line break in a world's name would end it.
+        # A value takes one line of the file, so a line break in a world's name would end it.
         line = "".join(each if each.isprintable() else " " for each in words)
         on = {"layer": layer, "style": LETTERS}
         text = self._space.add_text(line, height=height_m, rotation=turn_deg, dxfattribs=on)

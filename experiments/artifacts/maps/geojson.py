@@ -1,4 +1,4 @@
-"""The map as GeoJSON, in local metres: walls and corners with covariances, chains, what is left open or unseen."""
+"""The map as GeoJSON, in local metres: walls and corners with covariances, chains, open ends and unseen floor."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -131,12 +131,12 @@ def _obstacle_feature(thing: LeftObstacle) -> dict[str, Any]:
 
 
 def _trajectory_feature(log: Log) -> dict[str, Any]:
-    """Return the estimated way; a run of one step has a way of no length."""
+    """Return the estimated path; a run of one step has a path of zero length."""
     way = log.estimated_world[:, :2] if len(log) > 1 else np.repeat(log.estimated_world[:, :2], 2, axis=0)
     return _feature("LineString", way, kind="trajectory", steps=len(log), path_length_m=log.path_length_m[-1])
 
 
 def _start_feature(log: Log) -> dict[str, Any]:
-    """Return where the robot believes to have started: explored as a world, the map has a start."""
+    """Return the estimated start, so that the map can be explored as a world."""
     x, y, heading = log.estimated_world[0]
     return _feature("Point", [x, y], kind="start", id="start", heading=heading)

@@ -42,7 +42,7 @@ REMEDY = "name the folder of a run"
 def read_map(folder: Path) -> dict[str, np.ndarray]:
     """Return the arrays of a run's `map.npz`; raises UsageError for anything else.
 
-    The covariance is NaN throughout where the back end had lost it.
+    The covariance is NaN throughout if the back end had lost it.
     """
     path = folder / "map.npz"
     arrays = read_arrays(path, LAYOUT, REMEDY)
@@ -52,12 +52,12 @@ def read_map(folder: Path) -> dict[str, np.ndarray]:
         if len(cov) != 3 + 2 * len(ids):
             raise ArchiveError(f"a covariance of {len(cov)} columns for {len(ids)} walls")
         if np.any(np.diff(ids) <= 0) or np.any(ids < 0):
-            raise ArchiveError("walls whose ids do not rise")
+            raise ArchiveError("wall ids that are not ascending")
         places = [arrays[name] for name in ("pose", "lines", "lines_world", "anchors", "extents")]
         if not all(within(values, MOST_M) for values in places):
-            raise ArchiveError(f"places that are NaN or beyond {MOST_M:g} m")
+            raise ArchiveError(f"positions that are NaN or beyond {MOST_M:g} m")
         if not lost and not (within(cov, MOST_M) and are_covariances(cov)):
-            raise ArchiveError("a covariance that is none")
+            raise ArchiveError("an invalid covariance")
     return arrays
 
 
@@ -85,10 +85,10 @@ def read_features(folder: Path, ids: np.ndarray) -> dict[str, list[dict[str, Any
 
 
 def _way(feature: dict[str, Any]) -> None:
-    """Raise UnfitError where a chain has no way of two points or more, or a closed one not exactly one ring."""
+    """Raise UnfitError if a chain has fewer than two points, or a closed chain is not exactly one ring."""
     way = feature["geometry"]["coordinates"]
     if feature["properties"]["closed"]:
         way = way[0] if len(way) == 1 else []
     points = fit(list[PAIR], way, "a chain's coordinates")
     if len(points) < 2 or not within(np.array(points), MOST_M):
-        raise UnfitError("a chain that is no way")
+        raise UnfitError("a chain that is not a path")

@@ -1,4 +1,4 @@
-"""A run's map as it stands on disk: corners, walls and closed chains, with the joint covariance of all walls."""
+"""A run's map, read from its files: corners, walls and closed chains, with the joint covariance of all walls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,39 +23,41 @@ from .map_files import read_features, read_map
 
 @dataclass(frozen=True)
 class Room:
-    """A closed chain: the inside of a room, or the outside of something that stands in one."""
+    """A closed chain: the inside of a room, or the outside of an object in one."""
 
     chain: int
     corners: tuple[int, ...]
-    """Names of its corners, in order, the free side on the left."""
+    """Ids of its corners, in order, with the free side on the left."""
     is_island: bool
-    """Whether the free side lies outside."""
+    """Whether the free side is outside."""
 
 
 @dataclass(frozen=True)
 class MappedCorners:
-    """The corners of a map; their names are the ids of `map.geojson`, from 0 on."""
+    """The corners of a map; their names are the ids in `map.geojson`, from 0."""
 
     points: CornerPoints
     walls: tuple[tuple[int, int], ...]
-    """Ids of the two walls that meet in each corner."""
+    """Ids of the two walls that meet at each corner."""
     chains: tuple[int, ...]
     """The chain of each corner."""
     sharp: tuple[bool, ...]
-    """Whether its walls cross clearly: the place of other corners is not known along their walls."""
+    """Whether its walls cross at a clear angle; the other corners are not known along their walls."""
     rooms: tuple[Room, ...]
 
     def __len__(self) -> int:
         return len(self.walls)
 
     def named(self, name: str, folder: Path) -> int:
-        """Return a corner by its name; raises UsageError for one that is none, or whose walls lie on one line."""
+        """Return a corner by its name; raises UsageError for an unknown one, and for one whose walls are collinear."""
         corners = {str(k): k for k in range(len(self))}
         if name not in corners:
             known = f"0 to {len(self) - 1}" if corners else "none"
-            raise UsageError(f"expected a corner out of {known}, found {name!r}: see `chainslam measure {folder}`")
+            raise UsageError(f"expected a corner from {known}, found {name!r}: see `chainslam measure {folder}`")
         if not self.sharp[corners[name]]:
-            raise UsageError(f"expected walls that cross, found those of corner {name} on one line: take another")
+            raise UsageError(
+                f"expected a corner of two walls that cross, found collinear ones at corner {name}: choose another"
+            )
         return corners[name]
 
     def distance(self, first: int, second: int) -> Measured:
@@ -77,11 +79,13 @@ class MappedCorners:
 
 
 def read_corners(folder: Path) -> MappedCorners:
-    """Read `map.npz` and `map.geojson` of a run; raises UsageError, in one line, where they are no map."""
+    """Read `map.npz` and `map.geojson` of a run; raises UsageError for anything else."""
     arrays = read_map(folder)
     features = read_features(folder, arrays["ids"])
     if not np.all(np.isfinite(arrays["cov"])):
-        raise UsageError("expected a map with its joint covariance, found one that was lost: measure another run")
+        raise UsageError(
+            "expected a map with its joint covariance, found one whose estimate was lost: measure another run"
+        )
     return corners_of(arrays, features["corner"], features["chain"])
 
 

@@ -74,7 +74,7 @@ def _seen(free_space: FreeSpace) -> tuple[Integer[np.ndarray, "h w"], tuple[floa
     evidence = np.where(free_space.beyond, 0, free_space.evidence)
     seen = np.argwhere(evidence != 0)
     if not len(seen):
-        raise ValueError("expected floor that was seen, found none: this robot kept no free space")
+        raise ValueError("expected floor seen by the robot, found none: the run kept no free space")
     low = np.maximum(seen.min(axis=0) - BORDER_CELLS, 0)
     high = np.minimum(seen.max(axis=0) + 1 + BORDER_CELLS, evidence.shape)
     x, y = free_space.origin_world + low[::-1] * free_space.config.cell_m

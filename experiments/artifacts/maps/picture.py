@@ -1,4 +1,4 @@
-"""The pictures of a run's map and of its visibility graph, the truth moved by the initial pose error under both."""
+"""Pictures of a run's map and visibility graph over the truth, which is moved by the initial pose error."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,12 +28,12 @@ from .visibility import graph_words
 
 
 def picture_of(result: TrialResult) -> bytes:
-    """Return the PNG of a trial's map; raises ValueError where there was no step to draw."""
+    """Return the PNG of a trial's map; raises ValueError if there was no step to draw."""
     return png(draw_map(map_picture(result)))
 
 
 def map_picture(result: TrialResult) -> Picture:
-    """Return what the picture of a trial's map shows; raises ValueError where there was no step to draw."""
+    """Return the content of the picture of a trial's map; raises ValueError if there was no step to draw."""
     if result.log is None or result.last is None:
         raise ValueError("expected a run of at least one step, found none: there is no map to draw")
     log, last, scenario = result.log, result.last, result.scenario
@@ -51,7 +51,7 @@ def map_picture(result: TrialResult) -> Picture:
 
 
 def graph_png(result: TrialResult) -> bytes:
-    """Return the PNG of a trial's map with its visibility graph; raises ValueError where there was no step to draw."""
+    """Return the PNG of a trial's map with its visibility graph; raises ValueError if there was no step to draw."""
     shown = map_picture(result)
     assert result.log is not None
     assert result.last is not None
@@ -66,7 +66,7 @@ def graph_picture(shown: Picture, graph: "nx.DiGraph[int]", route: Route) -> Gra
 
 
 def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> Picture:
-    """Return the picture of a recorded drive: no truth lies under it, but the path that the wheels tell."""
+    """Return the picture of a recorded drive: without the truth, but with the path of the wheel odometry."""
     summary, config = result.summary, result.scenario.config
     looked = summary.get("second_looks", summary)
     words = [
@@ -77,7 +77,7 @@ def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> 
         map=last.map,
         chains=last.chains,
         path_world=log.estimated_world if result.smoothed is None else result.smoothed.poses_world,
-        title=f"{result.scenario.world.name}   {config.backend if looked is summary else 'second looks'}",
+        title=f"{result.scenario.world.name}   {config.backend if looked is summary else 'offline refinement'}",
         subtitle=";  ".join(words),
         odometry_path_world=odometry_poses(log.estimated_world[0], recorded.recording.odometry[: len(log)]),
         radius_m=config.robot.radius_m,
@@ -97,11 +97,11 @@ def over_truth(
     true_world: Float[np.ndarray, "s 3"],
     start_estimate: Float[np.ndarray, "3"],
 ) -> Picture:
-    """Return what the picture of a map shows."""
+    """Return the content of the picture of a map."""
     to_estimate = inverse(own_alignment(start_estimate, estimated_world, true_world, summary["map_began_step"]))
     rings = (world.free.exterior, *world.free.interiors)
     off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
-    laid_over = " laid over the truth" if summary["map_began_step"] else ""
+    laid_over = " aligned with the truth" if summary["map_began_step"] else ""
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
         f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",

@@ -17,7 +17,7 @@ from ..reading import read_json, told
 from ..schema import UnfitError, many
 
 VISIBILITY = "visibility.json"
-REMEDY = "run it anew with this version"
+REMEDY = "repeat the run with this version"
 Node = defstruct("Node", [("id", int)])
 Edge = defstruct("Edge", [("source", int), ("target", int), ("kind", Literal[NEIGHBOUR, SIGHT])])
 Planned = defstruct("Planned", [("step", int), ("walls", list[int])])
@@ -26,7 +26,7 @@ Visibility = defstruct("Visibility", [("graph", NodeLinks), ("route", Planned)])
 
 
 def visibility_record(last: Step, log: Log) -> dict[str, Any]:
-    """Return the graph of the last step, as networkx's node-link data, with the longest route that was planned."""
+    """Return the graph of the last step, as networkx's node-link data, with the longest planned route."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(sorted(last.graph))
     graph.add_edges_from(sorted(last.graph.edges(data=True), key=lambda edge: edge[:2]))
@@ -54,7 +54,7 @@ def read_visibility(folder: Path, ids: Int[np.ndarray, " n"]) -> tuple["nx.DiGra
 
 
 def graph_words(graph: "nx.DiGraph[int]", route: Route) -> str:
-    """Return how large a graph is, and the longest route that was planned, in words."""
+    """Return the size of a graph and its longest planned route, in words."""
     kinds = [str(edge["kind"]) for *_, edge in graph.edges(data=True)]
     pairs, sights = kinds.count(NEIGHBOUR) // 2, kinds.count(SIGHT)
     words = f"{len(graph)} walls, {pairs} pairs of neighbours, {sights} sights"

@@ -1,4 +1,4 @@
-"""Innovations on true associations, taken before any gate: a gate would cut off the very tail that tells."""
+"""Innovations of true associations, taken before any gate, which would truncate their distribution."""
 
 from dataclasses import dataclass, field
 
@@ -19,18 +19,18 @@ from ...scoring.innovations import share_in_own_band
 
 @dataclass
 class InnovationEar:
-    """Listens to a matcher that knows the true pairs, and keeps what the filter thought of each scan beforehand."""
+    """Wraps a matcher that knows the true pairs, and records the innovations of each scan."""
 
     reliability: ReliabilityConfig
-    """Segments of an unclear direction move no estimate and are not listened to."""
+    """Segments of uncertain direction do not change the estimate and are ignored."""
     values: list[float] = field(default_factory=list)
-    """NIS of each scan that showed a known wall."""
+    """NIS of each scan with a known wall."""
     dofs: list[int] = field(default_factory=list)
     _before: dict[int, Float[np.ndarray, "2"]] = field(default_factory=dict)
     _pairs: list[Float[np.ndarray, "2 2"]] = field(default_factory=list)
 
     def around(self, matcher: Matcher) -> Matcher:
-        """Return the matcher, overheard."""
+        """Return the wrapped matcher."""
 
         def overheard(
             segments: Segments, walls: KnownWalls, joint: Joint, config: MatchingConfig, *, clear_only: bool = False
@@ -43,7 +43,7 @@ class InnovationEar:
         return overheard
 
     def mean(self) -> float | None:
-        """Return the NIS over its degrees of freedom, all scans together: 1 is ideal."""
+        """Return the NIS of all scans over its degrees of freedom: 1 is ideal."""
         return float(np.sum(self.values) / np.sum(self.dofs)) if self.values else None
 
     def in_band(self) -> float | None:
@@ -51,7 +51,7 @@ class InnovationEar:
         return share_in_own_band(self.values, self.dofs) if self.values else None
 
     def whiteness(self) -> float | None:
-        """Return the correlation of a wall's normalised innovations in two scans running: 0 for a right filter."""
+        """Return the correlation of a wall's normalised innovations in consecutive scans: 0 for a correct filter."""
         if not self._pairs:
             return None
         before, after = np.array(self._pairs).transpose(1, 0, 2)
@@ -73,7 +73,7 @@ class InnovationEar:
             return
         self.values.append(value)
         self.dofs.append(len(e))
-        # Each wall's own 2 by 2 block, whitened: comparable from scan to scan whatever else was seen beside it.
+        # Whiten each wall's own 2 by 2 block, so that scans are comparable whatever else they show.
         blocks = S.reshape(len(rows), 2, len(rows), 2)[np.arange(len(rows)), :, np.arange(len(rows))]
         white = np.linalg.solve(np.linalg.cholesky(blocks), e.reshape(-1, 2, 1))[..., 0]
         now = dict(zip(pairs[:, 1].tolist(), white, strict=True))
@@ -84,7 +84,7 @@ class InnovationEar:
 def stacked(
     joint: Joint, rows: Int[np.ndarray, " m"], lines_robot: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k k"]]:
-    """Return the innovation (2m,) of lines seen on the joint's lines `rows`, and the covariance that it should have."""
+    """Return the innovation (2m,) of lines observed for the joint's lines `rows`, and its predicted covariance."""
     m = len(rows)
     means = joint.mean[3:].reshape(-1, 2)
     model = innovations(joint.mean[:3], joint.anchors[rows], means[rows], lines_robot, cov)

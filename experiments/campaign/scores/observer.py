@@ -1,4 +1,4 @@
-"""What a campaign keeps of a run beyond its log: the map at some moments, and what became of every segment."""
+"""What a campaign records of a run besides its log: the map at some moments, and the fate of every segment."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,32 +16,32 @@ from ...scoring.association import OVERLAP_M, Votes
 from ...scoring.beam_votes import UNLABELLED, vote
 
 MARKS_M = (10.0, 20.0, 33.0)
-"""Metres driven at which runs are compared; the end is the fourth mark (issue: equal metres)."""
+"""Path lengths at which runs are compared; the end of the run is the fourth mark."""
 EVERY_M = 2.0
-"""Metres driven between two looks at the coverage."""
+"""Path length between two measurements of the coverage."""
 SAME_SIDE_RAD, NEAR_M = np.pi / 4, 0.5
-"""A segment lies on a mapped wall if it overlaps it, faces the same way and stands this near to its line."""
+"""A segment lies on a mapped wall if it overlaps it, faces the same side and is this near to its line."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """The map when the robot had driven so far."""
+    """The map at a given path length."""
 
     index: int
     """The step."""
     path_length_m: float
     map: StochasticMap
-    """A copy, which the back end leaves alone."""
+    """A copy, independent of the back end."""
     joint: Joint | None
-    """Pose and all lines; only at the marks, and None where the back end could not tell."""
+    """Pose and all lines; only at the marks, and None if the back end could not compute it."""
 
 
 @dataclass(frozen=True)
 class Fate:
-    """What became of one segment that was seen well on one true wall."""
+    """The fate of a segment whose true wall is clear."""
 
     owner: int
-    """The line that it was fused into or began; -1 where it was not used."""
+    """The line into which it was fused or which it started; -1 if it was not used."""
     known: bool
     """Whether that line was in the map before this scan."""
     wall: int
@@ -52,7 +52,7 @@ class Fate:
 
 @dataclass
 class Observer:
-    """Watches the steps of one run."""
+    """Observes the steps of one run."""
 
     walls_of_faces: Int[np.ndarray, " n"]
     """The true wall of each true face."""
@@ -65,7 +65,7 @@ class Observer:
     _before: StochasticMap | None = None
 
     def __call__(self, step: Step) -> None:
-        """Take note of one step."""
+        """Record one step."""
         self.fates += self._fates(step)
         self._before = step.map
         if step.path_length_m >= EVERY_M * len(self.moments):
@@ -112,7 +112,7 @@ def association_counts(fates: list[Fate], votes: Votes) -> dict[str, int]:
 def _lying_on(
     ends_robot: Float[np.ndarray, "m 2 2"], pose_world: Float[np.ndarray, "3"], walls: StochasticMap
 ) -> list[Int[np.ndarray, " _"]]:
-    """Return, for each segment, the rows of the established walls that it lies on."""
+    """Return, for each segment, the rows of the confirmed walls that it lies on."""
     lines = walls.belief.lines_world
     ends = to_world(ends_robot, pose_world)
     n, t = normals(lines[:, 0]), directions(lines[:, 0])
@@ -129,7 +129,7 @@ def _lying_on(
 def _joint(step: Step) -> Joint | None:
     try:
         return step.map.belief.joint(step.map.ids)
-    except Exception:  # whatever a failing back end raises must not end the run that is watched
+    except Exception:  # errors of the back end must not end the observed run
         return None
 
 

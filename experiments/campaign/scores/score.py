@@ -1,4 +1,4 @@
-"""What is kept of one trial: its summary, its scores at equal metres, and small arrays of its steps."""
+"""The scores of one trial: its summary, its scores at equal path lengths, and small arrays over its steps."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -27,30 +27,30 @@ from .observer import Moment, Observer, association_counts
 
 END = "end"
 ROUNDING = 1e-6
-"""A trace or a bound missed by less than this share of the start's trace is not missed."""
+"""A trace or a bound that is exceeded by less than this share of the initial trace is not counted."""
 RPE_STEPS = 10
 
 
 @dataclass(frozen=True)
 class TrialScores:
-    """What is kept of one trial."""
+    """The record of one trial."""
 
     summary: dict[str, Any]
     """The keys of summary.json and those of the campaign; plain values, and `marks`, a row for each mark."""
     arrays: dict[str, np.ndarray]
-    """Empty where the trial ended before its first step."""
+    """Empty if the trial ended before its first step."""
 
 
 def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None) -> TrialScores:
     """Score a trial that was observed."""
-    # The curve of a campaign's trials is one of its arrays, where all trials are scored as noisy ones.
+    # The curve is one of the arrays of a campaign, all of whose trials are scored like noisy ones.
     summary = {key: value for key, value in result.summary.items() if key != "coverage_curve"}
     log, last = result.log, result.last
     if log is None or last is None:
         return TrialScores(summary, {})
     to_true = alignment(result.scenario.start_estimate, log.true_world[0])
     samples = sample(result.votes.truth)
-    # The truth's frame is that of the true start: what nothing can observe is undone, as in all scores of places.
+    # The estimate is moved by the initial pose error, which is unobservable, as in all scores of positions.
     end = Moment(len(log) - 1, float(log.path_length_m[-1]), last.map, result.joint)
     scorer = _Scorer(log, result.votes, samples, to_true, pose_nees(log))
     summary["marks"] = {
@@ -79,7 +79,7 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
     }
     arrays = _step_arrays(log, scorer.nees) | _map_arrays(last.map, last.chains, log, to_true)
     arrays |= _distance_arrays(last.map, last.chains, result.votes, result.joint, to_true)
-    # The last look is the end itself, so that a curve ends where its run does.
+    # The last sample is the end itself, so that the curve ends where the run does.
     moments = [moment for moment in observer.moments if moment.index < end.index] + [end]
     arrays["coverage_path_m"] = np.array([moment.path_length_m for moment in moments])
     arrays["coverage"] = np.array([scorer.coverage(moment) for moment in moments])
@@ -148,7 +148,7 @@ def wall_errors(
 
 
 def offsets(points: Float[np.ndarray, "m k 2"], lines: Float[np.ndarray, "m 2"]) -> tuple[float, float]:
-    """Return the rms distance of points from a line each, m, as they lie and after the best small shift and turn."""
+    """Return the rms distance of points from one line each, m, before and after the best small rigid motion."""
     n = np.repeat(normals(lines[:, 0]), points.shape[1], axis=0)
     flat = points.reshape(-1, 2)
     across = np.sum(flat * n, axis=1) - np.repeat(lines[:, 1], points.shape[1])
@@ -173,7 +173,7 @@ def _step_arrays(log: Log, nees: Float[np.ndarray, " s"]) -> dict[str, np.ndarra
 def _map_arrays(
     walls: StochasticMap, chains: tuple[Chain, ...], log: Log, to_true: Float[np.ndarray, "3"]
 ) -> dict[str, np.ndarray]:
-    """Return the last map and the path, moved by the initial pose error, for pictures beside the truth."""
+    """Return the final map and the path, moved by the initial pose error, for pictures with the truth."""
     closed = {wall for chain in chains if chain.is_closed for wall in chain.walls}
     return {
         "map_ends": to_world(walls.ends_world, to_true),
@@ -191,7 +191,7 @@ def _distance_arrays(
     joint: Joint | None,
     to_true: Float[np.ndarray, "3"],
 ) -> dict[str, np.ndarray]:
-    """Return all distances between mapped corners of which the true one is known: mapped, sigma, true, m."""
+    """Return all distances between mapped corners with a known true value: mapped, sigma, true, m."""
     found = [corner for corner in corners(walls, chains) if corner.jacobian is not None]
     places = _true_corners(votes)
     rows, true = [], []
@@ -214,7 +214,7 @@ def _distance_arrays(
 
 
 def _true_corners(votes: Votes) -> dict[tuple[int, ...], Float[np.ndarray, "c 2"]]:
-    """Return where the true walls meet, by the pair of walls, the free side on the left throughout."""
+    """Return the corners of true walls by pair of walls, with the free side on the left."""
     faces, walls = votes.truth.faces, votes.truth.walls
     begins = {_key(face[0]): row for row, face in enumerate(faces)}
     places: dict[tuple[int, ...], list[np.ndarray]] = {}

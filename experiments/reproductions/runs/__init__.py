@@ -1,1 +1,1 @@
-"""What several of the paper's figures share: worlds driven once, and what was measured on the way."""
+"""Shared parts of the reproductions: drives of the paper's worlds and their measurements."""

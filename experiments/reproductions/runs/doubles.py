@@ -1,4 +1,4 @@
-"""Walls that a map held twice, and how it saw them in model space when the second entry was made (paper, figure 10)."""
+"""Duplicate walls, and how the map saw them in model space when the duplicate was started (paper, figure 10)."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -20,12 +20,12 @@ from ...trial import TrialResult, run_trial
 from .drives import PAPER, driven
 
 SIGMAS = 3.0
-"""Ellipses are drawn at so many."""
+"""Number of standard deviations of the drawn ellipses."""
 LASTING = 30
-"""A duplicate wall that lasts so many steps, some three metres, is no passing doubt of the filter's."""
+"""A duplicate wall counts if it lasts this many steps, about three metres."""
 STANDS = f"a duplicate wall lasts {LASTING} steps or more, A* entered outside A's ellipse"
 SEEDS = 40
-"""So many drives are searched for a wall that stands in the map twice."""
+"""Number of drives that are searched for a duplicate wall."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ModelSpace:
     ends_world: Float[np.ndarray, "n 2 2"]
 
     def about(self, point_world: Float[np.ndarray, "2"]) -> "ModelSpace":
-        """Return the same lines with r measured from a point, as if the world's origin were there."""
+        """Return the same lines with r measured from a point, as if it were the world's origin."""
         alpha, away = self.lines_world[:, 0], np.broadcast_to(-point_world, (len(self.ids), 2))
         lines = self.lines_world + np.stack([0.0 * alpha, np.sum(normals(alpha) * away, axis=1)], axis=-1)
         return replace(self, lines_world=lines, covs=hessian_cov(alpha, away, self.covs))
@@ -49,7 +49,7 @@ class ModelSpace:
         return int(first), int(second)
 
     def sigmas_away(self, ids: tuple[int, int]) -> float:
-        """Return how far the second of two lines is from the first one, in standard deviations of the first."""
+        """Return the distance of the second of two lines from the first, in standard deviations of the first."""
         first, second = self.rows(ids)
         off = self.lines_world[second] - self.lines_world[first]
         off[0] = wrap(off[0])
@@ -61,31 +61,31 @@ class Double:
     """The paper's A and A*."""
 
     ids: tuple[int, int]
-    """The wall, and its second entry."""
+    """The wall and its duplicate."""
     wall: int
     """The true wall."""
     entered: int
-    """The step at which the second entry was made."""
+    """The step at which the duplicate was started."""
     standing: tuple[int, ...]
     """The steps at which both overlap, and neither is tentative."""
     space: ModelSpace
-    """The map at the step when it was entered."""
+    """The map at the step at which it was started."""
 
     @property
     def sigmas_away(self) -> float:
-        """How far A* was from A then, in standard deviations of A alone."""
+        """Distance of A* from A at that step, in standard deviations of A alone."""
         return self.space.sigmas_away(self.ids)
 
 
 @dataclass(frozen=True)
 class WatchedDrive:
-    """A drive with all walls that its map ever held twice."""
+    """A drive with all duplicate walls of its map."""
 
     made: TrialResult
     steps: tuple[Step, ...]
-    """Their beliefs answer for no joint covariance any more."""
+    """Their beliefs no longer give a joint covariance."""
     doubles: tuple[Double, ...]
-    """In the order in which they show: both overlap, and neither is tentative."""
+    """In order of appearance: both overlap, and neither is tentative."""
 
 
 @lru_cache(maxsize=8)
@@ -120,17 +120,17 @@ def watched(config: TrialConfig, backend: str = PAPER) -> WatchedDrive:
 
 @dataclass(frozen=True)
 class Search:
-    """Drives with one seed after the other, until a wall stands in the map twice, A* outside A's ellipse."""
+    """Drives with successive seeds, until there is a duplicate wall with A* outside A's ellipse."""
 
     config: TrialConfig
-    """Of the drive that has one; of the first drive, where none has."""
+    """The drive with a duplicate, or the first drive if there is none."""
     tried: int
-    """How many seeds that took, or how many were tried in vain."""
+    """Number of seeds that were tried."""
     double: Double | None
 
     @property
     def words(self) -> str:
-        """What the search came to."""
+        """The result of the search."""
         first = self.config.seed
         if self.double is None:
             return f"in none of {self.tried} drives, seeds {first} and on, {STANDS}"
@@ -152,7 +152,7 @@ def first_double(config: TrialConfig, most: int = SEEDS) -> Search:
 
 
 def _space(walls: StochasticMap) -> ModelSpace:
-    """Return the lines of a map in model space, while its back end has not moved on."""
+    """Return the lines of a map in model space, while its belief is valid."""
     belief = walls.belief
     count = len(belief.ids)
     cov = belief.joint(belief.ids).cov[3:, 3:].reshape(count, 2, count, 2)

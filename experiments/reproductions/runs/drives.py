@@ -1,4 +1,4 @@
-"""Drives that the reproductions share: one recording by the paper's filter, the same scans through the others."""
+"""Shared drives of the reproductions: recorded with the paper's filter, replayed with the others."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -27,7 +27,7 @@ from ...views.timelines import true_rings
 PAPER = METHODS["paper-method"].backend
 """The paper's estimator, which drives."""
 BESIDE = (PAPER, "full-ekf", "invariant-ekf", "graph")
-"""The estimators that are shown beside each other."""
+"""The estimators that are compared."""
 
 
 @lru_cache(maxsize=16)
@@ -38,13 +38,13 @@ def driven(config: TrialConfig) -> TrialResult:
 
 @lru_cache(maxsize=64)
 def replayed(config: TrialConfig, backend: str) -> TrialResult:
-    """Return what a back end makes, with its own gate, of the scans of a trial; raises UsageError likewise."""
+    """Return the result of a back end with its own gate on the scans of a trial; raises UsageError likewise."""
     made = driven(config)
     return made if backend == config.backend else replay(recorded(made), backend, world=made.scenario.world)
 
 
 MAX_STEPS = 6000
-"""A drive is stopped after this many scans: among duplicate walls the paper's robot may find no end."""
+"""A drive is stopped after this many scans, since the paper's robot may not end among duplicate walls."""
 
 
 def drive_by_walls(world: str, **settings: Any) -> TrialConfig:
@@ -53,7 +53,7 @@ def drive_by_walls(world: str, **settings: Any) -> TrialConfig:
 
 
 def there_and_back(seed: int) -> TrialConfig:
-    """Return the drive of figures 10 and 11: the world of figure 9 from an uncertain start, and back there."""
+    """Return the drive of figures 10 and 11: the world of figure 9 from an uncertain start, and back to it."""
     config = drive_by_walls("paper-fig9", seed=seed, p0="large")
     return replace(config, mission=replace(config.mission, return_to_start=True))
 
@@ -66,14 +66,14 @@ def log_of(result: TrialResult) -> Log:
 
 
 def to_true(result: TrialResult) -> Float[np.ndarray, "3"]:
-    """Return the motion that undoes the error of the start, which nothing can observe."""
+    """Return the motion that undoes the initial pose error, which is unobservable."""
     return alignment(result.scenario.start_estimate, log_of(result).true_world[0])
 
 
 def small_map(
     result: TrialResult, title: str, walls: StochasticMap, chains: tuple[Chain, ...], steps: int | None = None
 ) -> SmallMap:
-    """Return the map after so many steps in the true frame, for a picture; without `steps`, after all."""
+    """Return the map after this many steps in the true frame, for a picture; after all without `steps`."""
     closed = {wall for chain in chains if chain.is_closed for wall in chain.walls}
     moved = to_true(result)
     path = log_of(result).estimated_world[:steps, :2]
@@ -96,7 +96,7 @@ def trace_over_start(result: TrialResult) -> Float[np.ndarray, " s"]:
 
 
 def mark_double(axes: Axes, small: SmallMap, rows: Int[np.ndarray, " 2"], letter: str) -> None:
-    """Name a wall and its second entry, with a star, in a picture of a map, as the paper's figure 10 does."""
+    """Name a wall and its duplicate, with a star, in a picture of a map, as in the paper's figure 10."""
     for row, name, colour in zip(rows, (letter, f"{letter}*"), (palette.ALARM, palette.REFUSED), strict=True):
         ends = small.ends_world[row]
         axes.plot(*ends.T, color=colour, linewidth=2.6, linestyle="-" if name == letter else (0, (1.5, 1.0)), zorder=5)

@@ -1,4 +1,4 @@
-"""What figures 8 and 9 share: one building mapped by each back end from the same scans."""
+"""Shared parts of figures 8 and 9: one building mapped by each back end from the same scans."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,12 +13,12 @@ from .drives import BESIDE, log_of, replayed, trace_over_start
 
 
 def compared(config: TrialConfig) -> dict[str, TrialResult]:
-    """Return what each back end makes of one drive."""
+    """Return the results of each back end for one drive."""
     return {name: replayed(config, name) for name in BESIDE}
 
 
 def map_numbers(result: TrialResult) -> dict[str, Value]:
-    """Return what can be said of any of these maps."""
+    """Return the quantities of any of these maps."""
     summary, log = result.summary, log_of(result)
     closed = np.flatnonzero(log.closed_chains > 0)
     errors = [
@@ -42,14 +42,14 @@ def map_numbers(result: TrialResult) -> dict[str, Value]:
 
 
 def map_words(result: TrialResult) -> str:
-    """Return the words over a map."""
+    """Return the title of a map."""
     summary = result.summary
     closed = f"{summary['contours_closed']} of {summary['contours_reachable']} contours"
     return f"{closed}, pose ANEES {summary['pose_anees']:.3g}"
 
 
 def mark(axes: Axes, result: TrialResult) -> None:
-    """Name the corners that the paper names."""
+    """Label the corners that the paper names."""
     for name, at in result.scenario.world.labels.items():
         axes.plot(*at, "o", markersize=6, color="none", markeredgecolor=palette.ALARM, mew=1.2)
         axes.annotate(

@@ -1,7 +1,8 @@
-"""Equation (4): what a map's errors do when the world's origin is somewhere else.
+"""Equation (4): the effect of the position of the world's origin on the errors of a map.
 
-r changes with alpha by the lever arm to the point that r is measured from. Measured from the world's origin, as in
-the paper, the very same drive gives another map where the origin lies 100 m away; measured from the wall it does not.
+r changes with alpha by the lever arm to the point that r is measured from. If it is measured from the world's origin,
+as in the paper, the same drive gives another map when the origin is 100 m away; if it is measured from the wall, it
+does not.
 """
 
 from dataclasses import dataclass, replace
@@ -32,18 +33,18 @@ FILTERS: tuple[type[Any], ...] = (BlockEkf, RelocationEkf, FullEkf, FejEkf, Inva
 
 @dataclass(frozen=True)
 class ShiftedOrigin:
-    """Ride the same loop with the origin beside it and far away, lines anchored at their walls and at the origin."""
+    """Drive the same loop near the origin and far from it, with lines anchored at their walls and at the origin."""
 
     shift_m: tuple[float, float] = (100.0, 0.0)
-    """Where the same world is put."""
+    """Displacement of the world."""
     length_m: float = 60.0
-    """Of the ring of corridors."""
+    """Length of the ring of corridors."""
     seeds: int = 20
-    """Rings."""
+    """Number of rings."""
     first_seed: int = 1
-    """The seed of the first; the others follow it."""
+    """Seed of the first ring; the others follow it."""
     p0: P0 = "small"
-    """Covariance of the start."""
+    """Standard deviations of the initial pose."""
 
     def run(self) -> None:
         """Run the study and print a row for each filter and anchor; raises UsageError."""
@@ -83,7 +84,7 @@ class ShiftedOrigin:
 
 
 def moved(seen: DriveObservations, shift: Float[np.ndarray, "2"]) -> DriveObservations:
-    """Return the same drive in a world that stands elsewhere; what the robot reports stays as it was."""
+    """Return the same drive in a displaced world; the reports of the robot stay the same."""
     lines = {wall: line + np.array([0.0, normals(line[:1])[0] @ shift]) for wall, line in seen.true_lines_world.items()}
     return replace(seen, true_poses_world=seen.true_poses_world + np.append(shift, 0.0), true_lines_world=lines)
 

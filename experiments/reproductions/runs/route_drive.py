@@ -1,4 +1,4 @@
-"""A robot that explores, then goes from one wall to another along the walls that the visibility graph plans."""
+"""A robot that explores and then drives between two walls along a route planned on the visibility graph."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,28 +20,28 @@ from ...trial import TrialResult, default_mission, run_trial
 
 ARRIVED_M = 1.0
 NEAR_M = 0.5
-"""The middle of a mapped wall is this near to that of the wall in the plan."""
+"""A mapped wall corresponds to that of the plan if their middles are this near."""
 Named = Callable[[StochasticMap], Mapping[str, int]]
-"""From a map to the ids of the walls that have names in the plan."""
+"""A function from a map to the ids of the walls that have names in the plan."""
 
 
 @dataclass
 class AlongRoute:
-    """A strategy that explores like another one, and leaves nothing to explore until it has driven a route of walls."""
+    """A strategy that wraps another one, and continues with a route of walls when nothing is left to explore."""
 
     explores: Strategy
     named: Named
     ends: tuple[str, str]
     """Names of the first and the last wall."""
     plan: tuple[int, ...] = ()
-    """Ids of the walls to be followed, once they are planned."""
+    """Ids of the planned walls."""
     names: dict[int, str] = field(default_factory=dict)
-    """Of the walls, by their ids at that time."""
+    """Names of the walls at that time, by their ids."""
     _done: int = 0
-    """So many of them."""
+    """Number of visited walls."""
 
     def choose(self, situation: Situation) -> Choice | None:
-        """Return where to explore; then the first wall, and from there each wall of the plan in turn; then None."""
+        """Return where to explore; then the first wall, then each planned wall in turn; then None."""
         if situation.open_ends:
             return self.explores.choose(situation)
         if self._done == 0:
@@ -61,7 +61,7 @@ class AlongRoute:
 
     @property
     def taken(self) -> int:
-        """How many walls of the plan are taken or under way: 0 while there is something to explore."""
+        """Number of walls of the plan that are visited or under way; 0 during exploration."""
         return self._done
 
     def _to(self, wall: int, situation: Situation, why: str) -> Choice | None:
@@ -73,17 +73,17 @@ class AlongRoute:
 
 @dataclass(frozen=True)
 class RouteDrive:
-    """An exploration with a route of walls driven after it."""
+    """An exploration followed by a route of walls."""
 
     made: TrialResult
     names: dict[int, str]
-    """Of the walls that have any, in the last map and in that of the plan."""
+    """Ids of the named walls, in the last map and in that of the plan."""
     plan: tuple[int, ...]
-    """Ids of the walls that the graph led along, the first one and the goal included; empty where a wall is missing."""
+    """Ids of the planned walls, including the first and the goal; empty if one of them is missing."""
     steps: tuple[int, int, int]
-    """At which the exploration ended, the first wall was reached, and the last one."""
+    """Steps at which exploration ended, the first wall was reached, and the last one."""
     followed: tuple[int, ...]
-    """Ids of the walls that the robot was nearest to on the way, in order; round a corner of two, that of the plan."""
+    """Ids of the nearest walls along the path, in order; of two walls at a corner, the planned one."""
     has_arrived: bool
     """Whether the robot ends within `ARRIVED_M` of the goal."""
 
@@ -117,7 +117,7 @@ def drive_route(config: TrialConfig, ends: tuple[str, str]) -> RouteDrive:
 
 
 def _named(scenario: Scenario) -> Named:
-    """Return who names the walls of a map by the labels of the plan, which stand at the middles of its walls."""
+    """Return a function that names the walls of a map by the labels of the plan at their middles."""
     labels = scenario.world.labels
     to_true = alignment(scenario.start_estimate, scenario.world.start)
 

@@ -1,6 +1,6 @@
-"""A robot that stands still and looks at the same walls: what each back end claims to learn of where it stands.
+"""A robot that stands still and observes the same walls: how much each back end claims to learn about its pose.
 
-No look tells where the world lies, so the pose's covariance must not fall below that of the start carried along,
+No observation locates the world, so the covariance of the pose must not fall below the transported initial covariance,
 A P0 A' with A = [I, J (p - p0); 0, 1] (docs/estimation.md). The paper's figures 10 and 11 show one that does.
 """
 
@@ -27,16 +27,16 @@ MARKS = (10, 100, 1000)
 
 @dataclass(frozen=True)
 class StandingStill:
-    """Look at the same walls again and again, and print how sure each back end becomes of its pose."""
+    """Observe the same walls again and again, and print how certain each back end becomes of its pose."""
 
     backends: tuple[str, ...] = tuple(name for name in BACKENDS if name != "graph-batch")
-    """The estimators."""
+    """Estimators."""
     p0: tuple[P0, ...] = ("large", "small")
-    """Covariances of the start."""
+    """Standard deviations of the initial pose."""
     looks: int = 1000
-    """How often it looks."""
+    """Number of observations."""
     seed: int = 1
-    """Of the noise and the walls."""
+    """Seed of the noise and the walls."""
 
     def run(self) -> None:
         """Run the study and print a row for each back end; raises UsageError."""
@@ -54,15 +54,15 @@ class StandingStill:
                 cells = [f"{trace[mark - 1]:.4g}" for mark in marks]
                 table.add_row(name, *cells, f"{slope(trace):.3f}", f"{bound.min():.1e}")
             plain_console(width=max(plain_console().width, 100)).print(table)
-        print("slope: of the trace over the number of looks, log-log, from the tenth on; last column: least eigenvalue")
-        print("at any look, over the trace of P0, with A at the estimate")
+        print("slope: of the trace over the number of observations, log-log, from the tenth on; last column: least")
+        print("eigenvalue after any of them, over the trace of P0, with A at the estimate")
 
 
 def stand(name: str, p0: str, looks: int, seed: int) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return, after each look, tr P / tr P0 and the least eigenvalue of P - A P0 A' over tr P0."""
+    """Return, after each observation, tr P / tr P0 and the least eigenvalue of P - A P0 A' over tr P0."""
     walls = ring(40.0, np.random.default_rng(seed))
     lines = through(walls)
-    # Where most walls are in sight: between parallel ones alone nothing would be seen of the way along them.
+    # Where most walls are visible: from parallel walls alone the position along them is unobservable.
     true = max(on_ring(np.arange(0.0, 10.0, 0.25), 40.0), key=lambda p: len(look(walls, lines, p, 0.0 * lines)))
     chance = Chance(seed, world_key(walls, true))
     draws = [chance.standard_normals(Channel.LASER, k, 2 * len(walls)).reshape(-1, 2) for k in range(looks + 1)]
@@ -84,7 +84,7 @@ def stand(name: str, p0: str, looks: int, seed: int) -> tuple[Float[np.ndarray, 
 
 
 def slope(trace: Float[np.ndarray, " n"]) -> float:
-    """Return how the trace falls with the number of looks, from the tenth on: -1 is like 1/n."""
+    """Return the slope of the trace over the number of observations, from the tenth on: -1 is like 1/n."""
     n = np.arange(1, len(trace) + 1)
     return float(np.polyfit(np.log(n[9:]), np.log(trace[9:]), 1)[0]) if len(trace) > 10 else float("nan")
 

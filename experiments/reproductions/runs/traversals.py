@@ -1,4 +1,4 @@
-"""What figures 5 and 6 share: one world explored by two strategies, errorless, shaded by how often it was driven."""
+"""Shared parts of figures 5 and 6: one world explored by two strategies without noise, shaded by traversals."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from .drives import PAPER, drive_by_walls, driven, log_of
 NEAREST_ROBOT = drive_by_walls("paper-fig5", errorless=True)
 NEAREST_START = replace(NEAREST_ROBOT, strategy="nearest-start")
 RIDERS = (PAPER, "full-ekf", "invariant-ekf")
-"""The graph keeps every pose of some thousand and would take minutes."""
+"""The graph keeps every one of some thousand poses and would take minutes."""
 NOTES = (
     "As in the paper, motion and perception are errorless, so that the seed changes nothing; the models keep their"
     f" stated noise. {PAPER} drives; sigmas are of each back end alone on the same observations, true association.",
@@ -35,7 +35,7 @@ def noisy(config: TrialConfig, seed: int) -> TrialConfig:
 
 
 def traversal_numbers(config: TrialConfig) -> Numbers:
-    """Return the path's numbers, which no back end changes, and for each back end how uncertain it became."""
+    """Return the numbers of the path, which are the same for all back ends, and the uncertainty of each back end."""
     made = driven(config)
     log = log_of(made)
     path: dict[str, Value] = {
@@ -60,7 +60,7 @@ def traversal_numbers(config: TrialConfig) -> Numbers:
 
 
 def passes(path_world: Float[np.ndarray, "s 3"]) -> int:
-    """Return how often the path is within a metre of its start, the beginning included, 1.5 m elsewhere between."""
+    """Return how often the path comes within a metre of its start, counting the start, with 1.5 m in between."""
     away = np.hypot(*(path_world - path_world[0])[:, :2].T)
     count, outside = 1, False
     for distance in away:

@@ -1,1 +1,1 @@
-"""How good a map is beside the true walls: what of them it covers, and its corners."""
+"""Quality of a map compared with the true walls: coverage, corners, distances and free-space coverage."""

@@ -15,7 +15,7 @@ from chainslam.slam.map.stochastic_map import StochasticMap
 from .measurements import corner_jacobian
 
 LABEL_REACH_M = 0.5
-"""A named point of the drawing is taken for the mapped corner nearest to it, up to here, after alignment."""
+"""A named point of the drawing is matched with the nearest mapped corner within this distance, after alignment."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How much of the reachable contour the map holds, and which true contours it has closed."""
+"""How much of the reachable contour the map covers, and which true contours it has closed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ NEAR_M, NEAR_NOISY_M = 0.1, 0.3
 """A point of the contour is covered by a wall this near; the second is for runs with noise, after alignment."""
 PITCH_M = 0.02
 CLOSED_SHARE = 0.9
-"""A closed chain stands for a true contour if it covers this share of the contour's reachable length."""
+"""A closed chain represents a true contour if it covers this share of the contour's reachable length."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Points of the reachable contour, each standing for a piece of it."""
+    """Points of the reachable contour, each representing a piece of it."""
 
     points_world: Float[np.ndarray, "p 2"]
     normals_world: Float[np.ndarray, "p 2"]
@@ -60,7 +60,7 @@ def alignment(estimated_world: Float[np.ndarray, "3"], true_world: Float[np.ndar
 
 
 def began(lines: Int[np.ndarray, " s"]) -> int:
-    """Return the step at which a map of so many lines at each step began: the first, but for a start in the blind."""
+    """Return the step at which the map began, by its number of lines: 0 unless no wall was in sight at first."""
     return min(int(np.max(np.flatnonzero(lines == 0), initial=-1)) + 1, len(lines) - 1)
 
 
@@ -81,7 +81,7 @@ def own_alignment(
 
 
 def _with_headings(poses_world: Float[np.ndarray, "s 3"]) -> Float[np.ndarray, "r 3"]:
-    """Return poses and a place a metre ahead of each: a robot that stands still has a heading too."""
+    """Return poses and a point one metre ahead of each, since a robot that stands still has a heading too."""
     ahead = np.column_stack([poses_world[:, :2] + normals(poses_world[:, 2]), poses_world[:, 2]])
     return np.concatenate([poses_world, ahead])
 
@@ -101,7 +101,7 @@ def coverage(samples: Samples, walls_world: Float[np.ndarray, "m 2 2"], near_m: 
 def coverage_curve(
     samples: Samples, sketches: Sequence[Sketch], to_true: Float[np.ndarray, "3"], near_m: float
 ) -> dict[str, list[float]]:
-    """Return the covered share of the contour beside the metres driven, each as a list."""
+    """Return the covered share of the contour and the path length, each as a list."""
     return {
         "path_length_m": [sketch.path_length_m for sketch in sketches],
         "coverage": [coverage(samples, to_world(sketch.ends_world, to_true), near_m) for sketch in sketches],

@@ -39,9 +39,9 @@ class CornerPoints:
 def corner_jacobian(
     lines: Float[np.ndarray, "2 2"], anchors: Float[np.ndarray, "2 2"], position_world: Float[np.ndarray, "2"]
 ) -> tuple[Float[np.ndarray, "2 4"], bool]:
-    """Differentiate the corner of two walls by their (alpha, d, alpha, d), and tell whether they do cross there.
+    """Return the derivative of the corner of two walls by their (alpha, d, alpha, d), and whether they really cross.
 
-    From n·(x - c) = d: n·dx = dd - t·(x - c) d_alpha. Walls too near to parallel move a corner across them only.
+    From n·(x - c) = d: n·dx = dd - t·(x - c) d_alpha. Walls that are nearly parallel only move a corner across them.
     """
     alpha = lines[:, 0]
     off = np.sum(directions(alpha) * (position_world - anchors), axis=-1)

@@ -1,4 +1,4 @@
-"""How much of the floor that can be seen the range finder has seen, on a grid at true poses."""
+"""Free-space coverage: how much of the visible floor the range finder has seen, on a grid at true poses."""
 
 from functools import lru_cache
 
@@ -33,7 +33,7 @@ class Floor:
         self.seen |= self.free & shapely.contains_xy(region, grid_x, grid_y)
 
     def is_seen_around(self, pose_world: Float[np.ndarray, "3"], range_max_m: float) -> bool:
-        """Return whether no cell is left that a look from here could mark."""
+        """Return whether every cell in view of this pose is marked already."""
         return not len(self._unseen_around(pose_world, range_max_m)[0])
 
     def _unseen_around(
@@ -83,9 +83,9 @@ def _free_cells(
 
 @lru_cache(maxsize=4)
 def visible_floor(world: World, config: RobotConfig) -> Bool[np.ndarray, "h w"]:
-    """Return the cells that the disc can cover or see within range from some place that it can reach.
+    """Return the cells that the disc can cover or the scanner can see within range from a reachable position.
 
-    What the reachable region sees beyond itself, its boundary sees, so looking out from the boundary is enough.
+    Everything visible from the reachable region is also visible from its boundary, so only the boundary is sampled.
     """
     floor = Floor(world.floor)
     region = world.reachable(config.half_width_m)
@@ -120,7 +120,7 @@ def swept(
     finder = RangeFinder(world.faces, config.lidar) if config.faults.dropout > 0.0 else None
     for pose, ranges in zip(scanner_poses(poses_world, config.true_scanner), ranges_m, strict=True):
         if finder is not None:
-            # A beam that the scanner lost shows nothing, however many beside it are lost, too.
+            # A beam without a valid return shows nothing, however many of its neighbours are missing too.
             ranges = np.where(np.isposinf(ranges) & np.isfinite(finder.cast(pose)[0]), np.nan, ranges)
         floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
     return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)

@@ -1,1 +1,1 @@
-"""What a run tells without anybody knowing the truth."""
+"""Scores of a run without ground truth."""

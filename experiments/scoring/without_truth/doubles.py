@@ -1,4 +1,4 @@
-"""Walls that stand in a map twice, told by their geometry alone: where no truth is known, nothing else can tell."""
+"""Duplicate walls of a map by their geometry alone, for drives without ground truth."""
 
 import numpy as np
 from jaxtyping import Float
@@ -8,11 +8,11 @@ from chainslam.slam.geometry.numerics import TINY
 from chainslam.slam.geometry.poses import wrap
 
 TURN_RAD = float(np.deg2rad(5.0))
-"""Lines that differ by more in direction are two walls."""
+"""Lines with a larger difference in direction are different walls."""
 APART_M = 0.2
-"""Farther apart than this, two lines that face one way may well be two walls, as those of a niche."""
+"""Two lines facing one way that are farther apart may well be two walls, such as those of a niche."""
 OVERLAP_M = 0.2
-"""Along less than this, an end that was seen too long may overlap the next wall."""
+"""On a shorter stretch, a landmark that was extended too far may overlap the next wall."""
 
 
 def doubles(ends_world: Float[np.ndarray, "n 2 2"]) -> list[tuple[int, int]]:

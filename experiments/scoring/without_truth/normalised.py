@@ -1,4 +1,4 @@
-"""Does an estimate know how wrong it is, by what others measured? Its errors in units of what it states of them."""
+"""Consistency of an estimate with external measurements: errors normalised by their stated covariances."""
 
 from typing import Any
 
@@ -28,15 +28,16 @@ from .smoothing import PairCovs
 
 DOF = 3
 FAULTS = (RuntimeError, ValueError, IndexError)
-"""What a solver raises that has no solution any more: then nothing is known of pairs of poses."""
+"""Errors of a solver that has lost its solution: nothing is then known about pairs of poses."""
 
 
 def normalised_relations(
     relations: Relations, time_s: Float[np.ndarray, " n"], poses_world: Float[np.ndarray, "n 3"], pair_covs: PairCovs
 ) -> dict[str, Any]:
-    """Return the normalised errors of the relations both of whose times are those of poses, to 10 ms.
+    """Return the normalised errors of the relations whose times are both those of poses, to 10 ms.
 
-    `pair_covs` tells how two of the poses, by their rows, err together. The relation's own error is added.
+    `pair_covs` returns the joint covariance of the errors of two poses, given their rows. The error of the relation
+    itself is added.
     """
     own = sigmas_of_relations(relations)
     first, second, chosen = _at_poses(relations, time_s)
@@ -54,10 +55,11 @@ def normalised_path(
     poses_world: Float[np.ndarray, "n 3"],
     covs: Float[np.ndarray, "n 3 3"],
 ) -> dict[str, Any] | None:
-    """Return the normalised errors of poses against a reference, both as seen from the first pose that they share.
+    """Return the normalised errors of poses against a reference, both relative to the first pose that they share.
 
-    What is stated of a pose is taken for its error since then, since the first pose of a drive is its frame. The
-    error of the reference is told by relations a minute and more apart; without any it counts as exact.
+    The stated covariance of a pose is taken for that of its error since then, since the first pose of a drive is its
+    frame. The error of the reference is estimated from relations a minute and more apart; without any it counts as
+    exact.
     """
     if references.path is None:
         return None
@@ -78,7 +80,7 @@ def normalised_path(
 def pair_covs_of(
     backend: PathKeeper, scanner: ScannerSpec, rows: Int[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, "n 3"], PairCovs]:
-    """Return the path of the body at those rows of a back end's own path, and how two of its poses err together."""
+    """Return the path of the body at rows of a back end's own path, and the joint covariances of its poses."""
 
     def pair_covs(first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
         to_body = np.kron(np.eye(2), adjoint_of_inverse(inverse(scanner.pose_robot)[None])[0])
@@ -96,7 +98,7 @@ def _at_poses(
 
 
 def _error_of(references: References) -> Sigmas | None:
-    """Return the error of a reference path, told by relations; None where there are none between its poses."""
+    """Return the error of a reference path, estimated from relations; None if there are none between its poses."""
     if references.path is None or references.relations is None:
         return None
     time_s, poses_world = references.path
@@ -106,7 +108,7 @@ def _error_of(references: References) -> Sigmas | None:
 
 
 def _record(own: Sigmas | None) -> dict[str, Any]:
-    """Return what is stated of the error of what others measured; null where nothing tells it."""
+    """Return the assumed error of the measurements; null if it is unknown."""
     if own is None:
         return dict.fromkeys(("sigma_m", "sigma_rad", "told_by", "mistaken"))
     return {
@@ -118,7 +120,7 @@ def _record(own: Sigmas | None) -> dict[str, Any]:
 
 
 def _score(left: Float[np.ndarray, "m 3"], covs: Float[np.ndarray, "m 3 3"]) -> dict[str, Any]:
-    """Return the mean and the median of the squared errors in units of what is stated, each 1 if that is honest."""
+    """Return the mean and the median of the normalised squared errors, each 1 for a consistent estimate."""
     if not len(left):
         return {"count": 0, **dict.fromkeys(("anees", "median", "in_band", "error_m", "stated_m"))}
     values = nees(left, covs)

@@ -1,4 +1,4 @@
-"""What others measured of a recorded drive: relations between its poses, or a reference path, and scores by them."""
+"""Measurements of a recorded drive: relations between its poses, or a reference path, and scores by them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,7 @@ LEAST = 3
 
 @dataclass(frozen=True)
 class References:
-    """What a path is scored by; None where nobody measured it."""
+    """The measurements that a path is scored by; None for those that do not exist."""
 
     relations: Relations | None = None
     path: tuple[Float[np.ndarray, " r"], Float[np.ndarray, "r 3"]] | None = None
@@ -95,7 +95,7 @@ def _numbers(words: list[str], times: int, expected: str) -> list[float]:
 def scored_by(
     references: References, time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"]
 ) -> dict[str, Any]:
-    """Return what a path scores by what others measured; no key for what nobody did."""
+    """Return the scores of a path by the measurements; without a key for those that do not exist."""
     scores: dict[str, Any] = {}
     if references.relations is not None and len(time_s):
         scores["relations"] = {

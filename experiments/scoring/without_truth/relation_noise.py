@@ -1,7 +1,8 @@
-"""How uncertain relations between poses are: by the covariance of the two poses, or by what measured them.
+"""Covariance of relations between poses: from that of the two poses, or estimated from the measurements.
 
-An error of a pose is a small motion delta in its own frame, X_est = X_true Exp(delta). The relation M = X_i^-1 X_j then
-errs by xi = delta_j - Ad(M^-1) delta_i in the frame of the second pose, which is what is left between M and its truth.
+The error of a pose is a small motion delta in its own frame, X_est = X_true Exp(delta). The error of the relation M =
+X_i^-1 X_j is then xi = delta_j - Ad(M^-1) delta_i in the frame of the second pose: the motion between M and its true
+value.
 """
 
 from collections.abc import Callable
@@ -18,21 +19,21 @@ from chainslam.slam.geometry.poses import J, turned
 from .relations import Relations, between
 
 LEAST = 1e-4
-"""Nothing measured is taken for better than this, m and rad."""
+"""Lower limit of the error of measurements, m and rad."""
 ROUNDS = 10
-"""The likeliest error is sought so often at most."""
+"""Upper limit of the iterations for the most likely error."""
 
 
 @dataclass(frozen=True)
 class Sigmas:
-    """The error of something measured, the same along both axes and independent from one to the next."""
+    """The error of a measurement, equal along both axes and independent between measurements."""
 
     translation_m: float
     rotation_rad: float
     told_by: int = 0
-    """So many residuals tell it ..."""
+    """Number of residuals that it was estimated from."""
     mistaken: int = 0
-    """... and so many were left out as mistakes."""
+    """Number of residuals that were left out as mistakes."""
 
     @property
     def cov(self) -> Float[np.ndarray, "3 3"]:
@@ -83,9 +84,9 @@ def triangles(relations: Relations) -> Int[np.ndarray, "t 3"]:
 
 
 def sigmas_of_relations(relations: Relations) -> Sigmas | None:
-    """Return the error of a relation itself; None where no triangle tells it.
+    """Return the error of a single relation; None if no triangle determines it.
 
-    Of three relations around a triangle each is told twice: what does not close is the error of all three.
+    Each of the three relations of a triangle is estimated from the other two; the misclosure is the error of all three.
     """
     rows = triangles(relations)
     if not len(rows):
@@ -102,7 +103,7 @@ def sigmas_of_relations(relations: Relations) -> Sigmas | None:
 def sigmas_of_path(
     motions: Float[np.ndarray, "m 3"], left: Float[np.ndarray, "m 3"], relation: Sigmas | None
 ) -> Sigmas | None:
-    """Return the error of each pose of a path, of which m relations between its poses leave `left`; None for m = 0."""
+    """Return the error of each pose of a path, given residuals of m relations between its poses; None for m = 0."""
     if not len(left):
         return None
     own = np.zeros((3, 3)) if relation is None else relation.cov
@@ -110,10 +111,10 @@ def sigmas_of_path(
 
 
 def likeliest(left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.ndarray]) -> Sigmas:
-    """Return the error under which `noise`, a function of its covariance, makes the residuals likeliest.
+    """Return the most likely error, where `noise` is the covariance of the residuals as a function of it.
 
-    Some residuals are mistakes, of which no Gaussian tells: those beyond the level of 99 % are left out, and the
-    likeliest error is sought again, until it stays.
+    Some residuals are gross errors, which are not Gaussian: those beyond the level of 99 % are left out, and the most
+    likely error is computed again until it no longer changes.
     """
     kept = np.ones(len(left), dtype=bool)
     for _ in range(ROUNDS):

@@ -1,4 +1,4 @@
-"""How far a path is from relations between its poses that others measured: no common frame, nothing to align.
+"""Errors of a path against measured relations between its poses, which need no common frame and no alignment.
 
 The measure of Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms", Autonomous Robots 27 (2009).
 """
@@ -11,14 +11,14 @@ from jaxtyping import Bool, Float, Int
 from chainslam.slam.geometry.poses import wrap
 
 SAME_TIME_S = 0.01
-"""Times that differ by less are of one scan."""
+"""Times closer than this belong to one scan."""
 FAR_S = 60.0
-"""Relations over so long a time say how well a map comes together; shorter ones tell of the odometry."""
+"""Relations over a longer time measure the global consistency of a map; shorter ones measure the odometry."""
 
 
 @dataclass(frozen=True)
 class Relations:
-    """Where the robot was at one time, as seen from where it was at another; m relations."""
+    """Poses relative to earlier poses of the same robot; m relations."""
 
     first_s: Float[np.ndarray, " m"]
     second_s: Float[np.ndarray, " m"]
@@ -31,11 +31,11 @@ class Relations:
 
     @property
     def far(self) -> Bool[np.ndarray, " m"]:
-        """Whether the two times are a minute and more apart."""
+        """Whether the two times are at least a minute apart."""
         return np.abs(self.second_s - self.first_s) >= FAR_S
 
     def within(self, low_s: float, high_s: float) -> "Relations":
-        """Return those whose times both lie in a span."""
+        """Return those with both times in an interval."""
         times = np.stack([self.first_s, self.second_s])
         return self.take(np.all((times >= low_s) & (times <= high_s), axis=0))
 
@@ -50,7 +50,7 @@ def between(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -
 def nearest_rows(
     time_s: Float[np.ndarray, " s"], asked_s: Float[np.ndarray, " m"]
 ) -> tuple[Int[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Return the row of the time nearest to each one asked for, and whether it is within 10 ms; times ascend."""
+    """Return the row of the nearest time to each requested one, and whether it is within 10 ms; times ascend."""
     after = np.clip(np.searchsorted(time_s, asked_s), 0, len(time_s) - 1)
     before = np.maximum(after - 1, 0)
     rows = np.where(np.abs(time_s[before] - asked_s) <= np.abs(time_s[after] - asked_s), before, after)
@@ -70,7 +70,7 @@ def interpolated(
 def relation_errors(
     first_world: Float[np.ndarray, "m 3"], second_world: Float[np.ndarray, "m 3"], motions: Float[np.ndarray, "m 3"]
 ) -> Float[np.ndarray, "m 2"]:
-    """Return the size m and the turn rad of the motion that is left between a measured relation and the path's own."""
+    """Return the size m and the angle rad of the difference between a measured relation and that of the path."""
     left = between(motions, between(first_world, second_world))
     return np.column_stack([np.hypot(*left[:, :2].T), np.abs(left[:, 2])])
 
@@ -78,9 +78,9 @@ def relation_errors(
 def errors_at_scans(
     time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
 ) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
-    """Return the relations both of whose times are those of scans, to 10 ms, and their errors (m, rad).
+    """Return the relations whose times are both those of scans, to 10 ms, and their errors (m, rad).
 
-    Poses are those at the relation's own times: scans may be 3 ms apart where they are written in bursts.
+    Poses are those at the relation's own times, since scans may be 3 ms apart where they are written in bursts.
     """
     both = nearest_rows(time_s, relations.first_s)[1] & nearest_rows(time_s, relations.second_s)[1]
     return errors_between_scans(time_s, poses_world, relations.take(both), SAME_TIME_S)
@@ -89,9 +89,9 @@ def errors_at_scans(
 def errors_between_scans(
     time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations, beyond_s: float = 0.0
 ) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
-    """Return the relations whose times the path covers, and their errors (m, rad), its poses being interpolated.
+    """Return the relations within the time span of the path, and their errors (m, rad), with interpolated poses.
 
-    It covers a time that is `beyond_s` before its first pose or after its last one.
+    The span begins `beyond_s` before its first pose and ends as long after its last one.
     """
     chosen = relations.within(float(time_s[0]) - beyond_s, float(time_s[-1]) + beyond_s)
     first, second = (interpolated(time_s, poses_world, asked) for asked in (chosen.first_s, chosen.second_s))

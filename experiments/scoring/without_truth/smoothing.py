@@ -1,4 +1,4 @@
-"""What a back end that smooths knows once a run has ended; no score is taken from it."""
+"""The smoothed solution of a back end after the run; it does not enter the scores of a run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.nda
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The estimate of everything from everything, which no step of the run had."""
+    """The estimate of all poses and lines from all measurements, which was not available at any step."""
 
     poses_world: Float[np.ndarray, "s 3"]
     """The robot at each step."""
@@ -25,7 +25,7 @@ class Smoothed:
     joint: Joint
     """The pose at the last step and all lines."""
     pair_covs: PairCovs | None = None
-    """How poses at two of the steps err together, each in its body frame; None where nobody tells."""
+    """Covariances of pairs of poses, each error in its body frame; None if unknown."""
 
 
 def rows_of_steps(unstated_motion: Bool[np.ndarray, " s"]) -> Int[np.ndarray, " s"]:
@@ -44,7 +44,7 @@ def smooth(
     `unstated_motion` tells at which of the steps a second motion was predicted. Every belief before it goes stale.
     """
     try:
-        if not isinstance(backend, Smoother):  # Asks for the belief too, which a back end that failed may refuse.
+        if not isinstance(backend, Smoother):  # Also asks for the belief, which a back end that failed may refuse.
             return None
         poses, rows = body_poses(backend.finish(), scanner), rows_of_steps(unstated_motion)
         belief = belief_of_body(backend.belief, scanner)
@@ -52,5 +52,5 @@ def smooth(
             return None
         smoothed = replace(last, belief=belief).told
         return Smoothed(poses[rows], smoothed, smoothed.belief.joint(belief.ids))
-    except Exception:  # whatever a back end raises after a failed run must not cost the results so far
+    except Exception:  # errors of the back end after a failed run must not cost the results so far
         return None

@@ -1,4 +1,4 @@
-"""Scores of a drive of which the truth is not known: what the map itself tells, and null for all else."""
+"""Scores of a drive without ground truth: from the map itself, and null for all others."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,23 +25,23 @@ WITNESSED = (
     " pose_anees_from_start map_anees_straight map_frame_anees map_frame_m map_frame_rad lines_unlabelled false_matches"
     " false_matches_few_beams false_merges collisions map_began_step return_to_start"
 )
-"""The keys of summary.json that only the truth tells."""
+"""The keys of summary.json that need the truth."""
 
 
 def unseen_world(name: str) -> World:
-    """Return the building of a recorded drive: it has a name, and nobody drew it."""
+    """Return a world for a recorded drive: a name without a drawing."""
     return World(name, shapely.Polygon(), np.zeros(3), {})
 
 
 def no_truth(world: World) -> Truth:
-    """Return the truth about a building that nobody drew: no face at all."""
+    """Return the truth about an unknown building: no faces."""
     none, rows = np.zeros((0, 2, 2)), np.zeros(0, dtype=np.int64)
     return Truth(world, none, np.zeros((0, 2)), rows, rows, Contour(rows, np.zeros((0, 2)), none, rows))
 
 
 @dataclass
 class NoVotes(Votes):
-    """Counts merges; no beam tells which wall it met."""
+    """Counts merges; without the truth, beams have no walls."""
 
     def add(self, *_: Any, **__: Any) -> None:
         """Count nothing."""
@@ -60,16 +60,16 @@ class NoVotes(Votes):
 
 
 class UnwitnessedRecord(TrueRecord):
-    """The record of a drive whose truth is not known: NaN poses, and no face for any beam."""
+    """The record of a drive without ground truth: NaN poses, and no face for any beam."""
 
     def sensed(self, beams: int) -> None:
-        """Keep that a scan was taken."""
+        """Record that a scan was taken."""
         self.poses_world.append(np.full(3, np.nan))
         self.faces_of_beams.append(np.full(beams, -1, dtype=np.int64))
 
 
 def summarise_unwitnessed(scenario: Scenario, log: Log, votes: Votes, step: Step, ending: Ending) -> dict[str, Any]:
-    """Return every key of summary.json; null for what only the truth tells."""
+    """Return every key of summary.json; null for those that need the truth."""
     walls = step.map
     established = ~walls.tentative
     closed = int(log.closed_chains[-1])

@@ -1,1 +1,1 @@
-"""Buildings by chance, always the same for one seed."""
+"""Randomly generated buildings, always the same for one seed."""

@@ -1,4 +1,4 @@
-"""Rooms and doors by chance: an outline is cut into convex rooms, some cuts slanted, and doors join the rooms."""
+"""Random rooms and doors: an outline is cut into convex rooms, some along slanted lines, and doors join them."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import split
 
 JAMB_M = 0.1
-"""Least length of wall left between a door and the corner beside it."""
+"""Smallest length of wall between a door and the next corner."""
 
 
 @dataclass(frozen=True)
 class Style:
-    """What kind of building: lengths in m, each pair from and to."""
+    """Parameters of a kind of building: lengths in m, each as a range."""
 
     name: str
     long_m: tuple[float, float]
@@ -23,7 +23,7 @@ class Style:
     short_m: tuple[float, float]
     """Shorter side of the outline."""
     room_m: tuple[float, float]
-    """A room whose longer side is below a draw from this is not cut any more."""
+    """A room is not cut further if its longer side is below a draw from this range."""
     corridor: float
     """Probability that the outline is cut into two wings along a corridor first."""
     slanted: float
@@ -31,9 +31,9 @@ class Style:
     solid: float
     """Probability that a room is left out of the building: outlines become L, U or ring shapes."""
     second_door: float
-    """Probability of a door between two neighbouring rooms that need none to be reached."""
+    """Probability of a door between two neighbouring rooms that are connected already."""
     furniture: float
-    """Blocks for each square metre, on average."""
+    """Mean number of blocks per square metre."""
 
 
 STYLES = (
@@ -112,7 +112,7 @@ def _cut_up(cell: shapely.Polygon, style: Style, chance: np.random.Generator) ->
 
 
 def _is_room(piece: shapely.Polygon) -> bool:
-    """Return whether a piece is roomy and has neither a wall shorter than a door nor an acute corner."""
+    """Return whether a piece is large enough and has neither a wall shorter than a door nor an acute corner."""
     ring = shapely.get_coordinates(piece.exterior)[:-1]
     before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
     lengths = np.hypot(*after.T)
@@ -176,7 +176,7 @@ def _door(border: Float[np.ndarray, "2 2"], wall_m: float, chance: np.random.Gen
 
 
 def _aside(wall_m: float) -> float:
-    """Return how far a door keeps from a border's end: in a corner of 55 degrees walls take their own thickness."""
+    """Return the distance of a door from a border's end: in a corner of 55 degrees walls take their own thickness."""
     return wall_m + JAMB_M
 
 

@@ -1,4 +1,4 @@
-"""What stands in rooms by chance: pillars, cupboards, free-standing walls, walls that jut out, and niches."""
+"""Random furnishing of rooms: pillars, cupboards, free-standing and projecting walls, and niches."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from shapely.geometry.polygon import orient
 from .floor_plan import FloorPlan, frame, rectangle
 
 PASSAGE_M = 0.6
-"""Nothing is put so near to anything else that it leaves a narrower gap than this."""
+"""Smallest gap between two things."""
 SHORTEST_M = 0.1
-"""No face is shorter."""
+"""Smallest length of a face."""
 DOOR_ROOM_M = 0.7
-"""Nothing is put this near to a door."""
+"""Smallest distance from a door."""
 IN_WALL_M = 0.04
-"""How far what stands against a wall goes into it; walls are 0.1 m thick at the least."""
+"""How far things against a wall reach into it; walls are at least 0.1 m thick."""
 
 
 def furnish(plan: FloorPlan, per_m2: float, chance: np.random.Generator) -> shapely.Polygon:
@@ -57,9 +57,9 @@ def _if_sound(changed: BaseGeometry, floor: shapely.Polygon) -> shapely.Polygon:
 
 
 def _narrow_m2(floor: shapely.Polygon) -> float:
-    """Return the area that a disc as wide as a passage does not cover, or infinity where it cannot go everywhere."""
+    """Return the area that a disc of passage width does not cover, or infinity if it cannot reach everything."""
     inner = floor.buffer(-0.495 * PASSAGE_M, quad_segs=16)
-    # Mitres may cross each other, which buffer(0) mends.
+    # Mitres may cross each other, which buffer(0) repairs.
     grown = inner.buffer(0.505 * PASSAGE_M, join_style="mitre", mitre_limit=10.0).buffer(0)
     return float(floor.area - grown.intersection(floor).area) if isinstance(inner, shapely.Polygon) else np.inf
 

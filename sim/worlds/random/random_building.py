@@ -10,9 +10,9 @@ from .floor_plan import STYLES, floor_plan
 from .furnishing import furnish
 
 START_CLEARANCE_M = 0.4
-"""Least distance from the start to all walls."""
+"""Smallest distance of the start from all walls."""
 LEAST_FACE_M = 0.0999
-"""No face is shorter than the thickness of a wall, 0.1 m, less what rounding takes."""
+"""Smallest length of a face: the thickness of a wall, 0.1 m, less rounding."""
 OUTER_M = 0.3
 """Thickness of what surrounds the building."""
 
@@ -39,13 +39,13 @@ def random_building(seed: int) -> Drawing:
     return Drawing(
         solids=tuple(shapely.get_parts(solid)),
         start=np.array([0.0, 0.0, heading]),
-        understood="drawn by chance",
+        understood="generated at random",
         scale="in metres",
     )
 
 
 def _floor(chance: np.random.Generator) -> shapely.Polygon:
-    """Return a floor, drawn again where a door beside a slanted wall left a face shorter than any wall is thick."""
+    """Return a floor, drawn again if a door beside a slanted wall left a face shorter than the thickness of a wall."""
     while True:
         style = STYLES[int(chance.integers(len(STYLES)))]
         floor = furnish(floor_plan(style, chance), style.furniture * chance.uniform(0.0, 2.0), chance)
@@ -59,7 +59,7 @@ def _shortest_face(floor: shapely.Polygon) -> float:
 
 
 def _start(floor: shapely.Polygon, chance: np.random.Generator) -> Float[np.ndarray, "2"]:
-    """Return a place on the floor that is clear of all walls, any one as likely as another."""
+    """Return a uniformly random position on the floor that is clear of all walls."""
     roomy = floor.buffer(-1.05 * START_CLEARANCE_M)
     x0, y0, x1, y1 = roomy.bounds
     while True:

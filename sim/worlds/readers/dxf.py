@@ -1,9 +1,9 @@
 """DXF, read by ezdxf: lines, polylines, arcs, circles and curves of the model space are walls.
 
-Blocks are read where they are inserted. Layers that are off or frozen are not read, nor are hatches, texts and
+Blocks are read where they are inserted. Layers that are off or frozen are skipped, and so are hatches, texts and
 dimensions. A circle, a point or a block on a layer `START` (or a block of that name) marks the start. The scale is the
-file's own unit ($INSUNITS); a file without one is in metres if it is then as large as a building. Of a file that this
-program wrote the walls are read, and the start.
+file's own unit ($INSUNITS); a file without one is in metres if that gives the size of a building. From a file written
+by chainslam only the walls and the start are read.
 """
 
 import io
@@ -100,7 +100,7 @@ def _document(data: bytes) -> tuple[Any, list[str]]:
         # The library raises whatever a broken file makes it meet; to the user all of it is one bad file.
         raise _broken(error) from None
     faults = len(found.errors) + len(found.fixes)
-    return document, ([f"mended: {counted(faults, 'fault', 'faults')} of the file"] if faults else [])
+    return document, ([f"repaired: {counted(faults, 'fault', 'faults')} of the file"] if faults else [])
 
 
 def _broken(error: Exception) -> WorldError:
@@ -110,7 +110,7 @@ def _broken(error: Exception) -> WorldError:
 def _unit(document: Any) -> tuple[float | None, str]:
     number = int(document.header.get("$INSUNITS", 0) or 0)
     if number == 0:
-        return None, "assumed, for the file names no unit (--scale METRES says another)"
+        return None, "assumed, since the file names no unit (--scale METRES says another)"
     try:
         metres = float(units.conversion_factor(InsertUnits(number), InsertUnits.Meters))
     except (ValueError, TypeError, KeyError):

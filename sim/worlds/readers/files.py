@@ -1,4 +1,4 @@
-"""Reading a map's file, whatever lies there, and telling the two kinds of JSON apart."""
+"""Reading a map's file, whatever its type, and distinguishing the two kinds of JSON."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ FILE_MAX = 64 * 2**20
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return a file's bytes; raise WorldError where there is no plain file of sensible size."""
+    """Return a file's bytes; raise WorldError if it is not a regular file of reasonable size."""
     try:
         if not path.is_file():
             found = "a directory" if path.is_dir() else "something else" if path.exists() else "no such file"

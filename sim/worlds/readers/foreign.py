@@ -1,4 +1,4 @@
-"""Formats that people have and that are not read: what each is called, and the way in."""
+"""Common formats that are not read: their names and how to convert them."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ SVG = "export it as SVG or DXF"
 STOREY = "export a plan of one storey as SVG or DXF"
 CLOUD = "cut it at the scanner's height and save that as a picture"
 GEO = "save it as GeoJSON (ogr2ogr -f GeoJSON plan.geojson FILE)"
-LOG = "a drive is no drawing: `chainslam replay` reads it"
+LOG = "it is a log, which `chainslam replay` reads"
 FORMATS: dict[str, tuple[str, str]] = {
     ".ifc": ("an IFC building model", "cut a plan of one storey out of it as SVG (IfcConvert FILE plan.svg)"),
     ".pdf": ("a PDF document", "save its page as SVG (inkscape FILE --export-filename=plan.svg, or pdftocairo -svg)"),
@@ -26,9 +26,9 @@ FORMATS: dict[str, tuple[str, str]] = {
     **dict.fromkeys((".pbstream", ".posegraph"), ("a SLAM state", "save its map (nav2's map_saver_cli)")),
     **dict.fromkeys((".zip", ".tar", ".gz", ".7z"), ("an archive", "unpack it, and name a file in it")),
     **dict.fromkeys((".inc", ".cfg"), ("a part of a Stage world", "name the bitmap in it, with --scale METRES")),
-    ".xml": ("an XML file", "a plan is an SVG file: save it under that ending"),
+    ".xml": ("an XML file", "rename it to .svg if it is an SVG drawing"),
 }  # fmt: skip
-"""By the ending of the file name: what it is, and what to do."""
+"""By the file name's extension: what it is, and what to do."""
 STAGE = (
     "a Stage world",
     "name its bitmap, with --scale METRES a pixel: the size of its floorplan over the picture's width in pixels",
@@ -40,7 +40,7 @@ IRSIM = (
 
 
 def check_foreign(path: Path) -> None:
-    """Raise WorldError, which says what the file is and the way in, for a format that is known and not read."""
+    """Raise WorldError, with its name and how to convert it, for a known format that is not read."""
     suffix = path.suffix.lower()
     told = FORMATS.get(suffix)
     if suffix == ".world":
@@ -50,7 +50,7 @@ def check_foreign(path: Path) -> None:
 
 
 def check_yaml(data: bytes) -> None:
-    """Raise WorldError for a YAML file that describes a world of a simulator and no map."""
+    """Raise WorldError for a YAML file that describes a world of a simulator instead of a map."""
     keys = {line.split(b":")[0].strip() for line in data.splitlines() if line[:1].isalpha() and b":" in line}
     if b"image" not in keys and b"world" in keys and keys & {b"robot", b"obstacle"}:
         raise WorldError(f"expected a ROS map YAML with image: and resolution:, found {IRSIM[0]}: {IRSIM[1]}")

@@ -1,6 +1,7 @@
 """A strict reader of small YAML files: one mapping of plain values and lists of them.
 
-YAML's aliases, merges and tags make a kilobyte into gigabytes and text into objects. A map's description needs none.
+YAML's aliases, merges and tags can turn a kilobyte into gigabytes, and text into objects. The description of a map
+needs none of them.
 """
 
 import re

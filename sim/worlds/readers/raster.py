@@ -1,9 +1,9 @@
-"""Maps as pictures: drawn in a paint program, or made by a robot.
+"""Maps as pictures, drawn in a paint program or made by a robot.
 
-In a bare picture dark is wall and light is free, and a pixel is 0.05 m unless the caller says otherwise. What is
-transparent is unknown where other pixels are light, and paper where there is nothing but ink. A picture with much of
-grey 205 and of 254 is a robot's map without its YAML: 205 is unknown. Unknown is solid, for nobody can vouch for it.
-Beyond the border of the picture all is solid.
+In a plain picture dark is wall and light is free, and a pixel is 0.05 m unless the caller gives a scale. Transparent
+pixels are unknown if other pixels are light, and background if there are only dark ones. A picture with much of grey
+205 and 254 is treated as a robot's map without its YAML file: 205 is unknown. Unknown pixels are solid, since nothing
+is known about them, and so is everything outside of the picture.
 """
 
 from dataclasses import replace
@@ -36,9 +36,7 @@ def read_image(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
     beside = map_beside(path) if options == AS_DRAWN else None
     if beside is not None:
         drawing = read_ros_map(beside)
-        return replace(
-            drawing, notes=(f"read with {beside.name} beside it (--scale leaves that aside)", *drawing.notes)
-        )
+        return replace(drawing, notes=(f"read with {beside.name} beside it (--scale ignores that)", *drawing.notes))
     picture = read_picture(path, turns=True)
     metres = options.scale or PIXEL_M
     said = "given" if options.scale else "assumed (--scale METRES says another)"
@@ -50,7 +48,7 @@ def read_image(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:
 def _walls(picture: Picture, options: DrawingOptions) -> tuple[Bool[np.ndarray, "h w"], str, list[str]]:
     """Return the solid pixels of a bare picture, what was taken for a wall, and what else was done, in words."""
     grey = picture.grey
-    notes = ["turned as its EXIF orientation says"] if picture.is_turned else []
+    notes = ["rotated according to its EXIF orientation"] if picture.is_turned else []
     if options.negate:
         grey = (
             255 - grey if picture.alpha is None else np.where(picture.alpha < CLEAR, 255, 255 - grey).astype(np.uint8)
@@ -60,7 +58,7 @@ def _walls(picture: Picture, options: DrawingOptions) -> tuple[Bool[np.ndarray, 
     least = WALL_GREY if options.threshold is None else 255 * options.threshold
     solid: Bool[np.ndarray, "h w"] = grey <= UNKNOWN_GREY if mapped else grey < least
     if picture.is_jpeg:
-        notes.append("JPEG blurs greys: edges are rough, and what a robot's map means by unknown is lost")
+        notes.append("JPEG blurs greys: edges are rough, and unknown cells of a robot's map are lost")
     if picture.alpha is not None:
         clear = picture.alpha < CLEAR
         # Ink on a clear sheet has no other paper; where some is white, what is clear was never seen.

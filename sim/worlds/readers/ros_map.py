@@ -1,7 +1,7 @@
-"""Maps made by a robot, as ROS map_server keeps them: an image, and a YAML file that says what its greys mean.
+"""Maps made by a robot, in the format of ROS map_server: an image, and a YAML file that defines its greys.
 
-What is transparent is unknown in every mode, as map_saver means it; unknown is solid. Values in quotes are read as
-yaml-cpp reads them. A picture that is not where the YAML says is looked for beside it.
+Transparent pixels are unknown in every mode, as in map_saver; unknown pixels are solid. Quoted values are read as in
+yaml-cpp. If the picture is not at the path in the YAML file, it is searched for next to that file.
 """
 
 import os.path
@@ -22,7 +22,7 @@ from .picture import Picture, read_picture
 from .plain_yaml import as_number, plain_mapping
 
 UNKNOWN_GREY = 205
-JPEG = "JPEG blurs greys, so that what is unknown may read as free or as wall: save the map as PNG or PGM"
+JPEG = "JPEG blurs greys, so that unknown cells may be read as free or as walls: save the map as PNG or PGM"
 
 
 def read_ros_map(path: Path, options: DrawingOptions = AS_DRAWN) -> Drawing:

@@ -165,7 +165,11 @@ def a_wall_seen_twice_in_one_scan_is_taken_in_twice(make: Make) -> None:
         after = volume(ends[-1].cov)
         expect(after < before + 1e-6, "a scan to leave no larger volume", f"log volume {after - before:+.1e} larger")
     moved = float(np.abs(ends[1].mean - ends[0].mean).max())
-    expect(moved > 1e-9, "another answer by two looks at one wall than by the first alone", f"{moved:.1e} between them")
+    expect(
+        moved > 1e-9,
+        "another answer from two observations of one wall than from the first alone",
+        f"{moved:.1e} between them",
+    )
 
 
 def a_line_seen_again_is_better_known(make: Make) -> None:

@@ -169,7 +169,7 @@ MAPS = {
     "words": lambda m: {"lines": np.full(m["lines"].shape, "x")},
     "no covariance": lambda m: {"cov": None},
     "a covariance of another size": lambda m: {"cov": m["cov"][:-1, :-1]},
-    "a covariance that is none": lambda m: {"cov": -m["cov"]},
+    "an invalid covariance": lambda m: {"cov": -m["cov"]},
     "a covariance with one NaN": lambda m: {"cov": np.where(np.eye(len(m["cov"])) * m["cov"] > 0, m["cov"], np.nan)},
     "objects": lambda m: {"anchors": np.full(m["anchors"].shape, None)},
     "a scalar": lambda m: {"pose": np.float64(1.0)},

@@ -152,7 +152,7 @@ def test_the_occupancy_map_is_what_the_robot_knows(explored):
 
 
 def test_nothing_seen_is_no_map():
-    with pytest.raises(ValueError, match="expected floor that was seen"):
+    with pytest.raises(ValueError, match="expected floor seen"):
         occupancy_files(FreeSpace(), np.zeros(3))
 
 

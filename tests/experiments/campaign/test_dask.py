@@ -96,7 +96,7 @@ def told_in_one_line(capsys, found):
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("chainslam: expected ")
     assert found in line
-    assert "what is done is kept" in line
+    assert "finished trials are kept" in line
 
 
 @pytest.mark.long

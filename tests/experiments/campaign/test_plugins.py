@@ -134,7 +134,7 @@ def test_what_is_installed_is_registered_and_what_cannot_be_is_told(monkeypatch,
     assert backends.BACKENDS["shy"] is entry
     assert backends.BACKENDS["ukf"] is not entry
     told = capsys.readouterr().err.splitlines()
-    assert [line.partition(": left out the plug-in ")[2].partition(" of shy-slam: ")[::2] for line in told] == [
+    assert [line.partition(": ignored the plug-in ")[2].partition(" of shy-slam: ")[::2] for line in told] == [
         ("good", "ValueError: the name ukf is taken"),
         ("b", "KeyError: 'b'"),
     ]

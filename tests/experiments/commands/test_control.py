@@ -54,7 +54,7 @@ def test_a_resumed_run_leaves_the_bytes_of_one_that_was_never_stopped(tmp_path, 
     # A limit that lies before the end of the saved run costs it nothing.
     assert main(["explore", "--resume", str(stopped), "--max-steps", "20"]) == 2
     assert timeless(stopped) == timeless(whole)
-    assert "left as they were" in capsys.readouterr().err
+    assert "unchanged" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("_unchecked")
@@ -67,7 +67,7 @@ def test_a_run_that_cannot_be_driven_again_is_told(tmp_path, capsys):
     capsys.readouterr()
     assert main(["explore", "--resume", str(tmp_path), "--max-steps", "6"]) == 2
     said = capsys.readouterr().err
-    assert "from step 2 on" in said
+    assert "at step 2 " in said
     assert len(said.splitlines()) == 1
 
 
@@ -194,7 +194,7 @@ def test_an_interrupt_while_a_compiled_module_loads_is_one(monkeypatch, capsys, 
             main(["backends"])
     else:
         assert main(["backends"]) == status
-        assert capsys.readouterr().err == "chainslam: interrupted; files that were written are whole\n"
+        assert capsys.readouterr().err == "chainslam: interrupted; every file that was written is complete\n"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

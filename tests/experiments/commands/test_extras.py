@@ -31,7 +31,7 @@ def without(*words, cwd):
 def test_exploring_replaying_scoring_and_reports_need_no_extras(tmp_path):
     status, out, err = without("explore", "paper-fig4", "--max-steps", "3", "--out", "run", cwd=tmp_path)
     assert (status, err) == (0, "")
-    assert "gtsam is not installed, so that invariant-ekf explores" in out
+    assert re.search("gtsam is not installed.*invariant-ekf", out)
     for words in (["replay", "run", "--backend", "full-ekf", "--out", "again"], ["report", "run"], ["measure", "run"]):
         status, _, err = without(*words, cwd=tmp_path)
         assert (status, err) == (0, "")

@@ -74,7 +74,7 @@ def test_what_is_near_to_nothing_is_not_guessed(words, capsys):
         ([*WORLD, "--max-path", "far"], "expected a number for --max-path, found 'far'"),
         ([*WORLD, "--max-steps", "1.5"], "expected a whole number for --max-steps, found '1.5'"),
         (["compare"], "--out DIR"),
-        ([*WORLD, "hall"], "expected no more words for explore, found 'hall'"),
+        ([*WORLD, "hall"], "expected no further arguments for explore, found 'hall'"),
         ([], "expected a command, found none"),
     ],
 )

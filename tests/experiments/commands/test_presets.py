@@ -76,7 +76,7 @@ def test_a_saved_run_has_settled_its_preset(tmp_path, capsys):
     assert main(words) == 0
     capsys.readouterr()
     assert main(["explore", "--resume", str(tmp_path / "run"), *PRESET]) == 2
-    assert "found preset: the saved run has settled it" in capsys.readouterr().err
+    assert "found preset: leave it out" in capsys.readouterr().err
     said = json.loads((tmp_path / "run" / "config.json").read_text())["trial"]
     assert (said["backend"], said["mission"]["mapper"]["matching"]["method"]) == ("block-ekf", "paper")
 

@@ -63,7 +63,7 @@ def test_a_viewer_that_went_is_one_line_and_the_results_are_kept(tmp_path, capsy
     status = main(["explore", WORLD, "--max-steps", "2", "--out", str(tmp_path), "--view"])
     (said,) = capsys.readouterr().err.splitlines()
     assert status == 1
-    assert "expected the viewer to stay open till the end, found it closed" in said
+    assert "expected the viewer to stay open until the end, found it closed" in said
     assert json.loads((tmp_path / "summary.json").read_text())["steps"] == 2
 
 

@@ -89,7 +89,7 @@ def test_double_entries_are_held_against_the_gate_of_the_campaign():
 def test_what_a_campaign_settles_itself_cannot_be_set(key, capsys):
     value = {"seed": 1, "errorless": "true", "start": "[1, 2]"}.get(key, "hall")
     assert main(["compare", "--preset", "smoke", "--out", "DIR", "--set", f"{key}={value}"]) == 2
-    assert "is settled otherwise" in capsys.readouterr().err
+    assert "the command's own options" in capsys.readouterr().err
 
 
 def test_campaigns_of_other_settings_are_neither_one_nor_the_same(tmp_path, capsys):
@@ -132,14 +132,14 @@ def test_a_replay_has_the_settings_of_its_run_until_others_are_asked_for(run, tm
 @pytest.mark.parametrize("pair", ["seed=2", "robot.radius_m=0.3", "world=hall"])
 def test_what_a_log_has_settled_cannot_be_set(pair, run, tmp_path, capsys):
     assert main(["replay", str(run / "log.npz"), "--out", str(tmp_path / "out"), "--set", pair]) == 2
-    assert "is settled otherwise" in capsys.readouterr().err
+    assert "the command's own options" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("more", [["--seed", "1"], ["--set", f"{GATE}=0.9"], ["--config", "x.json"]], ids=" ".join)
 def test_a_saved_run_goes_on_with_its_own_settings(run, more, capsys):
     assert main(["explore", "--resume", str(run), *more]) == 2
-    assert "the saved run has settled it" in capsys.readouterr().err
+    assert "the saved run decides it" in capsys.readouterr().err
 
 
 def test_the_command_on_the_page_of_a_run_names_its_settings(run):

@@ -243,11 +243,11 @@ def test_what_is_good_of_a_damaged_log_is_mapped_and_one_line_tells_where_it_end
 BAD = {
     "no log": ([], b"hello\n", "expected a recorded log, found room.log: expected lines FLASER"),
     "empty": ([], b"", "found none of them"),
-    "truth": (["--association", "true"], None, "expected a log that knows the truth"),
-    "every": (["--every", "0"], None, "found --every 0"),
+    "truth": (["--association", "true"], None, "expected a log with the truth"),
+    "every": (["--every", "0"], None, "--every of 1 or more keyframes, found 0"),
     "noise": (["--range-noise", "0"], None, "found --range-noise 0"),
     "settled": (["--set", "seed=4"], None, "'seed'"),
-    "back end": (["--backend", "none"], None, "expected a back end out of"),
+    "back end": (["--backend", "none"], None, "expected a back end from"),
 }
 
 
@@ -280,7 +280,7 @@ def test_an_interrupt_in_second_looks_ends_them_and_keeps_the_map(stop, tmp_path
     assert main(["replay", str(log), "--second-looks", "--out", str(tmp_path / "out")]) == 130
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["status"], summary["outcome"]) == ("stopped", "interrupted")
-    assert summary["reason"] == f"interrupted by {stop or 'Ctrl-C'} in second looks"
+    assert summary["reason"] == f"interrupted by {stop or 'Ctrl-C'} during offline refinement"
     assert summary["lines"] >= 3
     assert (tmp_path / "out" / "map.npz").exists()
     assert "Traceback" not in capsys.readouterr().err

@@ -26,7 +26,7 @@ def test_an_empty_value_is_refused_for_every_option(command, option, capsys, tmp
     for words in ([f"{option}="], [option, ""]):
         assert main([command, "x", *words]) == 2
         assert capsys.readouterr().err == (
-            f"chainslam: expected a value for {option}, found an empty one: is a variable not set?\n"
+            f"chainslam: expected a value for {option}, found an empty one: is a shell variable unset?\n"
         )
     assert list(tmp_path.iterdir()) == []
 

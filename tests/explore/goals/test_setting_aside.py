@@ -74,7 +74,7 @@ def test_what_lies_on_something_round_is_set_aside_without_a_look(scripted, scen
     kinds["EndErrand"].steps = 99
     monkeypatch.setattr(explorer_module, "is_round", lambda end, walls, config: end.wall == 0)
     decision = ask(explorer_at(scene), scene, ends_at((5, 2), (2, 2)))
-    assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "on something round")]
+    assert [(end.wall, end.reason) for end in decision.given_up.ends] == [(0, "on a curved obstacle")]
     assert decision.goal.wall == 1
     assert len(made) == 1
 

@@ -70,7 +70,7 @@ def test_each_scan_carries_its_own_beams(tmp_path):
     arrays = {name: getattr(log.recording, name) for name in log.recording.__dataclass_fields__}
     arrays = {name: value for name, value in arrays.items() if value is not None}
     assert len(recording_of(arrays).scan(3).bearings_rad) == len(log.recording.scan(3).bearings_rad)
-    with pytest.raises(RecordingError, match="fans that are no beams"):
+    with pytest.raises(RecordingError, match="invalid ranges of bearings"):
         recording_of(arrays | {"fans": arrays["fans"] + np.array([10.0, 0.0, 0.0])})
 
 
@@ -99,7 +99,7 @@ def test_two_topics_of_odometry_are_told(tmp_path):
         first
         == "expected one topic of odometry, found /a_filter and /odom: /a_filter is read; --odom-topic takes another"
     )
-    assert "expected a transform from base to laser, found none: the scanner is taken to sit at the middle" in mounting
+    assert "expected a transform from base to laser, found none: the scanner is assumed to be at the middle" in mounting
     log = read_recorded_log(tmp_path / "a", wanted=TopicsWanted(odometry="/odom"))
     np.testing.assert_allclose(log.recording.odometry[1:, 0], 0.2)
 
@@ -118,14 +118,14 @@ def test_scans_after_the_end_of_the_odometry_are_told(tmp_path):
             if k < 4:
                 bag.odometry(1.0 + k, (0.2 * k, 0.0, 0.0))
             bag.scan(1.0 + k)
-    assert "found 3 scans after its end: they stand where it ends" in read_recorded_log(tmp_path / "a").notes[0]
+    assert "found 3 scans after its end: its last pose is used" in read_recorded_log(tmp_path / "a").notes[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_scans_alone_tell_their_motion(tmp_path, kind):
     path = room_bag(tmp_path / "a.bag", kind, odometry=False, mounting="none", place=np.zeros(3), noise_m=0.01)
     log = read_recorded_log(path, motion_of=motion_of_scans)
-    assert "found none: the scans alone tell the motion" in log.notes[0]
+    assert "found none: scan matching alone gives the motion" in log.notes[0]
     assert len(log.recording) > 8
     at = np.flatnonzero(np.diff(log.keyframe_of_scan, prepend=-1))[-1]
     found = np.zeros(3)
@@ -146,4 +146,4 @@ def test_a_scanner_inside_something_is_told_and_its_scans_are_left_out(tmp_path)
             bag.scan(1.0 + k, inside if k in (3, 4) else beside, -np.pi, 2.0 * np.pi / 90)
     log = read_recorded_log(tmp_path / "a")
     assert len(log.scan_time_s) == 6
-    assert "found it inside something in 2 scans, 4.000 s to 5.000 s" in log.notes[0]
+    assert "found it inside an object in 2 scans, 4.000 s to 5.000 s" in log.notes[0]

@@ -63,15 +63,15 @@ FAULTS = {
     "sigma 0": (with_one("sigma_m", 0.0), "sigma_m 0, sigma_share 0.01, range_max_m 4"),
     "range 0": (with_one("range_max_m", 0.0), "sigma_m 0.01, sigma_share 0.01, range_max_m 0"),
     "share below 0": (with_one("sigma_share", -0.01), "sigma_share -0.01"),
-    "back in time": (with_one("time_s", 0.5), "times that run backwards"),
+    "back in time": (with_one("time_s", 0.5), "times that decrease"),
     "late": ({"scan_start_s": np.array([0.0, 1.1, 2.0])}, "scans that end before they begin"),
-    "uneven": (with_one("bearings_rad", 1.2), "bearings that are not evenly spread"),
-    "backwards": ({"bearings_rad": np.linspace(1.0, -1.0, BEAMS)}, "bearings that are not evenly spread"),
-    "two turns": ({"bearings_rad": np.linspace(-7.0, 7.0, BEAMS)}, "bearings that are not evenly spread"),
+    "uneven": (with_one("bearings_rad", 1.2), "bearings that are not evenly spaced"),
+    "backwards": ({"bearings_rad": np.linspace(1.0, -1.0, BEAMS)}, "bearings that are not evenly spaced"),
+    "two turns": ({"bearings_rad": np.linspace(-7.0, 7.0, BEAMS)}, "bearings that are not evenly spaced"),
     "nothing far": (with_one("ranges_m", 0.0), "ranges of 0 m or less or beyond 4 m"),
     "too far": (with_one("ranges_m", 4.01), "ranges of 0 m or less or beyond 4 m"),
-    "skew": ({"odometry_cov": np.triu(np.ones((STEPS, 3, 3)))}, "odometry_cov that is no covariance"),
-    "negative": (with_one("odometry_cov", -1.0), "odometry_cov that is no covariance"),
+    "skew": ({"odometry_cov": np.triu(np.ones((STEPS, 3, 3)))}, "odometry_cov that is not a covariance"),
+    "negative": (with_one("odometry_cov", -1.0), "odometry_cov that is not a covariance"),
 }
 
 
@@ -98,7 +98,7 @@ def test_a_log_of_another_format_is_refused(tmp_path, said):
 
 def test_places_without_a_log_are_told_and_are_left_to_the_reader_of_own_logs(tmp_path):
     (tmp_path / "text.npz").write_text("hello")
-    for name, words in (("none.npz", "no file"), ("text.npz", "no archive of arrays"), ("", "a folder")):
+    for name, words in (("none.npz", "no file"), ("text.npz", "archive of arrays"), ("", "a folder")):
         with pytest.raises(RecordingError, match=r"^expected a run's log\.npz, found ") as caught:
             read_log(tmp_path / name)
         assert words in str(caught.value)

@@ -159,7 +159,7 @@ def test_doors_between_said_rooms_inside_drawn_walls_stay_open(tmp_path):
 @pytest.mark.parametrize(
     ("shape", "words"),
     [
-        (shapely.Polygon([(0, 0), (9, 0), (0, 0)]), "nothing drawn"),
+        (shapely.Polygon([(0, 0), (9, 0), (0, 0)]), "expected walls, found none"),
         (shapely.Polygon([(0, 0), (9, 9), (9, 0), (0, 9)]), None),
         (shapely.Polygon([(0, 0), (9, 0), (9, 0), (9, 9), (9, 9), (0, 9), (0, 0)]), None),
         (shapely.Polygon([(0, 0), (0.3, 0), (0.3, 9), (0, 9)]), "fits into"),

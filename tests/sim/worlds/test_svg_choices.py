@@ -111,9 +111,9 @@ def test_a_start_may_be_a_group_a_copy_or_a_word_and_is_no_pillar(tmp_path, mark
 
 def test_what_lies_beyond_the_page_is_told_and_most_of_it_refused(tmp_path):
     world = _load(tmp_path, '<rect x="11" y="2" width="2" height="2" fill="black"/>')
-    assert any("beyond the page" in note for note in world.reading.notes)
+    assert any("outside the page" in note for note in world.reading.notes)
     (tmp_path / "b.svg").write_text(f'{HEAD}<g transform="translate(8 0)">{ROOM}</g></svg>')
-    with pytest.raises(WorldError, match="% of its walls beyond the viewBox"):
+    with pytest.raises(WorldError, match="% of its walls outside the viewBox"):
         load(tmp_path / "b.svg")
 
 

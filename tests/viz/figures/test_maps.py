@@ -77,7 +77,7 @@ def test_all_that_is_written_lies_on_the_page(width, height):
         corner_covs=np.tile(1e-6 * np.eye(2), (4, 1, 1)),
     )  # fmt: skip
     figure = draw_map(shown)
-    assert {"tentative wall", "not straight (crooked): unreliable"} <= set(labels(figure))
+    assert {"tentative wall", "wall with lack of fit: unreliable"} <= set(labels(figure))
     renderer = figure.canvas.get_renderer()
     for artist in (*figure.axes[0].texts, figure.legends[0]):
         assert all(figure.bbox.fully_contains(*corner) for corner in artist.get_window_extent(renderer).corners()), (

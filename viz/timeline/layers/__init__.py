@@ -1,1 +1,1 @@
-"""What a timeline draws, one file for each part of the picture."""
+"""The layers of a timeline, one file for each."""

@@ -16,16 +16,16 @@ from .map_layers import style
 
 Row = Mapping[str, Any]
 CELL = ("world", "strategy", "mode", "association")
-"""What the back ends of one cell have in common."""
+"""What the back ends of one combination have in common."""
 CURVES = {
     "pose_anees": "log₁₀ of the pose's ANEES over the trials (0 is ideal), and the 95 % band of its mean",
     "pose_error_rms_m": "pose error, rms over the trials, m",
 }
 POWERS = ("pose_anees", "band_low", "band_high")
-"""Curves drawn as powers of ten: an overconfident filter would flatten all others."""
+"""Curves drawn as powers of ten, since an overconfident filter would flatten all others."""
 DOTS = {"pose_anees": "pose ANEES", "map_anees": "map ANEES"}
 WIDTH, HEIGHT = 1.6, 1.5
-"""How far apart the back ends stand among the dots, and how high a power of ten is."""
+"""Spacing of the back ends among the dots, and height of a power of ten."""
 
 
 class Summary:
@@ -109,7 +109,7 @@ class Summary:
     def _curve(self, entity: str, rows: Sequence[Row], name: str) -> None:
         known = [row for row in rows if _is_number(row.get(name))]
         step = np.array([row["step"] for row in known], dtype=np.int64)
-        # A campaign's trials have no time in common; its time axis is the step.
+        # The trials of a campaign have no common time; the time axis is the step.
         values = np.array([row[name] for row in known], dtype=np.float64)
         if name in POWERS:
             values = np.log10(np.maximum(values, 1e-3))
@@ -129,7 +129,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _spread(seed: int) -> float:
-    """Return a number from -1 to 1 that sets neighbouring seeds apart."""
+    """Return a number from -1 to 1 that separates neighbouring seeds."""
     return float(2.0 * (seed * 0.61803398875 % 1.0) - 1.0)
 
 

@@ -21,7 +21,7 @@ POSE_BAND = chi2_band(3)
 
 
 def curve_style(backend: str, of: str = "", width: float = 1.6) -> rr.SeriesLines:
-    """Return the look of a back end's curves; `of` says more where it has two in one plot."""
+    """Return the style of a back end's curves; `of` distinguishes two in one plot."""
     return rr.SeriesLines(colors=packed(palette.of_backend(backend)), names=backend + of, widths=width)
 
 
@@ -52,7 +52,7 @@ class CurvesLayer:
 
 
 class DecisionsLayer:
-    """What was chosen and why, what was given up and why, what the robot is about."""
+    """Goals and their reasons, blacklisted ends and why, the current behaviour."""
 
     def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity = out, f"/decisions/{backend}"
@@ -71,7 +71,7 @@ class DecisionsLayer:
 
     def _news(self, row: DrawnStep) -> list[tuple[str, str]]:
         news = [
-            (f"set aside: open end of wall {end.wall}: {end.reason}", "WARN")
+            (f"blacklisted: open end of wall {end.wall}: {end.reason}", "WARN")
             for end in row.set_aside
             if (end.wall, end.side) not in self._aside
         ]
@@ -87,14 +87,14 @@ class DecisionsLayer:
         if row.ended is not None:
             news.append((f"{row.ended}: {decision.words}", "INFO"))
         elif decision.words and decision.words != self._doing:
-            # The reason of the goal stands in a line of its own.
+            # The reason of the goal has its own line.
             why = "" if goal is None else f" ({goal.reason})"
             news.append((decision.words.removesuffix(why), "DEBUG"))
         self._doing = decision.words
         return news
 
     def _faults(self, row: DrawnStep) -> list[tuple[str, str]]:
-        """Return what the robot noticed of itself: a motion that was not reported, wheels worse than stated."""
+        """Return faults that the robot noticed: an unreported motion, more wheel slip than stated."""
         found, news = row.localisation, []
         if found.unstated_motion is not None:
             x, y, turn = found.unstated_motion.motion

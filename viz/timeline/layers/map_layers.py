@@ -1,4 +1,4 @@
-"""The map under `/world/BACKEND`: walls, corners, open ends, the goal, the swept floor."""
+"""The map under `/world/BACKEND`: walls, corners, open ends, the goal, the seen floor."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -24,18 +24,18 @@ PLACES = {
     "known-walls": "walls known well",
     "start": "the start",
 }
-"""Goals that are no open ends, by their kind, in words."""
+"""Goals other than open ends, by their kind, in words."""
 QUANTUM_M = 0.005
-"""A thing is drawn again when it has moved by about this."""
+"""Things are drawn again when they have moved by about this."""
 
 
 def style(radius: float, order: float, **more: Any) -> rr.LineStrips2D:
-    """Return what holds for all lines of an entity: half their width in points of the screen, and what lies on top."""
+    """Return the style of all lines of an entity: half their width in screen points, and their drawing order."""
     return rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(radius), draw_order=order, **more)
 
 
 def words_only() -> rr.Points2D:
-    """Return what holds for points that are there for their labels: the viewer gives a label its point's colour."""
+    """Return the style of points that only carry labels, which the viewer draws in the colour of their point."""
     return rr.Points2D.from_fields(
         radii=rr.Radius.ui_points(0.1), colors=packed(palette.PAGE), draw_order=50.0, show_labels=True
     )
@@ -48,18 +48,18 @@ class WallsLayer:
         self._each = PerWall(out, f"/world/{backend}/walls", 2, QUANTUM_M)
 
     def send(self, block: Block) -> None:
-        """Send each wall where it moved, changed its colour or went."""
+        """Send each wall that moved, changed its colour or was deleted."""
         self._each.send(block, [row.walls.ids for row in block.rows], block.ends, block.colours)
 
 
 class _Sparse:
-    """Rows of an entity, sent only where they differ from what was sent last."""
+    """Rows of an entity, sent only if they differ from the last ones sent."""
 
     def __init__(self) -> None:
         self._last: bytes | None = None
 
     def changed(self, tables: Sequence[Float[np.ndarray, "_ _"]]) -> list[int]:
-        """Return the rows whose table, rounded, is not that of the row before."""
+        """Return the rows whose table, after rounding, differs from the row before."""
         rows = []
         for at, table in enumerate(tables):
             key = np.round(table / QUANTUM_M).astype(np.int64).tobytes()
@@ -70,7 +70,7 @@ class _Sparse:
 
 
 class CornersLayer:
-    """Where two walls of a chain meet."""
+    """Corners of chains."""
 
     def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity, self._sparse = out, f"/world/{backend}/corners", _Sparse()
@@ -91,7 +91,7 @@ class CornersLayer:
 
 
 class OpenEndsLayer:
-    """Circles at open ends; grey where exploration gave one up."""
+    """Circles at open ends; grey if the end is blacklisted."""
 
     def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._entity, self._sparse = out, f"/world/{backend}/open_ends", _Sparse()
@@ -151,7 +151,7 @@ class GoalLayer:
         if chosen:
             counts = np.array([len(walls[at][0]) for at in chosen])
             ends = np.concatenate([walls[at][1] for at in chosen])
-            # The goal's label names its own wall.
+            # The goal's label already names its own wall.
             about = [block.rows[at].decision.goal for at in chosen]
             ends_at = [None if goal is None else goal.wall for goal in about]
             labels = [
@@ -172,7 +172,7 @@ def _number(wall: int | None) -> int:
 
 
 def _to_follow(block: Block, at: int) -> tuple[Int[np.ndarray, " k"], Float[np.ndarray, "k 2 2"]]:
-    """Return the walls to follow, moved a little to their free side so that the walls themselves stay to be seen."""
+    """Return the walls to follow, shifted to their free side so that the walls themselves remain visible."""
     row, here = block.rows[at], block.walls_at(at)
     chosen = np.isin(row.walls.ids, () if row.ended else row.decision.walls_to_follow)
     return row.walls.ids[chosen], block.ends[here][chosen] - 0.12 * normals(block.lines[here][chosen, 0])[:, None, :]

@@ -16,7 +16,7 @@ from .map_layers import style
 from .per_wall import PerWall
 
 TIMES = 10.0
-"""How much its ellipses are enlarged."""
+"""Magnification of its ellipses."""
 QUANTUM = 0.02
 """An enlarged ellipse is drawn again when it has changed by about this, rad or m."""
 
@@ -55,11 +55,11 @@ class ModelLayer:
         seen = np.concatenate([row.segments.lines for row in block.rows])
         alpha, places = wrap(seen[:, 0] + block.poses[at, 2]), block.poses[at, :2]
         lines = np.column_stack([alpha, seen[:, 1] + np.sum(normals(alpha) * places, axis=-1)])
-        # The pose is taken as exact here: what is drawn is the segment's own uncertainty.
+        # Only the segment's own uncertainty is drawn, as if the pose were exact.
         covs = hessian_cov(alpha, places, np.concatenate([row.segments.cov for row in block.rows]))
         walls = _matched_lines(block)
         paired = np.isfinite(walls[:, 0])
-        # A segment beside alpha = pi may belong to a wall beside -pi: it is drawn where its wall is.
+        # A segment near alpha = pi may belong to a wall near -pi: it is drawn next to its wall.
         lines[paired, 0] = walls[paired, 0] + wrap(lines[paired, 0] - walls[paired, 0])
         drawn = (kinds == FUSED) | (kinds == REFUSED)
         contours = ellipses(lines[drawn], covs[drawn], TIMES, vertices=9)
@@ -72,7 +72,7 @@ class ModelLayer:
 
 
 def _matched_lines(block: Block) -> Float[np.ndarray, "s 2"]:
-    """Return for each segment the line (alpha, r) of the wall that it was matched to; NaN for none."""
+    """Return the line (alpha, r) of the wall matched with each segment; NaN for none."""
     lines = np.full((len(block.row_of_segment), 2), np.nan)
     first = 0
     for at, row in enumerate(block.rows):

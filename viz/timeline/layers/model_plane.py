@@ -1,4 +1,4 @@
-"""The plane of (alpha, r): how wide a radian is drawn, and the axes."""
+"""The plane of (alpha, r): width of a radian, and axes."""
 
 from dataclasses import dataclass
 
@@ -16,15 +16,15 @@ class Plane:
     low: float
     high: float
     width_over_height: float
-    """Of the view that it is for."""
+    """Width over height of the view."""
 
     @property
     def alpha_units(self) -> float:
-        """How wide a radian is drawn where a metre is 1 high."""
+        """Width of a radian relative to a metre."""
         return self.width_over_height * (self.high - self.low + 1.0) / (2.0 * np.pi)
 
     def bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return what a view shows: along x, and along y downwards."""
+        """Return the ranges of a view: along x, and along y downwards."""
         margin = 0.1 * (self.high - self.low + 1.0)
         half = np.pi * self.alpha_units + margin
         return (-half - margin, half), (-self.high - 0.5 - margin, -self.low + 0.5 + 1.5 * margin)

@@ -1,4 +1,4 @@
-"""Things of which every wall has one, each an entity of its own, drawn again only where it changed."""
+"""Things that every wall has, one entity for each, drawn again only if they changed."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from ..recording import RerunRecording, Timestamps
 
 
 class PerWall:
-    """One strip of v points for each wall, under a folder; the view says how broad they are."""
+    """One strip of v points for each wall, under a folder; the view determines the width."""
 
     def __init__(self, out: RerunRecording, folder: str, vertices: int, quantum: float) -> None:
         self._out, self._folder, self._quantum = out, folder, quantum
@@ -27,7 +27,7 @@ class PerWall:
         strips: Float[np.ndarray, "k v 2"],
         colours: UInt32[np.ndarray, " k"],
     ) -> None:
-        """Send the strips of walls `ids` (for each row some) where they changed, and nothing once a wall is gone."""
+        """Send the changed strips of the walls `ids` (some for each row), and an empty one for a deleted wall."""
         at = np.repeat(np.arange(len(block)), [len(some) for some in ids])
         walls = np.concatenate(ids)
         table = np.column_stack([rounded(strips, self._quantum), colours.astype(np.int64)])
@@ -48,7 +48,7 @@ class PerWall:
         self._out.strips(f"{self._folder}/{wall}", moments, counts, strips, colours)
 
     def _gone(self, rows: Sequence[DrawnStep]) -> dict[int, int]:
-        """Return the walls that went, and at which row."""
+        """Return the deleted walls, and their rows."""
         gone: dict[int, int] = {}
         for at, row in enumerate(rows):
             if not np.array_equal(row.walls.ids, self._present):

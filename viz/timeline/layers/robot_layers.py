@@ -1,4 +1,4 @@
-"""The robot under `/world/BACKEND`: its path, its uncertainty, and what it sees."""
+"""The robot under `/world/BACKEND`: its path, its uncertainty, and its scans."""
 
 import numpy as np
 import rerun as rr
@@ -15,9 +15,9 @@ from ..recording import RerunRecording, Timestamps
 from .map_layers import style, words_only
 
 POSE_TIMES = 10.0
-"""How much the robot's ellipse is enlarged."""
+"""Magnification of the robot's ellipse."""
 LABEL_M = 0.5
-"""How far apart labels of one step stand at least, m."""
+"""Smallest distance between labels of one step, m."""
 
 
 class RobotLayer:
@@ -68,9 +68,9 @@ def send_path(
 
 
 class ScanLayer:
-    """What one scan showed, in the robot's frame: points, segments, and what matching made of each.
+    """The content of one scan, in the robot's frame: points, segments, and how each was matched.
 
-    Why a segment was refused is written beside it, in the world's frame, so that the words do not lie on each other.
+    The reason for a refused segment is written beside it, in the world's frame, so that texts do not overlap.
     """
 
     def __init__(self, out: RerunRecording, backend: str) -> None:

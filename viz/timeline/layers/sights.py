@@ -10,11 +10,11 @@ from ..recording import RerunRecording
 from .map_layers import style
 
 UNITS_PER_M = 45.0
-"""How far apart nodes are drawn in the graph's own view, where y points down."""
+"""Spacing of nodes in the graph's own view, where y points down."""
 
 
 class SightsLayer:
-    """Walls as nodes at their middles; neighbours in a chain, and what was seen from where."""
+    """Walls as nodes at their middles; neighbours in a chain, and walls seen from others."""
 
     def __init__(self, out: RerunRecording, backend: str) -> None:
         self._out, self._world, self._graph = out, f"/world/{backend}/visibility", f"/graph/{backend}"
@@ -22,7 +22,7 @@ class SightsLayer:
         out.fixed(f"{self._world}/neighbours", style(1.0, 13.0, colors=packed(palette.NEIGHBOUR)))
 
     def send(self, block: Block) -> None:
-        """Send the graph at the steps where it was kept."""
+        """Send the graph at the steps that have one."""
         chosen = [at for at, row in enumerate(block.rows) if row.sights is not None and row.sights.nodes]
         if not chosen:
             return

@@ -1,4 +1,4 @@
-"""The truth as plain geometry, under `/world/truth`, and how an estimate stands to it."""
+"""The truth as plain geometry, under `/world/truth`, and the NEES of an estimate."""
 
 from collections.abc import Callable, Sequence
 
@@ -17,14 +17,15 @@ from .robot_layers import body, send_path
 NeesOf = Callable[
     [Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]], Float[np.ndarray, " n"]
 ]
-"""From estimated poses, their covariances and the true poses to the NEES of each; NaN where it has none."""
+"""Function from estimated poses, their covariances and the true poses to the NEES of each; NaN if it cannot be
+computed."""
 
 
 BAND_WORDS = {"high": "above: overconfident", "low": "below: too cautious"}
 
 
 class TruthLayer:
-    """The true walls, and the true path as far as it is known; the same for all back ends, so sent once."""
+    """The true walls, and the true path so far; the same for all back ends, so sent once."""
 
     def __init__(self, out: RerunRecording, rings_world: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
         self._out = out
@@ -65,7 +66,7 @@ class NeesLayer:
                 out.fixed(f"/plots/{plot}/band/{name}", line)
 
     def send(self, block: Block) -> None:
-        """Send the values of the steps of which the truth is known."""
+        """Send the values of the steps with known truth."""
         known = [at for at, row in enumerate(block.rows) if row.true_pose is not None]
         if not known:
             return

@@ -1,4 +1,4 @@
-"""Where wheel odometry puts the robot, under `/world/odometry`: the same for all back ends, so sent once."""
+"""The path of the wheel odometry, under `/world/odometry`: the same for all back ends, so sent once."""
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +15,7 @@ WHEELS = "/world/odometry/path"
 
 
 class WheelsLayer:
-    """Gathers the wheels' path and sends each piece of it once."""
+    """Collects the odometry's path and sends each piece once."""
 
     def __init__(self, out: RerunRecording) -> None:
         self._out = out
@@ -24,7 +24,7 @@ class WheelsLayer:
         self._before: Float[np.ndarray, "1 3"] | None = None
 
     def add(self, step: Step, pose_world: Float[np.ndarray, "3"]) -> None:
-        """Keep a pose, unless another back end has brought it already."""
+        """Keep a pose, unless another back end has sent it already."""
         if step.index >= self._next:
             self._kept.append((step.index, step.time_s, pose_world))
             self._next = step.index + 1

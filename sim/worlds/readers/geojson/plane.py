@@ -1,8 +1,8 @@
-"""From a file's coordinates to metres of a plane.
+"""Conversion of a file's coordinates to metres in a plane.
 
-The plane of a building is small: longitudes and latitudes are laid flat around its middle (plate carree with the radii
-of curvature of WGS 84 there), which over 1 km is off by less than 0.1 mm a metre; Web Mercator is as much too large as
-its latitude says (1 / cos, on the sphere). What a projection in metres stretches, 0.04 % in UTM, stays.
+A building is small: longitudes and latitudes are projected to the plane around its middle (plate carree with the radii
+of curvature of WGS 84 there), with an error below 0.1 mm per metre over 1 km. Web Mercator is scaled by the cosine of
+its latitude, on the sphere. The distortion of projections in metres, 0.04 % for UTM, is not corrected.
 """
 
 import math

@@ -1,10 +1,10 @@
-"""GeoJSON: LineStrings are walls, Polygons rooms or solid, named Points are the start and labels.
+"""GeoJSON: LineStrings are walls, Polygons are rooms or solid, named Points are the start and labels.
 
-A Point whose id, or property `id` or `name`, is `start` marks the start (property `heading` in rad, optional);
-any other named Point is a label. A property says what a feature is (`kind`, `type`, `indoor`, ...: `room`, `solid`,
-`door`, `level`, ...); where none does, `rooms` says how a Polygon's shape decides. Doors may be lines, points or
-polygons: what is solid there opens, unless it would open the building to its outside. Of several storeys one is read.
-A map that this program wrote is a world again: its closed chains are rooms and islands, its open chains walls.
+A Point whose id, or property `id` or `name`, is `start` marks the start (optional property `heading` in rad); any other
+named Point is a label. The kind of a feature is a property (`kind`, `type`, `indoor`, ...: `room`, `solid`, `door`,
+`level`, ...); without one, the shape of a Polygon decides (see `rooms`). Doors may be lines, points or polygons: solid
+parts there are removed, unless that would open the building to its outside. Of several storeys one is read. A map
+written by chainslam can be read as a world: its closed chains are rooms and islands, its open chains walls.
 """
 
 from collections.abc import Sequence

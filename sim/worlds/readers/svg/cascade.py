@@ -1,8 +1,8 @@
-"""Which value of a property holds for an element: style sheets, attributes, and what comes down from around it.
+"""Which value of a property applies to an element: style sheets, attributes and inheritance.
 
-Selectors and colours are the libraries' (cssselect2, tinycss2). Here is the order of CSS (Cascading and Inheritance
-Level 4, section 6): important before normal, `style` before sheets before attributes, the more specific, the later. A
-value that is not understood is as if it were not there, as CSS says, and is remembered.
+Selectors and colours are parsed by cssselect2 and tinycss2. This module implements the order of CSS (Cascading and
+Inheritance Level 4, section 6): important before normal, `style` before sheets before attributes, more specific before
+less specific, later before earlier. An invalid value is ignored, as CSS demands, and remembered.
 """
 
 from collections.abc import Callable, Iterable, Mapping

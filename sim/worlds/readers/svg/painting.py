@@ -1,7 +1,7 @@
-"""The painter's order: what is light takes away the walls that lie under it.
+"""The painter's order: light shapes hide the walls below them.
 
-A dark fill is solid where nothing light hides it. A dark stroke is a wall of 0.1 m wherever any of its width is to be
-seen. All in metres.
+A dark fill is solid where no light shape hides it. A dark stroke is a wall of 0.1 m where any of its width is visible.
+All in metres.
 """
 
 from dataclasses import dataclass, replace

@@ -114,7 +114,7 @@ def _notes(renderer: Renderer, options: DrawingOptions) -> list[str]:
     if renderer.styles.unknown:
         told = [shorten(what) for what in renderer.styles.unknown]
         more = f" and {len(told) - 3} more" if len(told) > 3 else ""
-        notes.append(f"not understood, and read as if it were not there: {', '.join(told[:3])}{more}")
+        notes.append(f"not understood, and ignored: {', '.join(told[:3])}{more}")
     if found.left_out:
         told = [counted(count, what, f"{what}s") for what, count in found.left_out.items()]
         notes.append(f"left out: {', '.join(told)}")
@@ -132,12 +132,12 @@ def _hidden(walls: Walls, whole: Walls) -> list[str]:
     off = _extent(whole) - _extent(walls)
     if off > 0.5 * _extent(whole):
         raise WorldError(
-            f"expected a drawing on its page, found {100 * off / _extent(whole):.0f} % of its walls beyond the viewBox,"
-            " where no viewer shows them: resize the page to its content"
+            f"expected a drawing on its page, found {100 * off / _extent(whole):.0f} % of its walls outside the"
+            " viewBox, where they are not visible: resize the page to its content"
         )
     hidden = counted(whole.hidden, "dark piece", "dark pieces")
-    notes = [f"not to be seen (clipped away, or below what is light): {hidden}"] if hidden else []
-    return notes + ([f"beyond the page, where no viewer shows them: {off:.3g} m of walls"] if off > 0.05 else [])
+    notes = [f"not visible (clipped, or covered by light shapes): {hidden}"] if hidden else []
+    return notes + ([f"outside the page, where they are not visible: {off:.3g} m of walls"] if off > 0.05 else [])
 
 
 def _extent(walls: Walls) -> float:

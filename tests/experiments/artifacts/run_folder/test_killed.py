@@ -71,12 +71,10 @@ def test_a_finished_run_is_left_alone_and_a_raised_limit_goes_on(whole, tmp_path
         assert main(["explore", "--resume", str(folder), *words]) == 0
         said = capsys.readouterr()
         assert said.err == ""
-        assert (
-            said.out
-            == f"the run in {folder} is finished (stopped: step-limit; raise the limit to go on): nothing done\n"
-        )
+        (line,) = said.out.splitlines()
+        assert line.startswith(f"the run in {folder} is finished (stopped: step-limit; raise the limit")
     assert main(["explore", "--resume", str(folder), "--max-steps", "4"]) == 2
-    assert "left as they were" in capsys.readouterr().err
+    assert "unchanged" in capsys.readouterr().err
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.iterdir()} == before
     assert main(["explore", "--resume", str(folder), "--max-steps", "8"]) == 0
     assert timeless(folder) == timeless(whole)

@@ -13,8 +13,8 @@ from tests.experiments.artifacts.run_folder.striking import ROOT, WORDS
 from tests.experiments.commands.test_control import timeless
 
 FULL = (
-    "chainslam: expected room on standard output, found [Errno 28] No space left on device: files were written all the"
-    " same"
+    "chainslam: expected to write to standard output, found [Errno 28] No space left on device: the files were written"
+    " nevertheless"
 )
 
 
@@ -36,7 +36,7 @@ def test_a_folder_that_vanishes_is_one_line_and_status_1(at, tmp_path, capsys, m
     monkeypatch.setattr(RunningLog, "add", add_and_lose)
     assert main([*WORDS, "--max-steps", "8", "--out", str(folder)]) == 1
     (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith(f"chainslam: expected the folder {folder} to stay, found it gone")
+    assert said.startswith(f"chainslam: expected the folder {folder} to stay until the end, found it removed")
     assert not folder.exists()
 
 
@@ -53,7 +53,7 @@ def test_a_campaign_whose_folder_vanishes_is_one_line_and_status_1(tmp_path, cap
     words = ["--worlds", "paper-fig4", "--backends", "full-ekf", "--strategies", "nearest-robot", "--trials", "1"]
     assert main(["compare", *words, "--max-steps", "2", "--jobs", "1", "--out", str(folder)]) == 1
     (said,) = capsys.readouterr().err.splitlines()
-    assert "to stay, found it gone" in said
+    assert "found it removed" in said
     assert not folder.exists()
 
 

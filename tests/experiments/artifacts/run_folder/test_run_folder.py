@@ -93,10 +93,10 @@ def test_two_runs_on_one_folder_the_second_is_refused(tmp_path, capsys):
         with held(place):
             assert main([*words, str(place)]) == 2
             (said,) = capsys.readouterr().err.splitlines()
-            assert "another run at work" in said
+            assert "no other run uses" in said
             if place == folder:
                 assert main(["explore", "--resume", str(place), "--max-steps", "4"]) == 2
-                assert "another run at work" in capsys.readouterr().err
+                assert "no other run uses" in capsys.readouterr().err
         assert sorted(path.name for path in place.iterdir()) == before
 
 
@@ -107,7 +107,7 @@ def test_a_lock_is_let_go_by_the_kernel_and_missed_in_one_line_where_there_is_no
     )
     subprocess.run([sys.executable, "-c", holder, str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)})
     assert (tmp_path / LOCK).exists()
-    with held(tmp_path), pytest.raises(UsageError, match="another run at work"), held(tmp_path):
+    with held(tmp_path), pytest.raises(UsageError, match="no other run uses"), held(tmp_path):
         pass
     assert not (tmp_path / LOCK).exists()
 
@@ -140,7 +140,7 @@ def test_a_replay_replaces_itself_and_never_the_run_that_it_replays(whole, tmp_p
     log = str(whole / "log.npz")
     before = timeless(whole)
     assert main(["replay", log, "--out", str(whole), "--force"]) == 2
-    assert "another folder than that of the log" in capsys.readouterr().err
+    assert "a folder other than the log's" in capsys.readouterr().err
     for words, status in (([], 0), ([], 0), (["--association", "true"], 2), (["--association", "true", "--force"], 0)):
         assert main(["replay", log, *words, "--out", str(tmp_path / "out")]) == status
     assert "a replay of other options" in capsys.readouterr().err
