@@ -16,14 +16,14 @@ from .kalman.config import EkfConfig
 
 @dataclass(frozen=True)
 class BackendOptions:
-    """What can be set of the back ends; each takes what is of its type."""
+    """Options of the estimators."""
 
     ekf: EkfConfig = field(default_factory=EkfConfig)
-    """Of every Kalman filter."""
+    """Used by every Kalman filter."""
     graph: GraphConfig = field(default_factory=GraphConfig)
-    """Of both factor graphs."""
+    """Used by both factor graphs."""
     own: dict[str, dict[str, Any]] = field(default_factory=dict, hash=False)
-    """Of back ends that do not come along: by the name of the class of their options, and the name of each option."""
+    """Options of your own estimators: by the name of their options class, and the name of each option."""
 
     def of(self, kind: type) -> Any:
         """Return the options of a class; raises msgspec.ValidationError for values that are not of it."""

@@ -13,16 +13,17 @@ from .messages import Odometry
 
 @dataclass(frozen=True)
 class WheelSpec:
-    """Two driven wheels and how far they slip; the defaults lose 4 degrees of heading per square root of a metre."""
+    """Two driven wheels and their slip; by default the heading drifts by 4 degrees per square root of a metre."""
 
     base_m: Body = 0.4
-    """Distance m between the wheels."""
+    """Distance between the two wheels."""
     slip: Slip = 0.02
-    """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
+    """Standard deviation of a wheel's slip after 1 m; it grows with the square root of the distance."""
     lateral_slip: Slip = 0.006
-    """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
+    """Standard deviation of the sideways slip after 1 m; it grows with the square root of the wheels' mean distance."""
     floor: Slip = 1e-6
-    """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
+    """Standard deviation (m and rad) added to the odometry's covariance, so that it is positive definite even at
+    rest."""
 
     def ways(self, forward_m: float, turn_rad: float) -> tuple[float, float]:
         """Return the ways m of the left and the right wheel over an arc."""
