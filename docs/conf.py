@@ -13,12 +13,13 @@ author = "The chainslam authors"
 copyright = "The chainslam authors, MIT licence"
 version = release = version_of("chainslam")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "command_help", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "command_help", "plain_types", "mathml"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 highlight_language = "none"
 nitpicky = False
+default_role = "code"
 
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"

@@ -88,7 +88,7 @@ class TrialConfig:
     time_limit_s: Period | None = None
     """The run is stopped after this time on the robot's own clock."""
     odometry: OdometrySource = "wheels"
-    """Source of the motion between two scans: the wheels alone, or scan matching around what the wheels report."""
+    """Source of the motion between two scans: wheel odometry, or scan matching that starts from it."""
     robot: RobotConfig = field(default_factory=RobotConfig)
     mission: MappingMissionConfig = field(default_factory=MappingMissionConfig)
     backend_options: BackendOptions = field(default_factory=BackendOptions)

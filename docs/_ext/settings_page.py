@@ -21,9 +21,10 @@ the first table have no prefix:
     .venv/bin/chainslam explore hall --set mission.mapper.matching.gate=0.95 --set seed=2
 
 A value is written as in JSON, and text may stand without quotes. `--config FILE` reads several settings from a JSON
-file, such as the `config.json` of a run, and `chainslam schema` prints the same tables as a JSON Schema. A key that
-does not exist and a value outside its range end the command with one line and exit status 2. Values within the range
-are not checked for being sensible.
+file, such as the `config.json` of a run; `chainslam schema` prints its JSON Schema. An option of the command has
+priority over `--set`, `--set` over `--config`, and that over the robot's file (`--robot`). A key that does not exist
+and a value outside its range end the command with one line and exit status 2. Values within the range are not checked
+for being sensible.
 
 In the tables a *segment* is what one scan shows of a wall, a *wall* is a landmark of the map, and a *face* is one side
 of a true wall. A wall is *tentative* until it is confirmed. An *open end* is an end of a wall at which the chain of

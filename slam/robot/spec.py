@@ -53,7 +53,7 @@ class LidarSpec:
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """What a robot states of itself: planners, mapper, certificate and scores take it from here and nowhere else."""
+    """Description of a robot, which planners, mapper and scores share."""
 
     radius_m: Body = 0.2
     """Radius of the body, a disc around the middle of the axle; with an outline, its farthest corner gives the radius

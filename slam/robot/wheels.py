@@ -52,17 +52,16 @@ class WheelSpec:
         return Odometry(arc(forward_m, turn_rad), 0.5 * (cov + cov.T))
 
     def odometry(self, left_m: float, right_m: float) -> Odometry:
-        """Return the motion that two encoders tell, by the ways of the left and the right wheel since the last one.
+        """Return the motion by two encoders, from the distances of the left and the right wheel since the last one, m.
 
-        A way is the counts of an encoder times what one of them is worth, m. A long drive is many of these, one after
-        another (`along`).
+        It is one arc; `along` combines many of them into a longer drive.
         """
         return self.over_arc(0.5 * (left_m + right_m), (right_m - left_m) / self.base_m)
 
     def along(self, poses: Float[np.ndarray, "n 3"]) -> Odometry:
-        """Return the motion from the first of some poses to the last, with the covariance of the way between them.
+        """Return the motion from the first pose to the last, with the covariance of the path along all of them.
 
-        Each short motion between two poses counts as an arc.
+        Each motion from one pose to the next counts as an arc.
         """
         motion, cov = np.zeros(3), np.zeros((3, 3))
         for before, after in pairwise(poses):

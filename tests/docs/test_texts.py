@@ -82,7 +82,7 @@ def test_every_page_is_shown_for_a_screen_and_for_a_phone():
     shown = sorted((ROOT / "docs" / "pictures" / "pages").iterdir())
     assert {path.stem.rpartition("-")[0] for path in shown} == {"run", "replay", "campaign", "site"}
     for path in shown:
-        assert f"({Path('..') / 'pictures' / 'pages' / path.name})" in (ROOT / "docs/reference/pages.md").read_text()
+        assert f"({Path('..') / 'pictures' / 'pages' / path.name})" in (ROOT / "docs/contributing/pages.md").read_text()
         assert path.stat().st_size < 250_000
         with Image.open(path) as picture:
             assert picture.width == int(path.stem.rpartition("-")[2])
