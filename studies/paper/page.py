@@ -11,7 +11,7 @@ from chainslam.experiments.reproductions import REPRODUCTIONS
 from chainslam.experiments.reproductions.reproduction import Value
 from chainslam.viz.reports.report import PageTable
 
-from ..results.figures import short
+from ..runner.marks import short
 from ..runner.rows import Row
 
 ROWS = Path("studies/paper/rows.jsonl")

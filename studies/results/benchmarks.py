@@ -8,6 +8,7 @@ from chainslam.experiments.reproductions import REPRODUCTIONS
 
 from ..paper.page import cell
 from ..robots.faults import by_case
+from ..runner.marks import short
 from ..runner.rows import Row
 from .figures import (
     Table,
@@ -18,7 +19,6 @@ from .figures import (
     median_of,
     numbers,
     pose_score,
-    short,
     total,
 )
 from .plans import LOST
@@ -78,7 +78,7 @@ def kind_of(row: Row) -> str:
     if row["file"].startswith("lifull"):
         return "apartments"
     if row["file"].startswith("cml"):
-        return "schools and offices" + (", stopped after 1,500 steps" if row["max_steps"] == 1500 else "")
+        return "schools, first 1,500 steps" if row["max_steps"] == 1500 else "schools"
     return "bundled worlds"
 
 

@@ -107,7 +107,8 @@ def _looked(runs: Sequence[Path]) -> str:
 
 
 def _floor(runs: Sequence[Path]) -> str:
-    return f"{_log(runs[0])}: the floor that {read_summary(runs[0])['steps']} scans show, at the poses of offline refinement"
+    scans = read_summary(runs[0])["steps"]
+    return f"{_log(runs[0])}: the floor that {scans} scans show, at the poses of offline refinement"
 
 
 def _log_view(runs: Sequence[Path]) -> str:

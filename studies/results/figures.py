@@ -7,6 +7,7 @@ import rich.table
 
 from chainslam.slam.evaluation.consistency import verdict_on_noise
 
+from ..runner.marks import short
 from ..runner.rows import Row
 
 Table = list[list[str]]
@@ -16,11 +17,6 @@ def of_console(table: rich.table.Table) -> Table:
     """Return the cells of a table that a study prints."""
     columns = [[str(column.header), *map(str, column.cells)] for column in table.columns]
     return [list(cells) for cells in zip(*columns, strict=True)]
-
-
-def short(value: float) -> str:
-    """Return a number to three digits, in words."""
-    return f"{value:.3g}" if abs(value) < 1000.0 else f"{float(f'{value:.3g}'):,.0f}"
 
 
 def grouped(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:

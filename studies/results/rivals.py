@@ -8,8 +8,9 @@ from chainslam.experiments.replays.ideal import NAME as IDEAL
 from chainslam.experiments.scoring.statistics import mean_interval
 from chainslam.slam.backends import BACKENDS
 
+from ..runner.marks import short
 from ..runner.rows import Row
-from .figures import Table, grouped, mean_of, numbers, short
+from .figures import Table, grouped, mean_of, numbers
 
 WHOLE = "full-ekf"
 """The baseline: it keeps every correlation."""

@@ -17,9 +17,8 @@ from chainslam.sim.lidar import LidarConfig
 from chainslam.sim.people import PeopleConfig
 from chainslam.sim.robot import RobotConfig
 
-from ..results.figures import short
 from ..runner.command import run_study
-from ..runner.marks import markdown
+from ..runner.marks import markdown, short
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 

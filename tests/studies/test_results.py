@@ -7,14 +7,14 @@ import pytest
 from rich.table import Table as ConsoleTable
 
 from studies.results import benchmarks
-from studies.results.figures import of_console, pose_score, short
+from studies.results.figures import of_console, pose_score
 from studies.results.page import PAGES, Results, part, state
 from studies.results.plans import apartments, courts, navigation, schools, whole_schools
 from studies.results.rivals import rides
 from studies.results.sources import SOURCES, Source
 from studies.results.worlds import bundled
 from studies.robots.faults import SOUND
-from studies.runner.marks import PART, filled
+from studies.runner.marks import PART, filled, short
 from studies.runner.rows import fingerprint, last, newest
 
 
@@ -188,11 +188,11 @@ def test_buildings_stand_by_kind_and_back_end():
     ]
     apartment, stopped = benchmarks.exploration(rows)[1:]
     assert apartment[:8] == ["2 apartments", "`graph`", "2 of 2", "0.900, 0.900", "2 of 4", "0", "2.5", "1"]
-    assert stopped[:3] == ["1 schools and offices, stopped after 1,500 steps", "`graph`", "0 of 1"]
+    assert stopped[:3] == ["1 schools, first 1,500 steps", "`graph`", "0 of 1"]
     log = {"log": "intel", "backend": "graph", "every": 1, "cpu_ms_a_scan": 10.0, "steps": 20, "log_s": 4.0}
     assert benchmarks.speed([*rows, log])[1:] == [
         ["apartments", "`graph`", "2", "2.0", "4.0", "10"],
-        ["schools and offices, stopped after 1,500 steps", "`graph`", "1", "2.0", "4.0", "10"],
+        ["schools, first 1,500 steps", "`graph`", "1", "2.0", "4.0", "10"],
         ["log of Intel", "`graph`", "1", "10.0", "-", "20"],
     ]
 
