@@ -12,6 +12,8 @@ from sphinx.writers.html5 import HTML5Translator
 THIN = "0.17em"
 FUNCTION = re.compile(r"<mi[^>]*>(\w+)</mi>\s*<mo>&ApplyFunction;</mo>(\s*(?:<mo[^>]*>[(\[{]|<mi[^>]*>\w{2}))?")
 """A function's name, and a bracket or another function if one follows."""
+INDEX_BELOW = re.compile(r'<mo stretchy="false">[^<]*</mo>\s*</munderover>')
+"""An accent whose base has an index, which docutils sets below the base and not beside it."""
 
 
 def inline(writer: HTML5Translator, node: nodes.math) -> None:
@@ -27,12 +29,15 @@ def displayed(writer: HTML5Translator, node: nodes.math_block) -> None:
 
 
 def mathml(node: nodes.math | nodes.math_block, as_block: bool) -> str:
-    """Return a formula as MathML; one that docutils cannot read is a warning, and is left out."""
+    """Return a formula as MathML; one that docutils cannot read, or sets wrongly, is a warning, and is left out."""
     try:
-        return FUNCTION.sub(spaced, tex2mathml(node.astext(), as_block))
+        found = FUNCTION.sub(spaced, tex2mathml(node.astext(), as_block))
+        if INDEX_BELOW.search(found):
+            raise MathError("an index after an accent; write it on another symbol")
     except MathError as error:
         logging.getLogger(__name__).warning("expected TeX that docutils can read, found: %s", error, location=node)
         return ""
+    return found
 
 
 def spaced(function: re.Match[str]) -> str:

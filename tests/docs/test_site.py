@@ -51,8 +51,9 @@ def test_a_formula_is_mathml_without_a_script(tmp_path):
     assert not re.search("<script[^>]*math", page, flags=re.I)
 
 
-def test_a_formula_that_cannot_be_read_is_a_warning_with_its_line(tmp_path):
-    page, warned = built(tmp_path, "# Page\n\n$$\\unheardof{a}$$\n")
+@pytest.mark.parametrize("formula", [r"\unheardof{a}", r"\hat X_0"])
+def test_a_formula_that_cannot_be_set_is_a_warning_with_its_line(tmp_path, formula):
+    page, warned = built(tmp_path, f"# Page\n\n$${formula}$$\n")
     assert "index.md:3: WARNING: expected TeX that docutils can read, found:" in warned
     assert "<math" not in page
 
