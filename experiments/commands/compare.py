@@ -90,7 +90,7 @@ class Compare:
     """How the files of the worlds are read."""
     robot: str | None = None
     """Description of the robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file
-    (docs/robots.md). --config and --set have priority."""
+    (docs/howto/use-your-robot.md). --config and --set have priority."""
     config: Path | None = None
     """Settings of every trial from a file: a run's `config.json`, or some of its keys. What the campaign decides
     (worlds and starts, back ends, strategies, seeds) is not taken from it."""

@@ -115,10 +115,10 @@ class Explore:
     """Replace another run in the folder for the results: remove the files of a run, and no others."""
     preset: PresetName | None = None
     """A named method: paper-method is everything that the paper describes, with its filter, matching, navigation
-    and wall following (docs/exploration.md). --config, --set and other options have priority."""
+    and wall following (docs/concepts/exploration.md). --config, --set and other options have priority."""
     robot: str | None = None
     """Description of the robot and its simulated devices: a bundled robot (paper, turtlebot, front-scanner) or a
-    YAML file (docs/robots.md). --config, --set and other options have priority."""
+    YAML file (docs/howto/use-your-robot.md). --config, --set and other options have priority."""
     config: Path | None = None
     """Settings from a file: a run's `config.json`, or an object with some of its keys. --set and other options have
     priority."""

@@ -69,7 +69,7 @@ class Completion:
     """Print the script by which a shell completes commands and options."""
 
     shell: Annotated[tyro.conf.Positional[Literal["bash", "zsh", "fish"]], tyro.conf.arg(metavar="SHELL")]
-    """bash, zsh or fish; docs/commands.md says where its output belongs."""
+    """bash, zsh or fish; docs/howto/scripts.md says where its output belongs."""
 
     def run(self) -> int:
         """Print the script and return the exit status."""

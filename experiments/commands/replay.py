@@ -72,7 +72,7 @@ class Replay:
     """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
     robot: str | None = None
     """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
-    file (docs/robots.md), whose simulated devices are ignored."""
+    file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
     config: Path | None = None
     """Settings of the mission and the back ends in place of the run's: a run's `config.json`, or an object with
     some of its keys. --set has priority."""
