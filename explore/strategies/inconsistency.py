@@ -1,4 +1,4 @@
-"""How inconsistent a filter must be, from what it cannot hide (docs/contributing/exploration-notes.md); never from the truth.
+"""How inconsistent a filter must be, without the truth (docs/contributing/exploration-notes.md).
 
 Three signs: information gained along directions that no scan can tell, innovations larger than stated, and heading
 lost while no wall was in sight. They predict by how much a wall that is met again will be off.

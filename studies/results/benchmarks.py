@@ -1,4 +1,4 @@
-"""The short tables of docs/benchmarks.md; the full ones stand with the contributors' pages."""
+"""The short tables of docs/benchmarks.md and of the README; the full ones stand with the contributors' pages."""
 
 from collections.abc import Sequence
 
@@ -36,6 +36,10 @@ QUOTED = {
 }
 """Figures and quantities that the page quotes, and its words for them."""
 ESTIMATORS = "block-ekf", "full-ekf", "graph"
+PLACE = "apartments"
+SHOWN = "block-ekf", "full-ekf", "invariant-ekf", "graph"
+EXPLORER, LOG = "invariant-ekf", "intel"
+"""What the README shows: the place, the back ends in it, who explores, and a log."""
 LOGS = {"intel": "Intel", "aces": "ACES", "seattle": "Seattle"}
 
 
@@ -140,3 +144,29 @@ def speed(rows: Sequence[Row]) -> Table:
         faster = 1e3 * row["log_s"] / (row["steps"] * row["cpu_ms_a_scan"])
         table.append(["log of Intel", f"`{row['backend']}`", "1", f"{row['cpu_ms_a_scan']:.1f}", "-", f"{faster:.0f}"])
     return table
+
+
+def headlines(rows: Sequence[Row]) -> Table:
+    """Return what is measured and what came out: rows of rivals, of explored apartments and of logs together."""
+    rivals = [row for row in rows if "place" in row]
+    place, there = next((name, mine) for name, mine in by_place(rivals).items() if name.startswith(PLACE))
+    by_name = {name: [row for row in there if row["backend"] == name] for name in SHOWN}
+    driven = [row for row in rows if "file" in row and kind_of(row) == "apartments" and row["backend"] == EXPLORER]
+    log = next(row for row in rows if row.get("log") == LOG and row["every"] == 1 and row["odometry"] == "scans")
+    refined = log["relations_smoothed"]["at_scans"]["all"]["translation_m"]["mean"]
+    return [
+        ["measured", "result"],
+        [f"pose ANEES, identical observations in {place} (1 is ideal)", _scores(by_name, "pose_anees_from_start")],
+        ["map ANEES there", _scores(by_name, "map_anees")],
+        [
+            f"{len(driven)} apartments explored with noise by `{EXPLORER}`",
+            f"{completed(driven)} complete, {total(driven, 'collisions')} collisions,"
+            f" {100 * np.mean(numbers(driven, 'coverage_own_frame')):.1f} % of the walls mapped",
+        ],
+        ["log of the Intel lab, after offline refinement", f"{refined:.3f} m mean error of the published relations"],
+        ["processor time from scan to motion command", f"{mean_of(driven, 'step_ms_mean'):.1f} ms on one core"],
+    ]
+
+
+def _scores(by_name: dict[str, list[Row]], score: str) -> str:
+    return ", ".join(f"`{name}` {short(mean_of(mine, score))}" for name, mine in by_name.items())

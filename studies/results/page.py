@@ -1,4 +1,4 @@
-"""The tables of docs/benchmarks.md and of docs/contributing, made from stored rows; says which rows are of other code.
+"""The tables of README, docs/benchmarks.md and docs/contributing, made from stored rows; says which rows are of other code.
 
 .venv/bin/python -m studies.results.page
 """
@@ -14,7 +14,11 @@ from ..runner.rows import Row, fingerprint
 from .sources import SOURCES, Source
 
 DOCS = Path("docs")
-PAGES = ("benchmarks.md", *(f"contributing/{name}.md" for name in ("results", "paper", "robots", "logs")))
+PAGES = (
+    "../README.md",
+    "benchmarks.md",
+    *(f"contributing/{name}.md" for name in ("results", "paper", "robots", "logs")),
+)
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,9 @@ SOURCES: Mapping[str, Source] = {
         benchmarks.speed,
         lambda: [*_of("bundled-noisy", "apartments", "schools")(), *LOGS()],
     ),
+    "headlines": Source(
+        "make rivals apartments logs", benchmarks.headlines, lambda: [*RIVALS(), *_of("apartments")(), *LOGS()]
+    ),
     "rivals": Source("make rivals", rides, RIVALS),
     "real-plans": Source("make real-plans", plans.real_plans, _of("real-plans", each="code")),
     "apartments": Source("make apartments", plans.apartments, _of("apartments")),
