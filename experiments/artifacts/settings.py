@@ -26,7 +26,7 @@ NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
 DRAWING = tuple(each.name for each in fields(DrawingOptions))
 """Options that say how a world's file is read."""
-SEE = "docs/settings.md names all"
+SEE = "docs/reference/settings.md names all"
 Record = dict[str, Any]
 
 

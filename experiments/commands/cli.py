@@ -56,22 +56,22 @@ COMMANDS = {
     "explore": Entry(
         "explore",
         "Explore",
-        "Explore a world until every chain of walls is closed, and write the map beside how good it is.",
+        "Explore a world until every chain of walls is closed, and write the map and its scores.",
     ),
     "replay": Entry(
         "replay",
         "Replay",
-        "Send a log through one or several back ends: identical scans, the back end alone.",
+        "Replay a log through one or several back ends, all with identical scans.",
     ),
     "compare": Entry(
         "compare",
         "Compare",
-        "Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them honestly.",
+        "Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them statistically.",
     ),
     "reproduce": Entry(
         "reproduce",
         "Reproduce",
-        "Reproduce the paper's figures: a picture of each, and its numbers beside ours, by several back ends.",
+        "Reproduce the paper's figures: a picture of each, and its numbers next to those of several back ends.",
     ),
     "measure": Entry(
         "measure",
@@ -81,12 +81,12 @@ COMMANDS = {
     "view": Entry(
         "view",
         "View",
-        "Open a recording in Rerun's viewer, or a results folder: its recording, or one made now and kept in it.",
+        "Open a recording in Rerun's viewer, or that of a results folder, which is made if there is none.",
     ),
     "report": Entry(
         "report",
         "Report",
-        "Write what a campaign or a run found as one HTML file that holds everything, for a screen, a phone or paper.",
+        "Write the report of a campaign or a run as one self-contained HTML file, for screen, phone and paper.",
     ),
     "worlds": Entry("listings", "Worlds", "List the bundled worlds and families of worlds."),
     "backends": Entry("listings", "Backends", "List the estimators."),
@@ -94,7 +94,7 @@ COMMANDS = {
     "schema": Entry(
         "listings", "Schema", "Print the JSON Schema of config.json: each setting's type, range, unit and default."
     ),
-    "completion": Entry("listings", "Completion", "Print what a shell needs to complete commands and options."),
+    "completion": Entry("listings", "Completion", "Print the script by which a shell completes commands and options."),
 }
 
 

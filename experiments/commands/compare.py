@@ -47,66 +47,67 @@ JOBS_A_CORE = 8
 
 @dataclass(frozen=True)
 class Compare:
-    """Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them honestly.
+    """Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them statistically.
 
-    The same command goes on where it was stopped.
+    The same command continues a campaign that was stopped.
     """
 
     out: Path
     """Folder for the results."""
     preset: CampaignName | None = None
-    """A campaign by name; options named beside it go before. paper-method holds the paper's method against today's
-    mapper with three back ends."""
+    """A named campaign; other options have priority. paper-method compares the paper's method with today's mapper
+    and three back ends."""
     worlds: tuple[str, ...] | None = None
     """Bundled names or files."""
     backends: tuple[str, ...] | None = None
-    """The estimators (see `chainslam backends`); `paper-method` among them is the paper's filter and matching."""
+    """Estimators (see `chainslam backends`); `paper-method` among them is the paper's filter and matching."""
     strategies: tuple[str, ...] | None = None
     """Exploration strategies (see `chainslam strategies`)."""
     trials: int | None = None
-    """How many, with seeds that follow each other, in every cell."""
+    """Number of trials of each combination, with consecutive seeds."""
     first_seed: int = 1
-    """The seed of the first trial."""
+    """Seed of the first trial."""
     modes: tuple[Literal["closed", "replay"], ...] = ("closed", "replay")
-    """Closed loop, or one recording for each world, strategy and seed through all back ends."""
+    """Closed loop, or one recording for each world, strategy and seed that is replayed through all back ends."""
     association: tuple[Association, ...] = ("own", "true")
-    """Whose matches the replays use: the back end's own gate, the truth, or each."""
+    """Data association of the replays: the back end's own, the true one, or each in turn."""
     driver: str = "full-ekf"
-    """The back end that drives the recordings."""
+    """Back end that drives the recordings."""
     p0: P0 = "small"
-    """Covariance of the start."""
+    """Standard deviations of the initial pose."""
     errorless: bool = False
-    """Exact ranges and wheels in every trial; then all trials of a cell are one, and no NEES is told."""
+    """Simulate without noise; all trials of a combination are then the same, and there is no NEES."""
     max_steps: int | None = None
-    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500,
-    in paper-method 1000."""
+    """A trial is stopped, and counts as a failure, after this many scans; by default 5000, in preset paper 2500, in
+    paper-method 1000."""
     navigation: Navigation = "floor"
-    """How the robot finds its way in every trial: over the floor seen free, or by sequences of walls. Presets paper and
-    paper-method go by walls."""
+    """How paths are planned: over the floor seen free, or along sequences of walls, as in the presets paper and
+    paper-method."""
     following: Following = "viewpoints"
-    """How the robot explores an open end in every trial: from viewpoints, or by following its wall to and fro. Preset
-    paper-method follows walls."""
+    """How an open end is explored: from viewpoints, or by following its wall back and forth, as in preset
+    paper-method."""
     drawing: tyro.conf.OmitArgPrefixes[DrawingOptions] = AS_DRAWN
-    """What the files of the worlds leave open."""
+    """How the files of the worlds are read."""
     robot: str | None = None
-    """The robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file (docs/robots.md).
-    --config and --set go before it."""
+    """Description of the robot of every trial: a bundled one (paper, turtlebot, front-scanner) or a YAML file
+    (docs/howto/use-your-robot.md). --config and --set have priority."""
     config: Path | None = None
-    """Settings of every trial from this file: a run's `config.json`, or some of its keys. What the campaign decides
-    itself (worlds and starts in them, back ends, strategies, seeds) is not taken from there."""
+    """Settings of every trial from a file: a run's `config.json`, or some of its keys. What the campaign decides
+    (worlds and starts, back ends, strategies, seeds) is not taken from it."""
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
-    """One setting of every trial by its key in `config.json`, over those of --config; may be given again."""
+    """One setting of every trial by its key in `config.json`, with priority over --config; may be repeated."""
     jobs: int | None = None
-    """Number of processes; all cores by default. The results are the same."""
+    """Number of processes; all cores by default. It does not change the results."""
     dask: str | None = None
-    """Address of a Dask scheduler whose workers run the trials, in place of `--jobs`."""
+    """Address of a Dask scheduler whose workers run the trials, instead of `--jobs`."""
     merge: tuple[Path, ...] = ()
-    """Folders of campaigns to put together into one, in place of running any."""
+    """Combine the campaigns in these folders into one, instead of running any."""
     against: tuple[Path, Path] | None = None
-    """Folders of two campaigns to hold against each other, trial by trial, in place of running any."""
+    """Compare two campaigns trial by trial, instead of running any."""
 
     rrd: Path | None = None
-    """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this file."""
+    """Record the summary, and the first log through all back ends side by side, for Rerun's viewer into this
+    file."""
     given: tyro.conf.Suppress[frozenset[str]] = frozenset()
     """The options that stand in the command, with whatever value."""
 

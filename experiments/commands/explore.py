@@ -65,67 +65,69 @@ SETTLED = (
 
 @dataclass(frozen=True)
 class Explore:
-    """Explore a world until every chain of walls is closed, and write the map beside how good it is."""
+    """Explore a world until every chain of walls is closed, and write the map and its scores."""
 
     world: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="WORLD")] = None
-    """A name (see `chainslam worlds`) or a file: plan JSON, GeoJSON, SVG, a picture, a ROS map YAML."""
+    """Name of a bundled world (see `chainslam worlds`), or a file: plan JSON, GeoJSON, SVG, DXF, a picture or a ROS
+    map YAML."""
     backend: str = DRIVER
-    """The estimator (see `chainslam backends`)."""
+    """Estimator (see `chainslam backends`)."""
     strategy: str = "nearest-robot"
-    """Where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at step 200."""
+    """Strategy that chooses where to explore next (see `chainslam strategies`); `A,B@200` changes from A to B at
+    step 200."""
     seed: int = 1
-    """Decides, in this world, all noise and the error of the first estimate; the same seed gives the same bytes."""
+    """Seed of sensor noise, wheel slip and the error of the initial pose; the same seed gives identical results."""
     p0: P0 = "small"
-    """Covariance of the start: zero (0.1 mm, 1e-5 rad), small (0.01 m, 0.1 degree) or large (0.1 m, 2 degrees)."""
+    """Standard deviations of the initial pose: zero (0.1 mm, 1e-5 rad), small (0.01 m, 0.1 degree) or large (0.1 m,
+    2 degrees)."""
     errorless: bool = False
-    """Exact ranges and wheels, the estimate started at the truth; the models keep the stated noise."""
+    """Simulate ranges and odometry without noise and start at the true pose; the estimators still assume the stated
+    noise."""
     sweep: bool = True
-    """After the last chain is closed, look at the floor that was not seen yet; the paper's robot did not."""
+    """After the last chain is closed, visit the floor that no scan has seen; the paper's robot did not."""
     navigation: Navigation = "floor"
-    """How the robot finds its way: over the floor seen free, or by sequences of walls, as the paper's did."""
+    """How paths are planned: over the floor seen free, or along sequences of walls as in the paper."""
     following: Following = "viewpoints"
-    """How the robot explores an open end: from viewpoints around it, or as the paper's did, by following its wall to
-    and fro and driving round its ends."""
+    """How an open end is explored: from viewpoints around it, or by following its wall back and forth and rounding
+    its ends as in the paper."""
     odometry: OdometrySource = "wheels"
-    """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
-    matching*), with the wheels for a first guess."""
+    """Source of the motion between two scans: wheel odometry, or scan matching that starts from it."""
     max_steps: int | None = None
-    """The run is stopped after this many scans; 100,000 where no number is named."""
+    """Stop the run after this many scans; 100,000 by default."""
     max_path: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
-    """The run is stopped once the wheels have counted this many metres."""
+    """Stop the run once the odometry has counted this many metres."""
     time_limit: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """The run is stopped once this many seconds have passed on the robot's own clock: it counts driving and
-    scanning, not computing, so that every machine stops at the same step."""
+    """Stop the run after this many seconds on the robot's own clock. It counts driving and scanning, not computing,
+    so that a run stops at the same step on every machine."""
     return_to_start: bool = False
-    """Once there is nothing left to explore, drive back to the start, to within 0.2 m."""
+    """Drive back to the start once nothing is left to explore, to within 0.2 m."""
     start: tuple[float, ...] | None = None
-    """Start pose instead of the drawing's own: x and y in metres, and perhaps the heading in rad."""
+    """Start pose in place of the drawing's: x and y in metres, and optionally the heading in rad."""
     fence: Annotated[str | None, tyro.conf.arg(metavar="BOX|FILE")] = None
-    """Stay within a box, X0,Y0,X1,Y1 in metres of the world, or within the polygon of a GeoJSON file. What lies beyond
-    is not explored: an outdoor or unbounded world ends there."""
+    """Stay within a box, X0,Y0,X1,Y1 in metres of the world, or within the polygon of a GeoJSON file. What lies
+    beyond is not explored, which ends a run outdoors or in an unbounded world."""
     drawing: tyro.conf.OmitArgPrefixes[DrawingOptions] = AS_DRAWN
-    """What the world's file leaves open."""
+    """How the world's file is read."""
     out: Path | None = None
-    """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. One that holds anything but the same run
-    is refused."""
+    """Folder for the results; by default results/WORLD-BACKEND-STRATEGY-SEED. A folder with anything but the same
+    run is refused."""
     force: bool = False
-    """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
+    """Replace another run in the folder for the results: remove the files of a run, and no others."""
     preset: PresetName | None = None
-    """A method by name: paper-method is all that the paper describes, its filter, its matching, its navigation
-    and its wall following
-    (docs/exploration.md). --config, --set and options go before it."""
+    """A named method: paper-method is everything that the paper describes, with its filter, matching, navigation
+    and wall following (docs/concepts/exploration.md). --config, --set and other options have priority."""
     robot: str | None = None
-    """What the robot states of itself, and its devices: a bundled robot (paper, turtlebot, front-scanner) or a YAML
-    file (docs/robots.md). --config, --set and options go before it."""
+    """Description of the robot and its simulated devices: a bundled robot (paper, turtlebot, front-scanner) or a
+    YAML file (docs/howto/use-your-robot.md). --config, --set and other options have priority."""
     config: Path | None = None
-    """Settings from this file: a run's `config.json`, or an object of some of its keys. An option that is given goes
-    before it, and so does --set."""
+    """Settings from a file: a run's `config.json`, or an object with some of its keys. --set and other options have
+    priority."""
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
-    """One setting by its key in `config.json`, as `mission.mapper.matching.gate=0.95`; may be given again."""
+    """One setting by its key in `config.json`, such as `mission.mapper.matching.gate=0.95`; may be repeated."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """In place of WORLD: go on with the run in this folder, stopped or killed, up to its own limits or to those given
-    now. It is driven again from its start, which takes as long as it took, and leaves what a run that was never
-    stopped would have left."""
+    """Instead of WORLD: continue the run in this folder, which was stopped or killed, up to its own limits or those
+    given here. It is driven again from its start, takes as long again, and leaves the results of an uninterrupted
+    run."""
     rrd: Path | None = None
     """Record the run for Rerun's viewer into this file (`chainslam view FILE` opens it)."""
     view: bool = False

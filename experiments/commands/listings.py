@@ -53,7 +53,7 @@ class Schema:
     """Print the JSON Schema of config.json: each setting's type, range, unit and default."""
 
     some: bool = False
-    """Of a file for --config that holds some of the settings: none is missing then."""
+    """The schema of a file for --config that holds some of the settings."""
 
     def run(self) -> int:
         """Print it and return the exit status."""
@@ -66,10 +66,10 @@ class Schema:
 
 @dataclass(frozen=True)
 class Completion:
-    """Print what a shell needs to complete commands and options."""
+    """Print the script by which a shell completes commands and options."""
 
     shell: Annotated[tyro.conf.Positional[Literal["bash", "zsh", "fish"]], tyro.conf.arg(metavar="SHELL")]
-    """bash, zsh or fish; docs/commands.md says where its output belongs."""
+    """bash, zsh or fish; docs/howto/scripts.md says where its output belongs."""
 
     def run(self) -> int:
         """Print the script and return the exit status."""

@@ -21,7 +21,7 @@ class Measure:
     """Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """The folder that a run left."""
+    """Folder of a run."""
     corners: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="CORNER")] = ()
     """Two corners, by their ids in map.geojson."""
 

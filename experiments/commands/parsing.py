@@ -63,14 +63,14 @@ def parsed(words: Sequence[str], commands: Mapping[str, type], about: str) -> tu
 
 def typed(command: type) -> type:
     """Return a command as it is typed: its readable class, with the options that every command has."""
-    told = {"json": "Print what was found as JSON, and no words.", "quiet": "Print nothing but errors."}
+    told = {"json": "Print the results as JSON only.", "quiet": "Print nothing but errors."}
     flag = cast(Any, tyro.conf.FlagCreatePairsOff)[bool]
     common: list[tuple[str, Any, Any]] = [
         (name, Annotated[flag, tyro.conf.arg(help=words, help_behavior_hint="")], field(default=False))
         for name, words in told.items()
     ]
     plugin = tyro.conf.arg(
-        help="Back ends, strategies or formats of your own: a Python file (docs/howto/extend.md); may be given again.",
+        help="Python file with your own back ends, strategies or formats (docs/howto/extend.md); may be repeated.",
         help_behavior_hint="",
         metavar="FILE",
     )

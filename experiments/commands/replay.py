@@ -34,57 +34,58 @@ from ..views.timelines import TimelineOutput
 
 @dataclass(frozen=True)
 class Replay:
-    """Send a log through one or several back ends: identical scans, the back end alone.
+    """Replay a log through one or several back ends, all with identical scans.
 
-    A run's own log knows the truth; a real robot's log does not, and is scored by what the map itself tells.
+    The log of a run holds the truth. For a real robot's log it is unknown, so that only scores without it are written.
     """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """The log.npz that a run left, also that of a robot of one's own, with its config.json beside it; or a CARMEN,
-    dp-slam or BreezySLAM log, also packed by gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
+    """The log.npz of a run, or of your own robot with its config.json beside it; a CARMEN, dp-slam or BreezySLAM
+    log, optionally packed with gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
     backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
-    """The estimators (see `chainslam backends`)."""
+    """Estimators (see `chainslam backends`)."""
     association: Association = "own"
-    """Whose matches: the back end's own gate, or the truth."""
+    """Data association: the back end's own, or the true one."""
     perfect_extraction: bool = False
-    """True lines with noise drawn from exactly the stated covariance, in place of what was fitted."""
+    """Replace the extracted segments by true lines with noise of exactly the stated covariance."""
     perfect_odometry: bool = False
-    """The true motions in place of what the wheels reported; the stated covariance stays."""
+    """Replace the reported motions by the true ones; the stated covariance stays."""
     odometry: OdometrySource | None = None
-    """Who tells the motion between two scans: the wheels, or the scans themselves, laid onto those before (*scan
-    matching*). By default whoever told it when the run was driven, and the scans of a real robot's log."""
+    """Source of the motion between two scans: wheel odometry, or scan matching that starts from it. By default as
+    when the run was driven, and scan matching for a real robot's log."""
     second_looks: bool = False
-    """Once the drive of a real robot's log has ended, associate all segments anew and smooth the path by all of them
-    (trajectory_smoothed.tum). Back ends that smooth do so anyway."""
+    """Refine a real robot's log offline once its drive has ended: associate all segments again and smooth the path
+    (trajectory_smoothed.tum). Back ends that smooth always do so."""
     every: int = 1
-    """Of a real robot's log, map one of so many keyframes (the scans that are 0.1 m or 5 degrees apart)."""
+    """Map every n-th keyframe of a real robot's log (keyframes are scans 0.1 m or 5 degrees apart)."""
     range_noise: float | None = None
-    """Of a real robot's log, the standard deviation of a range in metres; by default 0.02 for all logs, since they do
-    not state it and real walls scatter more than scanners do."""
+    """Standard deviation of a range in a real robot's log, in metres; by default 0.02, since logs do not state it
+    and real walls scatter more than scanners do."""
     scan_topic: str | None = None
-    """Of a ROS bag with several topics of scans, the one to read; by default the one that looks around the farthest."""
+    """Topic of the scans in a ROS bag with several; by default the one with the widest view."""
     odom_topic: str | None = None
-    """Of a ROS bag with several topics of odometry, the one to read; by default the first by name."""
+    """Topic of the odometry in a ROS bag with several; by default the first by name."""
     relations: Path | None = None
-    """Relations between poses that others measured, `t1 t2 x y z roll pitch yaw` on each line: how far is the path
-    from them?"""
+    """Measured relations between poses, `t1 t2 x y z roll pitch yaw` on each line, with which the path is
+    compared."""
     reference: Path | None = None
-    """A path that others measured, in the TUM format or `t x y theta` on each line: how far is the path from it?"""
+    """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
     robot: str | None = None
-    """What the robot states of itself, in place of what the run's says: a bundled robot (paper, turtlebot,
-    front-scanner) or a YAML file (docs/robots.md), of which the devices are left aside: the log has settled them."""
+    """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
+    file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
     config: Path | None = None
-    """Settings of the mission and of the back ends from this file, in place of those of the run: a run's `config.json`,
-    or an object of some of its keys. --set goes before it."""
+    """Settings of the mission and the back ends in place of the run's: a run's `config.json`, or an object with
+    some of its keys. --set has priority."""
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")] = ()
-    """One of these settings by its key in `config.json`, as `mission.mapper.matching.gate=0.95`; may be given again."""
+    """One of these settings by its key in `config.json`, such as `mission.mapper.matching.gate=0.95`; may be
+    repeated."""
     out: Path | None = None
-    """Folder for the results, one folder for each of several back ends; by default replay-ASSOCIATION beside LOG,
-    and for a real robot's log replay-LOG."""
+    """Folder for the results, with one folder for each of several back ends; by default replay-ASSOCIATION beside
+    LOG, and replay-LOG for a real robot's log."""
     force: bool = False
-    """Replace another run in the folder for the results: remove the files that a run writes, and no others."""
+    """Replace another run in the folder for the results: remove the files of a run, and no others."""
     rrd: Path | None = None
-    """Record all back ends, side by side on one time axis, for Rerun's viewer (`chainslam view FILE` opens it)."""
+    """Record all back ends side by side on one time axis for Rerun's viewer (`chainslam view FILE` opens it)."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

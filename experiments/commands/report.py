@@ -18,14 +18,14 @@ TABLES, GIF = "tables.tex", "run.gif"
 
 @dataclass(frozen=True)
 class Report:
-    """Write what a campaign or a run found as one HTML file that holds everything, for a screen, a phone or paper."""
+    """Write the report of a campaign or a run as one self-contained HTML file, for screen, phone and paper."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """The folder that `compare`, `explore` or `replay` left."""
+    """Folder of `compare`, `explore` or `replay`."""
     latex: bool = False
     """Write the tables as LaTeX, too."""
     gif: bool = False
-    """Write a run as an animated GIF, too, run.gif; from its log, so that nothing is driven again."""
+    """Write a run as an animated GIF, run.gif, too, from its log."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""

@@ -25,14 +25,14 @@ SEED_LARGEST = 2**32
 
 @dataclass(frozen=True)
 class Reproduce:
-    """Reproduce the paper's figures: a picture of each, and its numbers beside ours, by several back ends."""
+    """Reproduce the paper's figures: a picture of each, and its numbers next to those of several back ends."""
 
     names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
-    """Out of table1, fig4, fig5, fig6, fig8, fig9, fig10, fig11, eq4, standing; without names, all of them."""
+    """Some of table1, fig4, fig5, fig6, fig8, fig9, fig10, fig11, eq4 and standing; all of them by default."""
     out: Path = Path("results/reproduce")
     """Folder for NAME.png, NAME.svg and NAME.json."""
     seed: int = 1
-    """Of the noise; where there are several drives, of the first."""
+    """Seed of the noise, or of the first of several drives."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""

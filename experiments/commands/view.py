@@ -29,16 +29,16 @@ TRIALS = "trials.csv"
 
 @dataclass(frozen=True)
 class View:
-    """Open a recording in Rerun's viewer, or a results folder: its recording, or one made now and kept in it.
+    """Open a recording in Rerun's viewer, or that of a results folder, which is made if there is none.
 
-    From a run's log, from the logs of several back ends that replayed one run, or from a campaign's tables.
+    It is made from a run's log, from the logs of several back ends that replayed one run, or from a campaign's tables.
     """
 
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
-    """A .rrd file, a run's log.npz, or the folder that `explore`, `replay` or `compare` left."""
+    """A .rrd file, a run's log.npz, or the folder of `explore`, `replay` or `compare`."""
 
     web: bool = False
-    """Serve the viewer to a browser, on this machine only, until Ctrl-C; `ssh -L` brings it to another."""
+    """Serve the viewer to a browser on this machine until Ctrl-C; `ssh -L` forwards it to another."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError where there is nothing to open."""

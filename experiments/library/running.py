@@ -69,13 +69,13 @@ def explore(
     force: bool = False,
     watch: Watch = lambda step: None,
 ) -> Run:
-    """Explore a world, or with a robot of one's own, and return the run; `chainslam explore` as a function.
+    """Explore a world, or a building with a robot of your own, and return the run, as `chainslam explore` does.
 
-    `world` is a bundled name, a file, or a `Robot`. Of a robot of one's own nobody knows the truth: its scores are
-    None, and the map's frame is its first pose. `robot` is what it states of itself: a bundled name, a YAML file or a
-    `RobotSpec`. `scale` to `negate` say what a file leaves open, as the options of the command. `preset`, `config` and
-    `settings` are --preset, --config and --set, the last as keys of config.json with their values. `watch` sees every
-    step. Without `out` the files go with the returned object. Raises UsageError, in one line, for bad input.
+    `world` is a bundled name, a file or a `Robot`. For a robot of your own the truth is unknown, so that scores which
+    need it are None, and its first pose is the origin of the map. `robot` describes it: a bundled name, a YAML file or
+    a `RobotSpec`. `scale` to `negate` are the command's options for drawings, and `preset`, `config` and `settings` its
+    `--preset`, `--config` and `--set`; the latter maps keys to values. `watch` is called with each step. Without `out`
+    the files are deleted together with the returned object. Raises UsageError for bad input.
     """
     register_installed()
     own = None if isinstance(world, str | Path) else world
@@ -168,11 +168,10 @@ def replay(
     force: bool = False,
     watch: Watch = lambda step: None,
 ) -> Run | dict[str, Run]:
-    """Send a log, or the log of a run, through one back end or several; `chainslam replay` as a function.
+    """Replay a log, or the log of a run, through one back end or several, as `chainslam replay` does.
 
-    Returns the run, or with several names the runs by name. `relations` and `reference` are files of what others
-    measured, and `second_looks` smooths a real robot's log once it has ended, as the options of the command do. Raises
-    UsageError, in one line, for bad input.
+    Returns the run, or for a list of names the runs by name. `relations` and `reference` are files with measurements,
+    and `second_looks` refines a real robot's log offline once it has ended. Raises UsageError for bad input.
     """
     register_installed()
     names = (backend,) if isinstance(backend, str) else tuple(backend)

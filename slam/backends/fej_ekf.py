@@ -1,4 +1,4 @@
-"""First-estimates Jacobians: an EKF that gains no information about where the world lies (docs/estimation.md)."""
+"""First-estimates Jacobians: no information about where the world lies (docs/concepts/consistency.md)."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The right-invariant error in plain coordinates: P follows the estimate's own corrections (docs/estimation.md)."""
+"""The right-invariant error in plain coordinates: P follows the estimate's corrections (docs/concepts)."""
 
 import numpy as np
 from jaxtyping import Float, Int

@@ -33,7 +33,7 @@ class OcEkf(InvariantEkf):
 def unseen(
     position: Float[np.ndarray, "2"], alpha: Float[np.ndarray, " n"], anchors: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, "s 3"]:
-    """Return N: what a shift and a turn of everything do to pose and lines, s = 3 + 2 n (docs/estimation.md)."""
+    """Return N: how a shift and a turn move pose and lines, s = 3 + 2 n (docs/concepts/consistency.md)."""
     N, n = np.zeros((POSE + 2 * len(alpha), 3)), normals(alpha)
     N[:POSE] = np.eye(POSE)
     N[:2, 2] = J @ position

@@ -46,7 +46,7 @@ class RelocationEkf(Ekf[RelocationMap]):
     """Moves the robot alone by the first matches, then the map alone by the second, seen from where the robot is now.
 
     The noise of an observation that moved the robot is in the robot's error when the map is fused: both gains act on
-    the errors there were before, so that no observation counts twice (docs/estimation.md).
+    the errors there were before, so that no observation counts twice (docs/contributing/estimation-notes.md).
     """
 
     new_map = RelocationMap

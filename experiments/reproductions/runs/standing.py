@@ -1,7 +1,7 @@
 """A robot that stands still and looks at the same walls: what each back end claims to learn of where it stands.
 
 No look tells where the world lies, so the pose's covariance must not fall below that of the start carried along,
-A P0 A' with A = [I, J (p - p0); 0, 1] (docs/estimation.md). The paper's figures 10 and 11 show one that does.
+A P0 A' with A = [I, J (p - p0); 0, 1] (docs/concepts/consistency.md). The paper's figures 10 and 11 show one that does.
 """
 
 from dataclasses import dataclass

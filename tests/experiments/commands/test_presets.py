@@ -15,7 +15,7 @@ from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of
 from chainslam.experiments.commands.cli import _parse, main
 from chainslam.experiments.scenario import TrialConfig
 
-DOCS = Path(__file__).parents[3] / "docs" / "exploration.md"
+DOCS = Path(__file__).parents[3] / "docs" / "concepts" / "exploration.md"
 METHOD = "mission.mapper.matching.method"
 DEFAULTS = dict(leaves(defaults()))
 MERGING = "mission.mapper.merging"
