@@ -4,7 +4,7 @@ YAML's aliases, merges and tags make a kilobyte into gigabytes and text into obj
 """
 
 import re
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import yaml
 
@@ -21,11 +21,11 @@ Value = Any
 class _Plain(yaml.SafeLoader):
     """PyYAML's safe loader without aliases, tags, keys that stand there twice, and YAML's many words for a value."""
 
-    yaml_implicit_resolvers: ClassVar[dict[str, Any]] = {}
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML says that it is an instance's)
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        event: Any = self.peek_event()
+        event = cast(Any, self).peek_event()
         if isinstance(event, yaml.AliasEvent):
             raise WorldError(
                 f"expected values in the YAML file, found the alias *{shorten(event.anchor)}: write them out"
