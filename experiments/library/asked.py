@@ -1,6 +1,7 @@
 """What a command or a call asks for, as what runs: one way in for both."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +11,7 @@ from chainslam.sim.logs.recorded_robot import knows_truth
 from ..artifacts.fences import fence_of
 from ..artifacts.presets import PresetName, against_methods, preset_of, robot_of, stated
 from ..artifacts.settings import (
+    DRAWING,
     FOLLOWING,
     NAVIGATION,
     Record,
@@ -40,6 +42,11 @@ KEYS = {
     "following": FOLLOWING,
 }
 """Options that decide a run, and their keys in `config.json`."""
+SETTLED = (
+    *("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "navigation", "following", "odometry"),
+    *("start", *DRAWING, "fence", "preset", "robot", "config", "set"),
+)
+"""What a saved run has settled; only its limits may be others when it goes on."""
 
 
 def asked_trial(
@@ -64,6 +71,26 @@ def asked_trial(
     if not trial.world:
         raise UsageError("expected a WORLD or --resume DIR, found neither: name one")
     return trial
+
+
+def refuse_settled(names: Iterable[str]) -> None:
+    """Raise UsageError where an option is said that a saved run has settled."""
+    for name in names:
+        raise UsageError(
+            f"expected nothing but limits and --out with --resume, found {name}: the saved run has settled it"
+        )
+
+
+def continued(
+    saved: TrialConfig, max_steps: int | None, max_path: float | None, time_limit: float | None, return_to_start: bool
+) -> TrialConfig:
+    """Return the settings of a saved run with the limits named now; its own where none is named."""
+    home = return_to_start or saved.mission.return_to_start
+    going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
+    if max_steps is max_path is time_limit is None:
+        return going_on
+    steps = TrialConfig.max_steps if max_steps is None else max_steps
+    return replace(going_on, max_steps=steps, max_path_m=max_path, time_limit_s=time_limit)
 
 
 def asked_source(

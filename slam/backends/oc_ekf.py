@@ -23,11 +23,11 @@ class OcEkf(InvariantEkf):
 
         W holds one over the variances, so that errors count in units of their sigmas.
         """
-        unseen_before, unseen_after = (unseen(*point, self._map.anchors) for point in (before, after))
-        variances = self._map.variances
+        unseen_before, unseen_after = (unseen(*point, self.map.anchors) for point in (before, after))
+        variances = self.map.variances
         variances[:2] = variances[:2].mean()  # As they are in a world that is turned.
         weighted = unseen_before / np.maximum(variances, LEAST_SIGMA**2)[:, None]
-        self._map.follow(unseen_after - unseen_before, np.linalg.solve(unseen_before.T @ weighted, weighted.T).T)
+        self.map.follow(unseen_after - unseen_before, np.linalg.solve(unseen_before.T @ weighted, weighted.T).T)
 
 
 def unseen(
