@@ -12,10 +12,10 @@ from typing import Any, Protocol, runtime_checkable
 from ..artifacts.files import json_bytes
 from ..terminal.answers import Output, answering
 from ..terminal.interrupts import INTERRUPTED, nothing_half_built_speaks, too_late
+from ..terminal.parsing import parsed
 from ..terminal.streams import Lasting, is_full, lasting_streams, one_line
 from ..terminal.word_order import with_files
 from ..usage import UsageError, choose, missing
-from .parsing import parsed
 
 FAILED, BAD_USAGE = 1, 2
 UTF8 = "PYTHONUTF8"
@@ -53,6 +53,11 @@ class Entry:
 
 
 COMMANDS = {
+    "demo": Entry(
+        "demo",
+        "Demo",
+        "Explore a bundled world, replay its scans through three estimators, and open a report that compares them.",
+    ),
     "explore": Entry(
         "explore",
         "Explore",

@@ -73,8 +73,8 @@ class Completion:
 
     def run(self) -> int:
         """Print the script and return the exit status."""
+        from ..terminal.parsing import typed
         from .cli import COMMANDS
-        from .parsing import typed
 
         classes: dict[str, Callable[..., Any]] = {name: typed(entry.load()) for name, entry in COMMANDS.items()}
         script = _completed(_tyros(classes, "bash" if self.shell == "fish" else self.shell))

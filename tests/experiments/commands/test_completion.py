@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from chainslam.experiments.commands.cli import COMMANDS, main
-from chainslam.experiments.commands.parsing import options_of
+from chainslam.experiments.terminal.parsing import options_of
 
 ASK = """
 source {script}

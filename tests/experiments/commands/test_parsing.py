@@ -5,7 +5,7 @@ import re
 import pytest
 
 from chainslam.experiments.commands.cli import COMMANDS, main
-from chainslam.experiments.commands.parsing import options_of
+from chainslam.experiments.terminal.parsing import options_of
 
 WORLD = ["explore", "rooms"]
 

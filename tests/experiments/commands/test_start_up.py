@@ -52,7 +52,14 @@ def test_the_help_and_the_listings_import_only_what_they_show(words, needed):
 
 @pytest.mark.parametrize(
     "words",
-    [["strategies"], ["explore", "--help"], ["replay", "--help"], ["report", "no-such-folder"], ["compare", "--help"]],
+    [
+        ["strategies"],
+        ["demo", "--help"],
+        ["explore", "--help"],
+        ["replay", "--help"],
+        ["report", "no-such-folder"],
+        ["compare", "--help"],
+    ],
 )
 def test_a_command_that_runs_no_step_loads_no_compiler(words):
     program = (

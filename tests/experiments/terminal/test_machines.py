@@ -8,7 +8,7 @@ import pytest
 
 from chainslam.experiments.commands import cli
 from chainslam.experiments.commands.cli import COMMANDS, main
-from chainslam.experiments.commands.parsing import options_of
+from chainslam.experiments.terminal.parsing import options_of
 
 ASCII = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 """Python takes UTF-8 in the C locale unless this forbids it."""

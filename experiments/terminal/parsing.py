@@ -14,9 +14,9 @@ from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, g
 
 import tyro
 
-from ..terminal.answers import Output
-from ..terminal.word_order import in_order, swallowed
 from ..usage import UsageError, choose, did_you_mean
+from .answers import Output
+from .word_order import in_order, swallowed
 
 FOLDERS = ("out", "resume", "merge", "against")
 """Options whose path is a folder's."""
