@@ -1,4 +1,4 @@
-"""The tables of README, docs/benchmarks.md and docs/contributing, made from stored rows; says which rows are of other code.
+"""The tables of README and docs, made from stored rows; says which rows are of other code than this.
 
 .venv/bin/python -m studies.results.page
 """
