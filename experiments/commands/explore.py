@@ -18,18 +18,20 @@ from ..artifacts.presets import PresetName
 from ..artifacts.run_folder import default_folder, point_latest_at
 from ..artifacts.settings import (
     DRAWING,
+    KEYS,
     drawing_settings,
     parse_setting,
 )
-from ..library.asked import KEYS, SETTLED, asked_trial, continued, refuse_settled
+from ..library.asked import SETTLED, asked_trial, continued, refuse_settled
 from ..library.driving import Finished, Watch, begin, go_on
 from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, Scenario, TrialConfig, check, load_world
 from ..terminal.answers import found
-from ..terminal.console import say
+from ..terminal.console import say, written
 from ..terminal.interrupts import first_interrupt_waits
-from ..terminal.progress import print_summary, progress
+from ..terminal.progress import progress
 from ..trial import TrialResult
 from ..usage import UsageError
+from ..views.run_lines import lines_of, notes_of
 from ..views.timelines import TimelineOutput
 from .echo import echo_world, expected_steps, run_line
 
@@ -181,9 +183,11 @@ class Explore:
 
 def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
     """Print what came of a run, and return the exit status."""
-    print_summary(result.summary)
-    found(folder=str(folder))
-    say(f"results in {folder}")
+    found(summary=result.summary, folder=str(folder))
+    for words in notes_of(result.summary):
+        say(f"note: {words}")
+    for words in (*lines_of([result.summary]), written(folder)):
+        say(words)
     if result.ending.exit_status:
         say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)
     for problem in problems:

@@ -13,6 +13,7 @@ from ..artifacts.presets import PresetName, against_methods, preset_of, robot_of
 from ..artifacts.settings import (
     DRAWING,
     FOLLOWING,
+    KEYS,
     NAVIGATION,
     Record,
     asked,
@@ -31,17 +32,6 @@ from ..terminal.console import say
 from ..usage import UsageError
 
 CampaignName = Literal["smoke", "paper", "paper-method", "full"]
-KEYS = {
-    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
-    "odometry": "odometry",
-    "max_path": "max_path_m",
-    "time_limit": "time_limit_s",
-    "sweep": "mission.explorer.sweep",
-    "return_to_start": "mission.return_to_start",
-    "navigation": NAVIGATION,
-    "following": FOLLOWING,
-}
-"""Options that decide a run, and their keys in `config.json`."""
 SETTLED = (
     *("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "navigation", "following", "odometry"),
     *("start", *DRAWING, "fence", "preset", "robot", "config", "set"),

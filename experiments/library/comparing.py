@@ -16,8 +16,9 @@ from chainslam.explore.planning.navigators import Navigation
 from ..artifacts.reading import read_json
 from ..artifacts.settings import drawing_said, drawing_settings, settings_of
 from ..campaign.cluster import on_dask
-from ..campaign.comparison.story import story_of
-from ..campaign.comparison.tables import write_tables
+from ..campaign.comparison.tables import read_comparison, write_tables
+from ..campaign.merge import union
+from ..campaign.pages.lines import lines_of
 from ..campaign.plan import check_campaign, check_parts, drawing_of, trials
 from ..campaign.plugins import register_installed
 from ..campaign.runner import on_cores, run_campaign
@@ -55,8 +56,8 @@ class Comparison:
 
     @property
     def verdict(self) -> list[str]:
-        """The findings, in words."""
-        return list(story_of(read_campaigns(self.folder)[0], self.comparison).verdict)
+        """Return in words what the campaign found."""
+        return list(lines_of(union(read_campaigns(self.folder)), read_comparison(self.folder)))
 
     def report(self) -> Path:
         """Write the page of `chainslam report` and return its path."""
