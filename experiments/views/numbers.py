@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-NONE = "–"
+from chainslam.viz.text import NONE
+
 ROUNDING = 1e-9
 """What is nearer to 0 than this is 0 but for rounding."""
 WITHIN, BUILDINGS = ("low", "high"), ("low_buildings", "high_buildings")

@@ -2,12 +2,13 @@
 
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from .. import palette
+from ..text import NONE
 from .drawing import PageDrawing
 
 LONG_ROWS = 24
@@ -23,10 +24,17 @@ class PageTable:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
 
+    def filled(self) -> "PageTable":
+        """Return the table without the columns in which no row has a value."""
+        kept = [k for k in range(len(self.header)) if any(row[k] != NONE for row in self.rows)]
+        rows = tuple(tuple(row[k] for k in kept) for row in self.rows)
+        return replace(self, header=tuple(self.header[k] for k in kept), rows=rows)
+
 
 def table(title: str, columns: Mapping[str, Callable[[Any], str]], rows: Sequence[Any], note: str = "") -> PageTable:
     """Return a table with a row for each of `rows`; `columns` say, by its name, what a cell of each column holds."""
-    return PageTable(title, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows), note)
+    cells = tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
+    return PageTable(title, tuple(columns), cells, note).filled()
 
 
 @dataclass(frozen=True)

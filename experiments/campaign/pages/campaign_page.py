@@ -1,7 +1,6 @@
 """The report of a campaign: its tables and pictures, and the numbers that the template's captions need."""
 
 from pathlib import Path
-from typing import Any
 
 from chainslam.viz.reports.report import Page, PageTable, table
 
@@ -76,17 +75,17 @@ def _tables(campaign: Campaign, said: Row, exact: bool) -> dict[str, PageTable]:
     closed = [row for row in said["strategies"] if row["arm"] == CLOSED]
     both = [row for row in said["interaction"] if row["arm"] == CLOSED]
     cells = [cell for cell in said["cells"] if cell["arm"] == arm] if len(said["cells"]) > len(said["pooled"]) else []
-    found: dict[str, Any] = {
-        "estimators": _of_arm(arm, said, shown.EXACT if exact else shown.ESTIMATORS),
-        "cells": table(f"Each world and strategy, {shown.ARMS[arm]}", shown.CELLS, cells),
+    told = shown.without_anees if exact else lambda columns: columns
+    found = {
+        "estimators": _of_arm(arm, said, told(shown.ESTIMATORS)),
+        "cells": table(f"Each world and strategy, {shown.ARMS[arm]}", told(shown.CELLS), cells),
         "strategies": shown.crossed("Strategies", closed, {"strategy": "first", "estimator": "backend"},
                                     shown.OF_STRATEGIES),
-        "marks": shown.marks_table(said),
+        "marks": shown.marks_table(said, told(shown.MARKS)),
     }  # fmt: skip
     if exact:
         return found
     backends = [row for row in said["backends"] if row["arm"] == arm]
-    listens = any(row["nis_mean"] is not None for row in said["pooled"])
     kept = (*shown.COSTS, "pose_anees_from_start", "map_anees")
     return found | {
         "costs": shown.crossed("Costs", backends, {"estimator": "first"}, shown.COSTS),
@@ -95,7 +94,7 @@ def _tables(campaign: Campaign, said: Row, exact: bool) -> dict[str, PageTable]:
             shown.OF_STRATEGIES,
         ),
         **{f"replays {a}": _of_arm(a, said, shown.ESTIMATORS) for a in campaign.arms if a != arm},
-        **{f"stated {a}": _of_arm(a, said, shown.LISTENED if listens else shown.STATED) for a in campaign.arms},
+        **{f"stated {a}": _of_arm(a, said, shown.STATED) for a in campaign.arms},
         **{f"errors {a}": _of_arm(a, said, shown.ERRORS) for a in campaign.arms},
         "claims": shown.claims(campaign.arms, said),
         "hypothesis": shown.hypothesis_table(said["hypothesis"]),

@@ -65,12 +65,6 @@ ESTIMATORS: Columns = {
     "false matches per run": _each_run("false_matches"),
     "duplicate walls per run": _each_run("duplicate_lines"),
 }
-EXACT: Columns = {
-    "estimator": text("backend"), "complete": lambda row: f"{row['complete']} of {row['trials']}",
-    "path length, m": _only_mean("path_length_m"), "wall error, cm": _only_mean("wall_rmse_m", 100.0),
-    "path error, cm": _only_mean("ate_m", 100.0), "false matches per run": _each_run("false_matches"),
-    "duplicate walls per run": _each_run("duplicate_lines"),
-}  # fmt: skip
 CELLS: Columns = {
     "world": text("world"), "strategy": text("strategy"), "estimator": text("backend"),
     "complete": lambda row: f"{row['complete']} of {row['trials']}", "path length, m": _only_mean("path_length_m"),
@@ -87,9 +81,10 @@ STATED: Columns = {
     "scans in its band, %": _only_mean("nis_in_band", 100.0),
     "noise": lambda row: _noise(row.get("nis"), row.get("nis_in_band")),
     "least trace, of the start's": _value("trace_least"),
-    "bound margin": _value("bound_margin"),
+    "bound margin": lambda row: number(None if row["bound_margin"] is None else round(row["bound_margin"], 6)),
+    "NIS of true matches": _only_mean("nis_mean"),
+    "whiteness": _only_mean("nis_whiteness"),
 }
-LISTENED: Columns = {**STATED, "NIS of true matches": _only_mean("nis_mean"), "whiteness": _only_mean("nis_whiteness")}
 ERRORS: Columns = {
     "estimator": text("backend"),
     "wall error, map aligned, cm": _only_mean("wall_shape_m", 100.0),
@@ -159,7 +154,7 @@ def crossed(title: str, rows: Sequence[Row], names: Mapping[str, str], measures:
         (*cell, *(compared(found.get(name)) for name in measures), number(max(row["runs"] for row in found.values())))
         for cell, found in by.items()
     )
-    return PageTable(title, header, shown)
+    return PageTable(title, header, shown).filled()
 
 
 def differences(title: str, rows: Iterable[Row], names: Mapping[str, str]) -> PageTable:
@@ -171,11 +166,16 @@ def differences(title: str, rows: Iterable[Row], names: Mapping[str, str]) -> Pa
     return table(title, {**lead, **DIFFERENCES, **more}, told)
 
 
-def marks_table(said: Row) -> PageTable:
+def without_anees(columns: Columns) -> Columns:
+    """Return columns for runs without noise, which have no NEES."""
+    return {name: cell for name, cell in columns.items() if "ANEES" not in name and name != "verdict"}
+
+
+def marks_table(said: Row, columns: Columns = MARKS) -> PageTable:
     """Return the means at equal path lengths, at those that some run reached."""
     closed = [row for row in said["marks"] if row["arm"] == CLOSED]
     reached = {END, *(row["metres"] for row in closed if row["driving"])}
-    return table("At equal path lengths, closed loop", MARKS, [row for row in closed if row["metres"] in reached])
+    return table("At equal path lengths, closed loop", columns, [row for row in closed if row["metres"] in reached])
 
 
 def claims(arms: Sequence[str], said: Row) -> PageTable:
