@@ -64,8 +64,10 @@ def test_runs_that_end_at_a_limit_have_their_scores(folder):
 
 def test_every_number_carries_its_name_for_a_phone(folder):
     page = (folder / "report.html").read_text()
-    for name in ("pose ANEES", "map ANEES", "false matches per run", "wall error, ratio", "p, corrected", "NIS"):
+    for name in ("pose ANEES", "map ANEES", "false matches per run", "wall error, ratio", "NIS"):
         assert f'data-name="{name}"' in page
+    # Too few runs for a test: a column of dashes would say nothing.
+    assert 'data-name="p, corrected"' not in page
 
 
 def test_a_long_table_is_folded():
@@ -222,7 +224,7 @@ def test_comparisons_are_laid_out_with_a_column_for_each_measure():
     rows.append(against("block-ekf", "full-ekf", "ate_m", 1.0) | {"value": None})
     table = crossed("t", rows, {"estimator": "first"}, ("ate_m", "wall_rmse_m", "false_matches"))
     (row,) = table.rows
-    assert row == ("graph", "2.00 (1.80 to 2.20)", "0.500 (0.450 to 0.550)", "–", "12")
+    assert row == ("graph", "2.00 (1.80 to 2.20)", "0.500 (0.450 to 0.550)", "12"), "no column of dashes alone"
     assert table.header[1] == "path error, ratio"
 
 
