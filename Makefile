@@ -64,7 +64,7 @@ random: setup
 
 .PHONY: rivals rows apartments apartments-errorless exact schools-whole bundled paper-method navigation-apartments odometry-twice
 
-# What the tables of docs/results.md are made of, table by table, and then the page. Hours; begun again, it goes on where it was.
+# What the tables of docs/contributing/results.md are made of, table by table, and then the pages. Hours; begun again, it goes on where it was.
 rows: intervals paper rivals paper-method bundled apartments real-plans schools schools-whole courts navigation-apartments results
 
 # 160 apartments with noise, by two back ends.
@@ -127,7 +127,7 @@ adaptive: setup
 
 .PHONY: robots scanners bodies bumps logs scanner-apartments
 
-# Every fault of a robot in one world, and its table in docs/robots.md; begun again, it goes on where it was.
+# Every fault of a robot in one world; begun again, it goes on where it was. `make results` makes its tables.
 robots: setup
 	$(BIN)/python -m studies.robots.faults
 
@@ -161,13 +161,13 @@ strategies: setup
 navigation: setup
 	$(BIN)/python -m studies.exploration.navigation --plans $(PLANS) --out results/navigation.jsonl
 
-.PHONY: navigation paper paper-check study intervals real-plans existence interval-causes counts settings
+.PHONY: navigation paper study intervals real-plans existence interval-causes counts settings
 
 # The same in every eighth apartment, errorless.
 navigation-apartments: setup
 	$(BIN)/python -m studies.exploration.navigation --worlds --plans $(PLANS) --every 8 --jobs 2 --out $(ROWS)/navigation.jsonl
 
-# The paper's figures over 20 seeds, stored with the commit, and their page docs/paper.md; begun again, it goes on where it was.
+# The paper's figures over 20 seeds, stored with the commit; begun again, it goes on where it was. `make results` makes their tables.
 paper: setup
 	$(BIN)/python -m studies.paper.following --jobs 2
 	$(BIN)/python -m studies.paper.study --seeds 20
@@ -193,17 +193,13 @@ existence: setup
 interval-causes: setup
 	$(BIN)/python -m studies.consistency.interval_causes --seeds 60
 
-# Which tables of docs/paper.md are of other code than this?
-paper-check: setup
-	$(BIN)/python -m studies.paper.page --check
-
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup
 	$(BIN)/python -m studies.counts
 
-# The page that names every number that one may tune.
+# The page of all settings, from the docstrings beside them.
 settings: setup
-	$(BIN)/python -m studies.counts --numbers > docs/settings.md
+	PYTHONPATH=. $(BIN)/python docs/_ext/settings_page.py > docs/reference/settings.md
 
 rules: setup
 	$(BIN)/python -m studies.rules.study --plans $(PLANS) --out studies/rules/rows.jsonl
@@ -220,7 +216,7 @@ rules-table: setup
 
 .PHONY: pictures results screenshots
 
-# The tables of docs/results.md from stored rows; says which rows are of another version of the code.
+# The tables of docs/benchmarks.md and docs/contributing from stored rows; says which rows are of another version of the code.
 results: setup
 	$(BIN)/python -m studies.results.page
 

@@ -50,47 +50,49 @@ STRATEGY_OF_REPLAYS = "none"
 
 @dataclass(frozen=True)
 class MappingMissionConfig(MissionConfig):
-    """What rules a mission, and the mapper that is handed to it."""
+    """Settings of the mission as a whole; its parts follow."""
 
     mapper: MapperConfig = field(default_factory=MapperConfig)
     scan_matching: ScanMatchingConfig = field(default_factory=ScanMatchingConfig)
-    """Of drives and replays whose odometry is told by the scans."""
+    """Used where `odometry` is `scans`."""
     second_looks: SecondLooksConfig = field(default_factory=SecondLooksConfig)
-    """Of real robots' logs, once the drive has ended."""
+    """Used once the drive has ended."""
 
 
 @dataclass(frozen=True)
 class TrialConfig:
-    """All that decides a trial: the same values give the same bytes."""
+    """Everything that determines a trial: two trials with the same settings give identical results."""
 
     world: str
-    """A bundled name or a file."""
+    """Name of a bundled world (`chainslam worlds`) or path of a drawing."""
     backend: str = "full-ekf"
-    """The estimator; `explore` takes another one by default."""
+    """Estimator (`chainslam backends` lists them); `explore` takes `graph` by default, or `invariant-ekf` without
+    GTSAM."""
     strategy: str = "nearest-robot"
-    """Where to explore next."""
+    """Strategy that chooses where to explore next (`chainslam strategies` lists them)."""
     seed: Annotated[int, Meta(ge=0)] = 1
-    """Decides all noise and the error of the first estimate; below 2^64."""
+    """Seed of all random numbers: sensor noise, wheel slip and the error of the initial pose; below 2^64."""
     p0: P0 = "small"
-    """Covariance of the start."""
+    """Standard deviations of the initial pose: 0.1 mm and 0.0006 degrees (zero), 1 cm and 0.1 degrees (small), 10 cm
+    and 2 degrees (large)."""
     errorless: bool = False
-    """Exact ranges and wheels; the models keep the stated noise."""
+    """Simulate ranges and odometry without noise, while the estimators still assume the stated noise."""
     max_steps: Count = 100_000
-    """The run is stopped after so many scans."""
+    """The run is stopped after this many scans."""
     start: Annotated[tuple[Place, ...], Meta(min_length=2, max_length=3)] | None = None
-    """Overrides the start pose of the drawing: x m, y m and perhaps heading rad."""
+    """Start pose in place of the drawing's: x and y in m, and optionally the heading in rad."""
     drawing: DrawingOptions = field(default_factory=DrawingOptions)
-    """What the world's file leaves open: its scale, its storey, and which of its parts are walls."""
+    """Each is also an option of `explore` and `compare`, such as `--scale`."""
     max_path_m: Size | None = None
-    """The run is stopped once the wheels have counted so much."""
+    """The run is stopped once the odometry has counted this path length."""
     time_limit_s: Period | None = None
-    """The run is stopped once so much has passed on the robot's own clock."""
+    """The run is stopped after this time on the robot's own clock."""
     odometry: OdometrySource = "wheels"
-    """Who tells the motion between two scans."""
+    """Source of the motion between two scans: wheel odometry, or scan matching that starts from it."""
     robot: RobotConfig = field(default_factory=RobotConfig)
     mission: MappingMissionConfig = field(default_factory=MappingMissionConfig)
     backend_options: BackendOptions = field(default_factory=BackendOptions)
-    """Of every back end, so that one file of settings fits a comparison; `backend` takes its own."""
+    """Each estimator takes its own, so that one file of settings fits a comparison."""
 
     def __post_init__(self) -> None:
         """Let the mission know what the robot states of itself, and nothing else of it."""
@@ -180,7 +182,7 @@ def _check_own(options: BackendOptions) -> None:
 def check_settings(config: TrialConfig) -> None:
     """Raise UsageError for what cannot be in any run, whatever its back end and strategy are."""
     if wrong := fault(config):
-        raise UsageError(f"expected settings of a trial, found {wrong}: docs/settings.md names all")
+        raise UsageError(f"expected settings of a trial, found {wrong}: docs/reference/settings.md names all")
     choose("start covariance (--p0)", config.p0, P0_SIGMAS)
     if config.seed > SEED_MAX:  # a schema's numbers have 63 bits
         raise UsageError(f"expected a seed from 0 to 2^64 - 1, found {config.seed}: choose another")

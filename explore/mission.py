@@ -43,7 +43,7 @@ class MissionConfig:
     homing: HomingConfig = field(default_factory=HomingConfig)
     lost: LostConfig = field(default_factory=LostConfig)
     return_to_start: bool = False
-    """Once there is nothing left to explore, drive back to where the mission began."""
+    """Drive back to the start once nothing is left to explore."""
 
 
 def explore_mission(

@@ -33,50 +33,51 @@ MOMENTS = 32
 
 @dataclass(frozen=True)
 class FaultsConfig:
-    """Faults that the robot does not know of; the defaults are none."""
+    """Faults of the simulated robot that the software is not told about; by default there are none."""
 
     dropout: Share = 0.0
-    """Share of the beams that come back empty (+inf), whatever stands there."""
+    """Share of the beams that return nothing (+inf), whatever is in front of them."""
     clump: Count = 1
-    """They are lost in runs of so many neighbours."""
+    """Number of neighbouring beams that drop out together."""
     mixed: Share = 0.0
-    """Share of the beams at an edge that return something between the surface before it and the one behind it."""
+    """Share of the beams at a range discontinuity that return a range between its two surfaces (mixed pixels)."""
     edge_m: Distance = 0.2
-    """An edge is where two neighbouring beams' true ranges differ by more than this m."""
+    """Difference between neighbouring true ranges above which there is a discontinuity for `mixed`."""
     bump: Share = 0.0
-    """Share of the drives in which a bump turns the robot by `bump_rad`, to either side alike."""
+    """Share of the drives in which a bump turns the robot by `bump_rad`, with equal probability to either side."""
     bump_rad: Heading = float(np.deg2rad(8.0))
-    """How far a bump turns the robot rad; the wheels report nothing of it."""
+    """Turn caused by a bump, which the wheels do not report."""
     moving: Share = 0.0
-    """Share of the scans that are taken over the end of the drive, not after it; nobody corrects them for that."""
+    """Share of the scans that are taken during the last part of a drive instead of after it, without correction."""
     slip: Times = 1.0
-    """How many times as far as stated the wheels slip."""
+    """Factor on the stated wheel slip."""
     scanner_ahead_m: Offset = 0.0
-    """How much farther ahead than stated the scanner sits m."""
+    """How far ahead of its stated position the scanner really is."""
     scanner_left_m: Offset = 0.0
-    """How much farther to the left m."""
+    """How far to the left of its stated position the scanner really is."""
     scanner_turned_rad: Heading = 0.0
-    """By how much more than stated it is turned rad, counter-clockwise."""
+    """How far the scanner is really turned from its stated direction, counter-clockwise."""
     range_bias_m: Offset = 0.0
-    """How much too long each range is m."""
+    """Constant error added to each range."""
     range_scale: Factor = 1.0
-    """How many times too long each range is."""
+    """Factor on each range."""
     resolution_m: Distance = 0.0
-    """Ranges come in multiples of this m, unstated; 0 for any."""
+    """Resolution of the ranges that the scanner does not state; 0 for none."""
     mirrored: bool = False
-    """The beams come in the opposite order: what is on the left seems to be on the right."""
+    """Report the beams in reverse order, so that left and right are exchanged."""
     frozen_from: Number = NEVER
-    """From this scan on the scanner repeats the one before."""
+    """Index of the scan from which on the scanner repeats the scan before it; the default is never."""
     late: Number = 0
-    """Each scan is the one that was taken so many steps before."""
+    """Number of steps by which each scan is delayed."""
     stuck_from: Number = NEVER
-    """From this drive on the wheels turn, and report it, while the robot stands."""
+    """Index of the drive from which on the wheels turn and report motion while the robot stands still; the default is
+    never."""
     posts: Number = 0
-    """So many posts of the robot's own body stand around the scanner, evenly ..."""
+    """Number of posts of the robot's own body that stand evenly around the scanner and hide part of its view."""
     post_m: Body = 0.15
-    """... so far from it m ..."""
+    """Distance of the robot's own posts from the scanner."""
     post_rad: Angle = float(np.deg2rad(8.0))
-    """... and hide so much of its view rad each."""
+    """Angle that each of the robot's own posts hides."""
     people: PeopleConfig = field(default_factory=PeopleConfig)
 
 

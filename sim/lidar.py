@@ -14,24 +14,24 @@ from .kernels import nearest, seen_from
 
 @dataclass(frozen=True)
 class LidarConfig(LidarSpec):
-    """The range finder (section 4 of the paper)."""
+    """The simulated range finder (section 4 of the paper)."""
 
     beams: Beams = 180
-    """Number of beams."""
+    """Number of beams in a scan."""
     fov_rad: View = 2 * np.pi
-    """Field of view rad: a full turn without repeating its end, or anything less with both ends included."""
+    """Field of view: a full turn, or less with a beam at both ends."""
     range_max_m: Sight = 4.0
-    """Returns beyond this m are rejected."""
+    """Maximum range; returns beyond it are rejected."""
     sigma_m: Deviation = 0.010
-    """Standard deviation m of the radial error of one beam."""
+    """Standard deviation of the range error of a beam."""
     sigma_share: Share = 0.0
-    """Standard deviation of a beam's radial error as a share of its range, beside `sigma_m`; both add by squares."""
+    """Standard deviation of an additional, independent range error, as a share of the range."""
     resolution_m: Distance = 0.0
-    """Ranges come in multiples of this m, and the scanner says so; 0 for any."""
+    """Resolution of the ranges, which the scanner states; 0 for none."""
     cell_m: Size = 1.0
-    """Side m of the grid cells that share one list of faces within range."""
+    """Cell size of the grid that speeds up ray casting; it does not change the scans."""
     cells_max: Count = 4096
-    """Number of cells whose lists are kept in memory."""
+    """Largest number of ray-casting cells kept in memory."""
 
     @property
     def is_full_turn(self) -> bool:

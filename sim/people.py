@@ -21,20 +21,20 @@ DRAWS = 64
 
 @dataclass(frozen=True)
 class PeopleConfig:
-    """People that the robot knows nothing of; the defaults are none."""
+    """People in the building that the software is not told about; by default there are none."""
 
     walking: Annotated[int, Meta(ge=0, le=1000)] = 0
-    """So many walk about, each straight on until something is in the way, then in another direction."""
+    """Number of people who walk straight on until something is in the way, and then in another direction."""
     radius_m: Body = 0.2
-    """Radius of a person at the height of the scanner m."""
+    """Radius of a person at the height of the scanner."""
     speed_m_s: Pace = 0.8
-    """How fast they walk m/s."""
+    """Walking speed."""
     keep_m: Distance = 0.1
-    """They keep at least this m between themselves and walls, and between themselves and the robot's body."""
+    """Smallest distance that people keep from walls and from the robot's body."""
     standing: tuple[Place, ...] = ()
-    """Where others stand, world frame: x and y m of the first, of the second, and so on."""
+    """Positions of people who stand still: x and y of the first in the world frame, then of the second, and so on."""
     leave_s: Wait = 1e9
-    """When those who stand have gone, s on the robot's clock."""
+    """Time on the robot's clock at which the standing people leave."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for people that cannot be."""

@@ -55,15 +55,15 @@ def chance_in(world: Building, seed: int) -> Chance:
 
 @dataclass(frozen=True)
 class RobotConfig(RobotSpec):
-    """What a simulated robot states of itself, and what only the simulation knows: clock, devices, faults."""
+    """The simulated robot: what it states about itself, and what only the simulation knows."""
 
     sampling_m: Pitch = 0.005
-    """Distance m between the places of a step that are checked for collisions."""
+    """Distance between the points of a step at which collisions are checked."""
     scan_s: Period = 0.1
-    """How long one turn of the range finder takes, s."""
+    """Time that one revolution of the scanner takes."""
     lidar: LidarConfig = field(default_factory=LidarConfig)
     wheel_speed_m_s: Speed = 0.3
-    """Speed m/s of the faster wheel, which sets how long a step takes."""
+    """Speed of the faster wheel, which determines how long a step takes."""
     faults: FaultsConfig = field(default_factory=FaultsConfig)
 
     @property

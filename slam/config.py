@@ -15,23 +15,22 @@ from .robot import RobotSpec, fitted, of_robot
 
 @dataclass(frozen=True)
 class MapperConfig:
-    """The rules of the seven steps."""
+    """Settings of the mapper as a whole; its parts follow."""
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = field(default_factory=SharedConfig)
-    """What more than one of the rules asks for; it reaches all groups below."""
+    """Used by several of the groups below."""
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     vertices: bool = True
-    """Whether segments are cut at bends that the map knows, and walls for them."""
+    """Split segments at breakpoints that the map knows, and walls at breakpoints that a scan shows."""
     walls: WallsConfig = field(default_factory=WallsConfig)
     change_points: ChangePointsConfig | None = field(default_factory=ChangePointsConfig)
-    """None where no wall is cut for bends that only all scans together show; they are never looked for either where
-    `vertices` is False."""
+    """Without it, walls are split only at breakpoints that a single scan shows."""
     merging: MergingConfig | None = field(default_factory=MergingConfig)
-    """None where one wall may stand in the map twice."""
+    """Without it, one wall may be in the map twice."""
     recovery: RecoveryConfig | None = field(default_factory=RecoveryConfig)
-    """None where the robot is taken at its word."""
+    """Without it, the odometry is always believed."""
     ranges: RangesConfig = field(default_factory=RangesConfig)
 
     def __post_init__(self) -> None:

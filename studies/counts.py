@@ -1,7 +1,7 @@
 """How large the code is where size hurts: numbers that one may tune, entries of a folder, arrows between files.
 
 .venv/bin/python -m studies.counts            # a table
-.venv/bin/python -m studies.counts --numbers  # every number that one may tune, with its value and place
+.venv/bin/python -m studies.counts --numbers  # every such number that is no setting, with its value and place
 """
 
 import ast
@@ -17,8 +17,6 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from chainslam.experiments.views.settings_schema import settings
-
 ROOMS = ("slam", "explore", "sim", "viz", "experiments", "studies")
 TUNED = ("slam", "explore")
 """The rooms whose numbers decide what is mapped and where the robot drives."""
@@ -28,20 +26,12 @@ LAYOUT = ("POSE", "POSE_ROWS", "LINE_ROWS", "FORMAT", "NANO", "ROOM", "SPARE", "
 """Constants that are no choice: shapes of arrays and files, room that is kept for more, and where arithmetic ends."""
 HALF = 0.5
 """No choice either, but in a comparison: the middle of two."""
-PREFACE = """# Settings, and numbers that one may tune
+IN_CODE = """# Numbers in the code
 
-<!-- made by `make settings` -->
-
-Every setting of a run by its key, as `--set` and `--config` take it, with its default and what it may be. The page is
-made of the JSON Schema of `config.json`, which `chainslam schema` prints. The unit stands behind the range. Any other
-value, and a key that is none, ends in one line and exit status 2.
-"""
-IN_CODE = """## Numbers in the code
-
-Numbers of `slam/` and `explore/` that were chosen and are no settings: constants, and numbers in the middle of the
-code: in conditions, and all others with a point but 0, 1, 2 and a half. Those that have no words guard the arithmetic
-or count in geometry (a ring has three corners). `make counts` counts them; the settings of a folder count in this
-table, too.
+Numbers of `slam/` and `explore/` that were chosen and are no settings (those are in docs/reference/settings.md):
+constants, numbers in conditions, and all others with a decimal point but 0, 1, 2 and a half. Those without a
+description guard the arithmetic or count in geometry (a ring has three corners). The table by folder counts settings,
+too.
 """
 NO_ENTRIES = {"__pycache__", "__init__.py", "py.typed"}
 
@@ -68,7 +58,7 @@ class Asked:
     root: Path = Path()
     """The sources: a checkout."""
     numbers: bool = False
-    """List every setting of a run and every number that one may tune instead, as the page docs/settings.md."""
+    """List every number that is no setting instead, in Markdown."""
 
 
 def tunable(root: Path, rooms: tuple[str, ...] = TUNED) -> list[Number]:
@@ -189,20 +179,13 @@ def room_of(module: str) -> str:
 
 
 def page(numbers: Iterable[Number]) -> str:
-    """Return a page in Markdown: every setting of a run by its key, and the numbers of each file that are none."""
+    """Return a page in Markdown: how many numbers each folder has, and those of each file that are no settings."""
     numbers = list(numbers)
-    lines = [PREFACE]
-    for group, own in groupby(settings(), lambda each: each.group):
-        place = f"{group.kind.__module__.removeprefix('chainslam.').replace('.', '/')}.py"
-        lines += [f"## `{group.key or 'trial'}`: `{group.kind.__name__}`, `{place}`", ""]
-        lines += ["| key | default | what it may be | what it is |", "|---|---|---|---|"]
-        lines += [f"| `{each.key}` | `{_cell(each.default)}` | {each.allows} | {_cell(each.says)} |" for each in own]
-        lines.append("")
-    lines += [IN_CODE, "| folder | numbers |", "|---|---|"]
+    lines = [IN_CODE, "| folder | numbers |", "|---|---|"]
     lines += [f"| `{folder}/` | {count} |" for folder, count in by_folder(numbers).items()]
     lines.append("")
     for file, found in groupby((each for each in numbers if each.kind != "setting"), lambda each: each.file):
-        lines += [f"### `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
+        lines += [f"## `{file}`", "", "| name | value | what it is |", "|---|---|---|"]
         lines += [f"| `{_cell(each.name)}` | `{_cell(each.value)}` | {_cell(each.says)} |" for each in found]
         lines.append("")
     return "\n".join(lines)

@@ -7,14 +7,14 @@
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tyro
 
 from chainslam.experiments.artifacts.files import write
 from chainslam.experiments.artifacts.run_folder import prepare
-from chainslam.experiments.campaign.pages.page import page_of
+from chainslam.experiments.campaign.pages.campaign_page import campaign_page
 from chainslam.experiments.reproductions import REPRODUCTIONS
 from chainslam.experiments.usage import UsageError
 from chainslam.viz.reports.report import Page, PagePicture, Section, html
@@ -85,8 +85,7 @@ class WholeStudy:
             Part("intervals", "Intervals of distances between corners",
                  ("studies.consistency.intervals", "--seeds", trials, *first, *jobs, "--out", f"{at}/intervals.jsonl")),
             Part("paper", "The paper's figures",
-                 ("studies.paper.study", "--seeds", trials, *first, *jobs, "--out", f"{at}/paper.jsonl",
-                  "--page", f"{at}/paper.md")),
+                 ("studies.paper.study", "--seeds", trials, *first, *jobs, "--out", f"{at}/paper.jsonl")),
             Part("figures", "One drive of each of the paper's figures",
                  (cli, "reproduce", "--out", f"{at}/figures"),
                  tuple((f"figures/{name}.png", entry.about) for name, entry in REPRODUCTIONS.items())),
@@ -110,9 +109,8 @@ class WholeStudy:
         return len(failed)
 
     def page(self, failed: list[str]) -> Page:
-        """Return the report of what has been run so far."""
-        campaign = page_of(self.out / "campaign") if (self.out / "campaign/comparison.json").exists() else None
-        sections = list(campaign.sections) if campaign else []
+        """Return the report of what has been run so far: that of the campaign, and a section for each other study."""
+        sections = []
         for part in self.parts():
             said = self.out / f"{part.name}.txt"
             shown = [(self.out / file, caption) for file, caption in part.pictures]
@@ -128,13 +126,13 @@ class WholeStudy:
                     printed="" if tables else said.read_text(),
                 )
             )
-        return Page(
-            "What neglecting the cross-correlations costs: the whole study",
-            "Every study of this question, made by one command." if campaign is None else campaign.question,
-            campaign.verdict if campaign else ("The campaign is not done.",),
-            f"python -m studies.whole --trials {self.trials} --out {self.out}",
-            campaign.made_with if campaign else (),
-            tuple(sections),
+        done = (self.out / "campaign/comparison.json").exists()
+        campaign = campaign_page(self.out / "campaign") if done else Page("", ("The campaign is not done.",), "", ())
+        return replace(
+            campaign,
+            title="What neglecting the cross-correlations costs: every study of it",
+            command=f"python -m studies.whole --trials {self.trials} --out {self.out}",
+            sections=tuple(sections),
         )
 
 

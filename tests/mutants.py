@@ -1,9 +1,9 @@
 """Mutation testing: how many of the small faults put into a module do its own tests notice?
 
 `python tests/mutants.py [MODULE...]` runs the modules of `mutants.toml` one after another, or those named, and prints
-killed over all; `--table` prints the last results of all of them as the table of docs/testing.md, `--survivors` what
-was changed where no test failed. Results stay in `results/mutants`: a run that was stopped goes on where it was, and
-where tests or code have changed only new mutants and those that had survived are tried again.
+killed over all; `--table` prints the last results of all of them as the table of docs/contributing/testing.md,
+`--survivors` what was changed where no test failed. Results stay in `results/mutants`: a run that was stopped goes on
+where it was, and where tests or code have changed only new mutants and those that had survived are tried again.
 """
 
 import argparse

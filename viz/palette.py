@@ -18,6 +18,11 @@ def of_backend(name: str) -> str:
     return BACKEND_COLOURS[turn % len(BACKEND_COLOURS)]
 
 
+def backends() -> dict[str, str]:
+    """Return the colour of each registered back end."""
+    return {name: of_backend(name) for name in BACKENDS}
+
+
 def of_rank(rank: int) -> str:
     """Return the colour of anything else, by its place in a list."""
     return BACKEND_COLOURS[rank % len(BACKEND_COLOURS)]

@@ -1,5 +1,8 @@
 """User-provided text, drawn literally."""
 
+NONE = "–"
+"""What stands where there is no value."""
+
 
 def literal(words: str) -> str:
     r"""Return text that matplotlib draws as it is: between two plain dollar signs it would typeset mathematics.

@@ -51,7 +51,7 @@ METHODS: dict[str, MethodPreset] = {
         driving=((FOLLOWING, "paper"), (NAVIGATION, "visibility"), (SWEEP, False)),
     ),
 }
-"""What the paper describes and today's software does otherwise (docs/exploration.md, "The paper's method")."""
+"""What the paper describes and today's software does otherwise (docs/concepts/exploration.md, "The paper's method")."""
 
 
 def backend_of(name: str) -> str:

@@ -24,9 +24,20 @@ from .schema import UnfitError, UnknownKeyError, check_keys, fit, group_of, sett
 REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
+KEYS = {
+    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
+    "odometry": "odometry",
+    "max_path": "max_path_m",
+    "time_limit": "time_limit_s",
+    "sweep": "mission.explorer.sweep",
+    "return_to_start": "mission.return_to_start",
+    "navigation": NAVIGATION,
+    "following": FOLLOWING,
+}
+"""Options that decide a run, and their keys in `config.json`."""
 DRAWING = tuple(each.name for each in fields(DrawingOptions))
 """Options about how a world's file is read."""
-SEE = "docs/settings.md names all"
+SEE = "docs/reference/settings.md names all"
 Record = dict[str, Any]
 
 

@@ -1,5 +1,6 @@
 """The plan of a campaign: its trials, their order, and the name of each."""
 
+import shlex
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import product
@@ -11,7 +12,7 @@ from chainslam.sim.worlds import WORLDS, DrawingOptions
 from chainslam.slam.backends import BACKENDS
 
 from ..artifacts.presets import METHODS, backend_of, mapping_of
-from ..artifacts.settings import NAVIGATION, nested, trial_of
+from ..artifacts.settings import NAVIGATION, nested, options_of, trial_of
 from ..replays.replay import Association
 from ..scenario import P0, TrialConfig, check_settings
 from ..usage import OR_OWN, UsageError, choose, need
@@ -86,6 +87,7 @@ class Trial:
 DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start")
 """Settings that the campaign itself decides, or that would invalidate its statistics."""
 
+SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps"), ("--first-seed", "first_seed"))
 PRESETS: dict[str, dict[str, Any]] = {
     "smoke": {
         "worlds": ("paper-fig8",),
@@ -214,3 +216,18 @@ def world_digests(campaign: Campaign) -> dict[str, str]:
     """Return the SHA-256 of each world that is a file: the same name with other walls is another campaign."""
     files = [Path(world) for world in campaign.worlds if world not in WORLDS]
     return {path.stem: sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def command_of(campaign: Campaign) -> str:
+    """Return the command that runs a campaign."""
+    modes = [mode for mode in (CLOSED, "replay") if any(arm.startswith(mode) for arm in campaign.arms)]
+    association = [name for name in ("own", "true") if f"replay-{name}" in campaign.arms]
+    words = ["chainslam", "compare", "--worlds", *campaign.worlds, "--backends", *campaign.backends]
+    words += ["--strategies", *campaign.strategies, "--trials", str(campaign.trials), "--modes", *modes]
+    words += ["--association", *association] if association else []
+    plain = Campaign((), (), (), 0)
+    for option, name in SETTINGS:
+        value = getattr(campaign, name)
+        words += [] if value == getattr(plain, name) else [option, str(value)]
+    words += options_of(campaign.settings)
+    return shlex.join([*words, "--out", "DIR"])

@@ -14,13 +14,12 @@ from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
 from ..artifacts.settings import drawing_settings, parse_settings
 from ..campaign.cluster import ClusterError, on_dask
-from ..campaign.comparison.story import decisive_arm, story_of
 from ..campaign.comparison.tables import write_tables
-from ..campaign.comparison.words import ARMS_SHORT, left_out
 from ..campaign.contrast import contrast, read_contrast
 from ..campaign.merge import merge
-from ..campaign.pages.contrast_page import verdict
+from ..campaign.pages.contrast_page import lines_of_contrast
 from ..campaign.pages.film import record_campaign
+from ..campaign.pages.lines import deciding_arm, lines_of
 from ..campaign.plan import (
     Campaign,
     check_campaign,
@@ -34,9 +33,8 @@ from ..library.asked import CampaignName, asked_campaign
 from ..replays.replay import Association
 from ..scenario import P0, load_world
 from ..terminal.answers import found
-from ..terminal.console import say
+from ..terminal.console import say, written
 from ..terminal.interrupts import INTERRUPTED
-from ..terminal.progress import print_pooled
 from ..usage import UsageError
 from .echo import campaign_line, echo_world
 
@@ -169,16 +167,12 @@ class Compare:
                       file=sys.stderr)  # fmt: skip
                 return FAILED
             said = write_tables(self.out, campaign, trials(campaign), store.record)
-        print(tally.words())
-        arm = decisive_arm(campaign)
-        print_pooled([row for row in said["pooled"] if row["arm"] == arm], f"means over the runs, {ARMS_SHORT[arm]}")
-        verdict_words = story_of(campaign, said).verdict
-        found(verdict=list(verdict_words), folder=str(self.out))
-        for words in verdict_words:
+        lines = lines_of(campaign, said)
+        pooled = [row for row in said["pooled"] if row["arm"] == deciding_arm(campaign)]
+        found(pooled=pooled, verdict=list(lines), folder=str(self.out))
+        ends = ", ".join(f"{said['counts'][end]} {end}" for end in ("complete", "stopped", "failed"))
+        for words in (f"{tally.words()} ({ends})", *lines, written(self.out)):
             say(words)
-        for words in left_out(campaign, said):
-            print(words)
-        say(f"results in {self.out}")
         problems = [] if self.rrd is None else record_campaign(self.out, campaign, self.rrd)
         for problem in problems:
             say(f"chainslam: not written: {problem}", stderr=True)
@@ -195,10 +189,10 @@ class Compare:
             merge(self.merge, self.out)
         else:
             contrast(*self.against, self.out)
-            told = verdict(read_contrast(self.out))
+            told = lines_of_contrast(read_contrast(self.out))
             found(verdict=list(told))
             for words in told:
                 print(words)
         found(folder=str(self.out))
-        say(f"results in {self.out}")
+        say(written(self.out))
         return 0

@@ -11,8 +11,9 @@ from typing import Any
 
 from chainslam.explore.step import Step
 
+from ..library.driving import Watch
 from ..library.pages import report_at
-from ..library.running import Watch, explore, replay
+from ..library.running import explore, replay
 from ..library.runs import Run
 from ..scenario import DRIVER
 from ..scoring.summary import EXIT_STATUS

@@ -1,66 +1,39 @@
 """`chainslam explore`: one world, one robot, one map."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
 from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
 from chainslam.explore.step import Step
-from chainslam.sim.worlds import AS_DRAWN, DrawingOptions, World
+from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
 from ..artifacts.presets import PresetName
-from ..artifacts.results import config_record, write_results
-from ..artifacts.run_folder import (
-    clear_leftovers,
-    default_folder,
-    held,
-    point_latest_at,
-    prepare,
-    refuse_others,
-    settle,
-)
-from ..artifacts.running_log import RunningLog
-from ..artifacts.saved import SavedRun, read_saved
+from ..artifacts.run_folder import default_folder, point_latest_at
 from ..artifacts.settings import (
     DRAWING,
+    KEYS,
     drawing_settings,
     parse_setting,
 )
-from ..library.asked import KEYS, asked_trial
-from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..library.asked import SETTLED, asked_trial, continued, refuse_settled
+from ..library.driving import Finished, Watch, begin, go_on
+from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, Scenario, TrialConfig, check, load_world
 from ..terminal.answers import found
-from ..terminal.console import say
+from ..terminal.console import say, written
 from ..terminal.interrupts import first_interrupt_waits
-from ..terminal.progress import print_summary, progress
-from ..trial import TrialResult, default_mission, run_scenario
+from ..terminal.progress import progress
+from ..trial import TrialResult
 from ..usage import UsageError
+from ..views.run_lines import lines_of, notes_of
 from ..views.timelines import TimelineOutput
 from .echo import echo_world, expected_steps, run_line
-
-MAX_STEPS = TrialConfig.max_steps
-SETTLED = (
-    "world",
-    "backend",
-    "strategy",
-    "seed",
-    "p0",
-    "errorless",
-    "sweep",
-    "navigation",
-    "following",
-    "odometry",
-    "start",
-    *DRAWING,
-    "fence",
-    "preset",
-    "robot",
-    "config",
-    "set",
-)
-"""What a saved run has settled; only its limits may be others when it goes on."""
 
 
 @dataclass(frozen=True)
@@ -152,128 +125,72 @@ class Explore:
         said, default = (self.drawing, AS_DRAWN) if name in DRAWING else (self, Explore)
         return name in self.given or getattr(said, name) != getattr(default, name)
 
-    def continued(self, saved: TrialConfig) -> TrialConfig:
-        """Return a saved run with the limits given now; raises UsageError where anything else is given, too."""
-        for name in SETTLED:
-            if self._is_given(name):
-                raise UsageError(
-                    f"expected only limits and --out with --resume, found {name}: leave it out, the saved run decides"
-                    " it"
-                )
-        home = self.return_to_start or saved.mission.return_to_start
-        going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
-        if self.max_steps is self.max_path is self.time_limit is None:
-            return going_on
-        steps = MAX_STEPS if self.max_steps is None else self.max_steps
-        return replace(going_on, max_steps=steps, max_path_m=self.max_path, time_limit_s=self.time_limit)
-
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
         if self.view and self.rrd is not None:
             raise UsageError("expected --rrd or --view, found both: leave one out (the viewer can save what it shows)")
+        recordings: list[TimelineOutput] = []
+        watching = partial(self._watched, recordings)
         if self.resume is not None:
-            return self._go_on(self.resume)
-        trial = self.trial
-        check(trial)
-        world = load_world(trial.world, trial.start, trial.drawing)
-        folder = self.out or default_folder(world.name, trial, self.preset)
-        prepare(folder)
-        with held(folder):
-            config = config_record(trial)
-            refuse_others(folder, config, self.force)
-            settle(folder, config)
-            status = self._drive(trial, world, folder, config)
-        if self.out is None:
-            point_latest_at(folder)
+            refuse_settled(filter(self._is_given, SETTLED))
+            limits = self.max_steps, self.max_path, self.time_limit, self.return_to_start
+            driven = go_on(self.resume, self.out, lambda saved: continued(saved, *limits), self.force, watching)
+            if isinstance(driven, Finished):
+                print(f"the run in {driven.folder} is finished ({driven.why}): nothing done")
+                return 0
+        else:
+            trial = self.trial
+            check(trial)
+            world = load_world(trial.world, trial.start, trial.drawing)
+            driven = begin(
+                trial, world, self.out or default_folder(world.name, trial, self.preset), self.force, watching
+            )
+        if driven.fell_short:
+            recordings[0].drop()
+            reason = driven.result.ending.reason
+            told = f"expected to get past the end of the saved run, found {reason}: its files are unchanged,"
+            say(f"chainslam: {told} --resume continues it", stderr=True)
+            return driven.result.ending.exit_status
+        status = _told(driven.result, driven.folder, driven.problems + recordings[0].close())
+        if self.out is None and self.resume is None:
+            point_latest_at(driven.folder)
         return status
 
-    def _go_on(self, source: Path) -> int:
-        """Take up the run in a folder; raises UsageError where there is none, or none that these limits let go on."""
-        # Read before any folder is made, and once more when nobody else can write into it.
-        check(self.continued(read_saved(source).trial))
-        folder = self.out or source
-        prepare(folder)
-        with held(folder):
-            saved = read_saved(source)
-            trial = self.continued(saved.trial)
-            world = load_world(trial.world, trial.start, trial.drawing)
-            in_place = folder.samefile(source)
-            if in_place and saved.is_finished(trial):
-                print(f"the run in {source} is finished ({_why(saved)}): nothing done")
-                return 0
-            if saved.outlasts(trial.limits):
-                raise UsageError(
-                    f"expected limits beyond the {len(saved)} steps of the saved run, found one before its end: raise"
-                    " it (the files are unchanged)"
-                )
-            config = config_record(trial)
-            if in_place:
-                clear_leftovers(folder)
-            else:
-                refuse_others(folder, config, self.force)
-                settle(folder, config)
-            return self._drive(trial, world, folder, config, saved)
-
-    def _drive(
-        self, trial: TrialConfig, world: World, folder: Path, config: dict[str, Any], saved: SavedRun | None = None
-    ) -> int:
-        """Drive a run, write it into its folder, and return the exit status; raises UsageError."""
-        scenario = build(trial, world)
+    @contextmanager
+    def _watched(self, recordings: list[TimelineOutput], scenario: Scenario) -> Iterator[Watch]:
+        """Tell of a run that begins, and show and record its steps; the recording is added to a list."""
+        trial, world = scenario.config, scenario.world
         echo_world(world)
         say(run_line(world, trial))
         if not HAS_GTSAM and trial.backend == DRIVER and not self._is_given("backend"):
             say(f"note: the package gtsam is not installed; {DRIVER} is used instead of graph")
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"
         title = f"{world.name}: {trial.backend}, {trial.strategy}, {noise}"
-        log = RunningLog(folder, config, saved.kept if saved is not None else None)
         recording = TimelineOutput(title, [trial.backend], world, trial.errorless, self.rrd, self.view)
+        recordings.append(recording)
+        steps = sum(expected_steps(world, trial.max_steps)) / 2
         try:
-            steps = sum(expected_steps(world, trial.max_steps)) / 2
             with progress(world.name, steps) as show, first_interrupt_waits() as stop_if_asked:
 
                 def watch(step: Step) -> None:
-                    if saved is not None:
-                        saved.check(step)
-                    log.add(step)
                     show(step)
                     stop_if_asked()
 
-                recorded = recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
-                result = run_scenario(scenario, recorded, default_mission)
-            log.check()
+                yield recording.watch(trial.backend, lambda step: scenario.robot.record.poses_world[-1], watch)
         except UsageError:
             recording.drop()
-            if saved is not None and saved.kept is None:
-                log.remove()
             raise
-        finally:
-            log.close()
-        if saved is not None and result.ending.exit_status and len(result.log or ()) < len(saved):
-            recording.drop()
-            told = f"expected to get past the end of the saved run, found {result.ending.reason}: its files are"
-            say(f"chainslam: {told} unchanged, --resume continues it", stderr=True)
-            return result.ending.exit_status
-        problems = write_results(result, folder, config)
-        if not problems:
-            log.remove()
-        problems += recording.close()
-        return _told(result, folder, problems)
 
 
 def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
     """Print what came of a run, and return the exit status."""
-    print_summary(result.summary)
-    found(folder=str(folder))
-    say(f"results in {folder}")
+    found(summary=result.summary, folder=str(folder))
+    for words in notes_of(result.summary):
+        say(f"note: {words}")
+    for words in (*lines_of([result.summary]), written(folder)):
+        say(words)
     if result.ending.exit_status:
         say(f"chainslam: {result.ending.status}: {result.ending.reason}", stderr=True)
     for problem in problems:
         say(f"chainslam: not written: {problem}", stderr=True)
     return result.ending.exit_status or (1 if problems else 0)
-
-
-def _why(saved: SavedRun) -> str:
-    """Return in words why a finished run is over."""
-    assert saved.outcome is not None
-    words = f"{saved.outcome.status}: {saved.outcome}"
-    return words if saved.outcome.status == "complete" else f"{words}; raise the limit to continue"

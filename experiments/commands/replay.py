@@ -4,7 +4,7 @@ import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -23,12 +23,12 @@ from ..replays.sources import OwnLog, RealLog
 from ..scenario import OdometrySource
 from ..scoring.without_truth.references import read_references
 from ..terminal.answers import found
-from ..terminal.console import say
+from ..terminal.console import say, written
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
-from ..terminal.measured_tables import print_references
-from ..terminal.progress import print_comparison, print_recorded, progress
+from ..terminal.progress import progress
 from ..trial import TrialResult
 from ..usage import OR_OWN, UsageError, choose
+from ..views.run_lines import lines_of, notes_of
 from ..views.timelines import TimelineOutput
 
 
@@ -116,16 +116,16 @@ class Replay:
                 if status == INTERRUPTED:
                     break
             problems += recording.close()
-        self._print(source, summaries)
+        found(summaries={summary["backend"]: summary for summary in summaries}, folder=str(out))
+        for summary in summaries:
+            for words in notes_of(summary):
+                say(f"note: {summary['backend']}: {words}")
         ended = {summary["reason"]: summary["outcome"] for summary in summaries}
         for words, outcome in ended.items():
-            if outcome == Outcome.RECORDING_CUT_SHORT:
-                print(words)
-            elif outcome == Outcome.FAILED:
+            if outcome == Outcome.FAILED:
                 say(f"chainslam: failed: {words}", stderr=True)
-        print_references(summaries)
-        found(folder=str(out))
-        print(f"results in {out}")
+        for words in (*lines_of(summaries), written(out)):
+            say(words)
         for problem in problems:
             print(f"chainslam: not written: {problem}", file=sys.stderr)
         return status or (1 if problems else 0)
@@ -144,13 +144,6 @@ class Replay:
         if isinstance(source, RealLog):
             return TimelineOutput(source.title, self.backend, None, True, self.rrd)
         return TimelineOutput(source.title, self.backend, source.world, source.run.trial.errorless, self.rrd)
-
-    def _print(self, source: OwnLog | RealLog, summaries: list[dict[str, Any]]) -> None:
-        if isinstance(source, RealLog):
-            print_recorded(summaries, source.title)
-            return
-        trial = source.run.trial
-        print_comparison(summaries, f"{trial.world}, seed {trial.seed}, {self.association} association")
 
     def _one(self, source: OwnLog | RealLog, name: str, recording: TimelineOutput) -> TrialResult:
         """Replay through one back end, and stop between two steps where that is asked for."""

@@ -34,9 +34,8 @@ class Report:
         found(report=str(self.folder / REPORT))
         print(f"report in {self.folder / REPORT}{replaced}")
         if self.latex:
-            tables = [table for section in page.sections for table in section.tables]
             replaced = replacing(self.folder / TABLES)
-            write(self.folder / TABLES, latex(tables))
+            write(self.folder / TABLES, latex(page.all_tables))
             found(tables=str(self.folder / TABLES))
             print(f"tables in {self.folder / TABLES}{replaced}")
         if self.gif:

@@ -1,6 +1,7 @@
-"""What a command or a call asks for, as what runs: one way in for both."""
+"""Conversion of the options of a command or a function call to the settings of a trial, log or campaign."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,7 +11,9 @@ from chainslam.sim.logs.recorded_robot import knows_truth
 from ..artifacts.fences import fence_of
 from ..artifacts.presets import PresetName, against_methods, preset_of, robot_of, stated
 from ..artifacts.settings import (
+    DRAWING,
     FOLLOWING,
+    KEYS,
     NAVIGATION,
     Record,
     asked,
@@ -29,17 +32,11 @@ from ..terminal.console import say
 from ..usage import UsageError
 
 CampaignName = Literal["smoke", "paper", "paper-method", "full"]
-KEYS = {
-    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
-    "odometry": "odometry",
-    "max_path": "max_path_m",
-    "time_limit": "time_limit_s",
-    "sweep": "mission.explorer.sweep",
-    "return_to_start": "mission.return_to_start",
-    "navigation": NAVIGATION,
-    "following": FOLLOWING,
-}
-"""Options that decide a run, and their keys in `config.json`."""
+SETTLED = (
+    *("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "navigation", "following", "odometry"),
+    *("start", *DRAWING, "fence", "preset", "robot", "config", "set"),
+)
+"""Options that a saved run determines; only its limits may change when it is continued."""
 
 
 def asked_trial(
@@ -51,10 +48,10 @@ def asked_trial(
     config: Path | None,
     settings: Iterable[Record],
 ) -> TrialConfig:
-    """Return what decides a run: options win over settings, these over a file of some, over the robot and the preset.
+    """Return the settings of a run; options override settings, then come --config, the robot and the preset.
 
-    `said` are the options that are said (`KEYS`), `drawing` those of the world's file by their dotted keys. Raises
-    UsageError where no world is named, or where anything cannot be.
+    `said` are the given options (`KEYS`), `drawing` those of the world's file by their dotted keys. Raises UsageError
+    if no world is given, or if a value is invalid.
     """
     given = {KEYS[name]: list(value) if isinstance(value, tuple) else value for name, value in said.items()} | drawing
     if fence is not None:
@@ -66,10 +63,30 @@ def asked_trial(
     return trial
 
 
+def refuse_settled(names: Iterable[str]) -> None:
+    """Raise UsageError for an option that a saved run determines."""
+    for name in names:
+        raise UsageError(
+            f"expected only limits and --out with --resume, found {name}: leave it out, the saved run decides it"
+        )
+
+
+def continued(
+    saved: TrialConfig, max_steps: int | None, max_path: float | None, time_limit: float | None, return_to_start: bool
+) -> TrialConfig:
+    """Return the settings of a saved run with the given limits, or with its own if none is given."""
+    home = return_to_start or saved.mission.return_to_start
+    going_on = replace(saved, mission=replace(saved.mission, return_to_start=home))
+    if max_steps is max_path is time_limit is None:
+        return going_on
+    steps = TrialConfig.max_steps if max_steps is None else max_steps
+    return replace(going_on, max_steps=steps, max_path_m=max_path, time_limit_s=time_limit)
+
+
 def asked_source(
     path: Path, own: ReplayOptions, real: RealOptions, robot: str | None, config: Path | None, settings: Record
 ) -> OwnLog | RealLog:
-    """Return a log, read, to be replayed as asked for; raises UsageError where it is none, or cannot be so."""
+    """Read a log for a replay with these options; raises UsageError for an invalid log or option."""
     spec = stated(robot_of(robot))
     is_own = is_own_log(path)
     if is_own and real.every != 1:
@@ -111,10 +128,10 @@ def asked_campaign(
     driver: str,
     first_seed: int,
 ) -> Campaign:
-    """Return a campaign; raises UsageError where it leaves something open.
+    """Return a campaign; raises UsageError if something is missing.
 
-    `cells` are worlds, back ends, strategies and trials, None for one that the preset names; `said` are the options
-    that are said of navigation, following, errorless, p0 and max_steps.
+    `cells` are worlds, back ends, strategies and trials, None to take them from the preset; `said` are the given
+    options among navigation, following, errorless, p0 and max_steps.
     """
     begin = dict(PRESETS[preset]) if preset else {}
     ruling = over(nested(begin.pop("settings", ())), robot_of(robot), asked(config, settings, DECIDED))

@@ -16,8 +16,9 @@ from chainslam.explore.planning.navigators import Navigation
 from ..artifacts.reading import read_json
 from ..artifacts.settings import drawing_said, drawing_settings, settings_of
 from ..campaign.cluster import on_dask
-from ..campaign.comparison.story import story_of
-from ..campaign.comparison.tables import write_tables
+from ..campaign.comparison.tables import read_comparison, write_tables
+from ..campaign.merge import union
+from ..campaign.pages.lines import lines_of
 from ..campaign.plan import check_campaign, check_parts, drawing_of, trials
 from ..campaign.plugins import register_installed
 from ..campaign.runner import on_cores, run_campaign
@@ -37,29 +38,29 @@ REMEDY = "name a folder that compare left"
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` left in a folder."""
+    """A campaign, over the files in its folder."""
 
     folder: Path
-    """Where its files are (docs/reference/files.md); without a folder of its own they go with this object."""
+    """Folder of its files; if `out` was not given they are deleted together with this object."""
     _home: Home | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def trials(self) -> Any:
-        """Return `trials.csv`, a row for each trial: a pandas DataFrame, or arrays by name where pandas is missing."""
+        """`trials.csv`, one row for each trial: a pandas DataFrame, or arrays by name without pandas."""
         return table_at(self.folder / "trials.csv")
 
     @cached_property
     def comparison(self) -> dict[str, Any]:
-        """Return `comparison.json`: means, differences and their intervals."""
+        """`comparison.json`: means, differences and their intervals."""
         return read_json(self.folder / COMPARISON, dict, REMEDY)
 
     @property
     def verdict(self) -> list[str]:
         """Return in words what the campaign found."""
-        return list(story_of(read_campaigns(self.folder)[0], self.comparison).verdict)
+        return list(lines_of(union(read_campaigns(self.folder)), read_comparison(self.folder)))
 
     def report(self) -> Path:
-        """Write the page that `chainslam report` writes, and return its place."""
+        """Write the page of `chainslam report` and return its path."""
         return report_at(self.folder)[1]
 
     def __repr__(self) -> str:
@@ -102,13 +103,12 @@ def compare(
     dask: str | None = None,
     out: str | Path | None = None,
 ) -> Comparison:
-    """Run many trials and return their comparison; `chainslam compare` as a function.
+    """Run many trials and return their comparison, as `chainslam compare` does.
 
-    Without a `preset`, worlds and back ends are named, and it is ten trials by the strategy nearest-robot unless others
-    are. `scale` to `negate` say what the worlds' files leave open. `jobs` processes run them, one a core by default, or
-    the workers of the Dask scheduler at the address `dask`. The same call with the same `out` goes on where it was
-    stopped.
-    Raises UsageError, in one line, for bad input.
+    Without a `preset`, `worlds` and `backends` must be given; by default there are ten trials each, with the strategy
+    nearest-robot. `scale` to `negate` are the command's options for drawings. Trials run in `jobs` processes, by
+    default one for each core, or on the workers of the Dask scheduler at the address `dask`. The same call with the
+    same `out` continues a campaign that was stopped. Raises UsageError for bad input.
     """
     register_installed()
     home: Home | None = None
@@ -154,7 +154,7 @@ DEFAULTS = {name: each.default for name, each in signature(compare).parameters.i
 
 
 def load(folder: str | Path) -> Run | Comparison:
-    """Return the run or the comparison in a folder; raises UsageError, in one line, where there is neither."""
+    """Return the run or the comparison in a folder; raises UsageError if there is neither."""
     place = Path(folder)
     if not (place / COMPARISON).is_file():
         return run_at(place)

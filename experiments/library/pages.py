@@ -19,8 +19,8 @@ def report_at(folder: Path) -> tuple[Page, Path]:
 
 def _page(folder: Path) -> Page:
     from ..campaign.contrast import CONTRAST
+    from ..campaign.pages.campaign_page import campaign_page
     from ..campaign.pages.contrast_page import contrast_page
-    from ..campaign.pages.page import page_of
     from ..views.run_page import is_run, run_page
 
     if not folder.is_dir():
@@ -28,4 +28,4 @@ def _page(folder: Path) -> Page:
     if (folder / CONTRAST).is_file():
         return contrast_page(folder)
     # A campaign keeps no summary.json; its recordings lie two folders further down.
-    return run_page(folder) if is_run(folder) else page_of(folder)
+    return run_page(folder) if is_run(folder) else campaign_page(folder)

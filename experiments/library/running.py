@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 from functools import partial
 from inspect import signature
@@ -11,7 +12,6 @@ from typing import Any, overload
 
 from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
-from chainslam.explore.step import Step
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.robot import Robot, RobotSpec
 
@@ -25,19 +25,18 @@ from ..replays.real_log import RealOptions
 from ..replays.replay import Association, ReplayOptions
 from ..replays.sources import RECORDED, OwnLog, RealLog
 from ..replays.unwitnessed import run_unwitnessed, unwitnessed
-from ..scenario import DRIVER, P0, OdometrySource, TrialConfig, build, check, load_world
+from ..scenario import DRIVER, P0, OdometrySource, check, load_world
 from ..scoring.without_truth.references import References, read_references
 from ..terminal.word_order import file_in
-from ..trial import TrialResult, default_mission, run_scenario
+from ..trial import TrialResult, default_mission
 from ..usage import OR_OWN, UsageError, choose
-from .asked import asked_source, asked_trial
+from .asked import SETTLED, asked_source, asked_trial, continued, refuse_settled
+from .driving import Driven, Finished, Watch, begin, go_on
 from .runs import Home, Run
-
-Watch = Callable[[Step], None]
 
 
 def explore(
-    world: str | Path | Robot,
+    world: str | Path | Robot | None = None,
     *,
     backend: str = DRIVER,
     strategy: str = "nearest-robot",
@@ -65,33 +64,50 @@ def explore(
     robot: str | Path | RobotSpec | None = None,
     config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
+    resume: str | Path | Run | None = None,
     out: str | Path | None = None,
     force: bool = False,
     watch: Watch = lambda step: None,
 ) -> Run:
-    """Explore a world, or with a robot of one's own, and return the run; `chainslam explore` as a function.
+    """Explore a world, or a building with a robot of your own, and return the run, as `chainslam explore` does.
 
-    `world` is a bundled name, a file, or a `Robot`. Of a robot of one's own nobody knows the truth: its scores are
-    None, and the map's frame is its first pose. `robot` is what it states of itself: a bundled name, a YAML file or a
-    `RobotSpec`. `scale` to `negate` say what a file leaves open, as the options of the command. `preset`, `config` and
-    `settings` are --preset, --config and --set, the last as keys of config.json with their values. `watch` sees every
-    step. Without `out` the files go with the returned object. Raises UsageError, in one line, for bad input.
+    `world` is a bundled name, a file or a `Robot`. For a robot of your own the truth is unknown, so that scores which
+    need it are None, and its first pose is the origin of the map. `robot` describes it: a bundled name, a YAML file or
+    a `RobotSpec`. `scale` to `negate` are the command's options for drawings, and `preset`, `config` and `settings` its
+    `--preset`, `--config` and `--set`; the latter maps keys to values. `watch` is called with each step. Without `out`
+    the files are deleted together with the returned object.
+
+    `resume`, in place of a world, is the folder of a run that was stopped or killed. The run continues there, or in
+    `out`, up to its own limits or to those given now, and leaves the same files as an uninterrupted run. Raises
+    UsageError for bad input.
     """
     register_installed()
-    own = None if isinstance(world, str | Path) else world
-    name = str(world) if own is None else type(own).__name__
-    spec = robot if isinstance(robot, RobotSpec) else None
     said: dict[str, Any] = {
         "backend": backend, "strategy": strategy, "seed": seed, "p0": p0, "errorless": errorless, "sweep": sweep,
         "navigation": navigation, "following": following, "odometry": odometry, "max_steps": max_steps,
         "max_path": max_path, "time_limit": time_limit, "return_to_start": return_to_start, "start": start,
     }  # fmt: skip
+    said = {key: value for key, value in said.items() if value is not None and value != DEFAULTS[key]}
     drawing = drawing_said(
         scale=scale, layers=tuple(layers), ids=tuple(ids), without=tuple(without), level=level, threshold=threshold,
         negate=negate,
     )  # fmt: skip
+    if resume is not None:
+        more = {"world": world, "fence": fence, "preset": preset, "robot": robot, "config": config, "set": settings}
+        named = said.keys() | {key.rpartition(".")[2] for key in drawing_settings(drawing)}
+        named |= {key for key, value in more.items() if value}
+        refuse_settled(key for key in SETTLED if key in named)
+        limits = max_steps, max_path, time_limit, return_to_start
+        source = resume.folder if isinstance(resume, Run) else Path(resume)
+        place = None if out is None else _folder(out)[0]
+        going = go_on(source, place, lambda saved: continued(saved, *limits), force, lambda _: nullcontext(watch))
+        home = resume._home if isinstance(resume, Run) and out is None else None
+        return Run(source, home) if isinstance(going, Finished) else _run(going, home)
+    own = None if isinstance(world, str | Path | None) else world
+    spec = robot if isinstance(robot, RobotSpec) else None
+    named_world = {} if world is None else {"world": str(world) if own is None else type(own).__name__}
     trial = asked_trial(
-        {"world": name} | {key: value for key, value in said.items() if value is not None and value != DEFAULTS[key]},
+        named_world | said,
         drawing_settings(drawing),
         fence,
         preset,
@@ -104,10 +120,11 @@ def explore(
     check(trial)
     if own is None:
         drawn = load_world(trial.world, trial.start, trial.drawing)
-        return _kept(*_folder(out), trial, force, lambda: run_scenario(build(trial, drawn), watch, default_mission))
+        folder, home = _folder(out)
+        return _run(begin(trial, drawn, folder, force, lambda _: nullcontext(watch)), home)
     scenario = unwitnessed(replace(trial, p0="zero"), own)
-    said = config_record(scenario.config) | {REPLAY: {RECORDED: asdict(RealOptions())}}
-    return _kept(*_folder(out), said, force, lambda: run_unwitnessed(scenario, watch, default_mission))
+    record = config_record(scenario.config) | {REPLAY: {RECORDED: asdict(RealOptions())}}
+    return _kept(*_folder(out), record, force, lambda: run_unwitnessed(scenario, watch, default_mission))
 
 
 DEFAULTS = {name: each.default for name, each in signature(explore).parameters.items()}
@@ -168,11 +185,10 @@ def replay(
     force: bool = False,
     watch: Watch = lambda step: None,
 ) -> Run | dict[str, Run]:
-    """Send a log, or the log of a run, through one back end or several; `chainslam replay` as a function.
+    """Replay a log, or the log of a run, through one back end or several, as `chainslam replay` does.
 
-    Returns the run, or with several names the runs by name. `relations` and `reference` are files of what others
-    measured, and `second_looks` smooths a real robot's log once it has ended, as the options of the command do. Raises
-    UsageError, in one line, for bad input.
+    Returns the run, or for a list of names the runs by name. `relations` and `reference` are files with measurements,
+    and `second_looks` refines a real robot's log offline once it has ended. Raises UsageError for bad input.
     """
     register_installed()
     names = (backend,) if isinstance(backend, str) else tuple(backend)
@@ -212,20 +228,26 @@ def _folder(out: str | Path | None) -> tuple[Path, Home | None]:
     return home.folder / "run", home
 
 
-def _kept(
-    folder: Path,
-    home: Home | None,
-    config: TrialConfig | dict[str, Any],
-    force: bool,
-    go: Callable[[], TrialResult],
-) -> Run:
+def _run(driven: Driven, home: Home | None) -> Run:
+    """Return the run that was driven; raises UsageError where it fell short of the saved one, or was not written."""
+    if driven.fell_short:
+        raise UsageError(
+            f"expected to pass the end of the saved run, found {driven.result.ending.reason}: its files are left as"
+            " they were, resume it again"
+        )
+    return _written(driven.folder, home, driven.problems)
+
+
+def _kept(folder: Path, home: Home | None, config: dict[str, Any], force: bool, go: Callable[[], TrialResult]) -> Run:
     """Run in a folder, write all that came of it, and return it; raises UsageError where something was not written."""
-    said = config_record(config) if isinstance(config, TrialConfig) else config
     prepare(folder)
     with held(folder):
-        refuse_others(folder, said, force)
-        settle(folder, said)
-        problems = write_results(go(), folder, said)
+        refuse_others(folder, config, force)
+        settle(folder, config)
+        return _written(folder, home, write_results(go(), folder, config))
+
+
+def _written(folder: Path, home: Home | None, problems: list[str]) -> Run:
     if problems:
         raise UsageError(f"expected to write a run's files, found {problems[0]}: see {folder}")
     return Run(folder, home)

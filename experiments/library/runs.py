@@ -44,17 +44,17 @@ class Home:
 
 @dataclass(frozen=True)
 class Map:
-    """The walls that a run ended with, n of them, world frame."""
+    """The final map of a run: n walls in the world frame."""
 
     ids: Int[np.ndarray, " n"]
     lines_world: Float[np.ndarray, "n 2"]
-    """(alpha rad, r m) in the paper's Hessian form; alpha points from the seen side into the wall."""
+    """(alpha rad, r m) in Hessian form; the normal alpha points from the free side into the wall."""
     ends_world: Float[np.ndarray, "n 2 2"]
-    """First and last point, m; walking on, the free side is on the left."""
+    """First and last point, m, with the free side on the left."""
     tentative: Bool[np.ndarray, " n"]
-    """Walls that were not seen well enough yet."""
+    """Which walls are not confirmed yet."""
     pose_world: Float[np.ndarray, 3]
-    """The robot at the end, m m rad."""
+    """Final pose of the robot: x m, y m, heading rad."""
     cov: Float[np.ndarray, "s s"]
     """Joint covariance of the pose and the lines (alpha, d) about their anchors, s = 3 + 2 n."""
 
@@ -68,25 +68,25 @@ class Map:
 
 @dataclass(frozen=True)
 class Run:
-    """What `explore` or `replay` left in a folder."""
+    """A run, over the files in its folder; raises UsageError if one of them is missing or of another format."""
 
     folder: Path
-    """Where its files are (docs/reference/files.md); of a run without a folder of its own they go with this object."""
+    """Folder of its files; if `out` was not given they are deleted together with this object."""
     _home: Home | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Return the keys of `summary.json`; raises UsageError where a file is missing or another, as all here do."""
+        """The keys of `summary.json`."""
         return read_json(self.folder / SUMMARY, Ended, REMEDY)
 
     @cached_property
     def steps(self) -> Any:
-        """Return `steps.csv`, a row for each step: a pandas DataFrame, or arrays by name where pandas is missing."""
+        """`steps.csv`, one row for each step: a pandas DataFrame, or arrays by name without pandas."""
         return table_at(self.folder / STEPS)
 
     @cached_property
     def map(self) -> Map:
-        """Return the walls at the end."""
+        """The final map."""
         arrays = read_map(self.folder)
         alpha = arrays["lines"][:, 0]
         feet = arrays["anchors"] + arrays["lines"][:, 1:] * normals(alpha)
@@ -94,24 +94,25 @@ class Run:
         return Map(arrays["ids"], arrays["lines_world"], ends, arrays["tentative"], arrays["pose"], arrays["cov"])
 
     def plot(self, picture: Picture = "map") -> Figure:
-        """Return a picture as a matplotlib figure: map, visibility graph, paths, NEES, model space or traversals.
+        """Return a matplotlib figure of the map, visibility graph, paths, NEES, model space or traversals.
 
-        All but the first two need the truth, which a real robot does not know.
+        All but the first two need the truth, which is unknown for a real robot.
         """
         from ..views.pictures import figure_of
 
         return figure_of(self.folder, picture)
 
     def report(self) -> Path:
-        """Write the page that `chainslam report` writes, and return its place."""
+        """Write the page of `chainslam report` and return its path."""
         from .pages import report_at
 
         return report_at(self.folder)[1]
 
     def measure(self, first: int | None = None, second: int | None = None) -> Measured | MappedCorners:
-        """Return the distance between two corners with its error, by their ids in `map.geojson`; without, all corners.
+        """Return the distance between two corners with its error; without arguments, all corners.
 
-        Raises UsageError for what is no corner, or where one's walls lie on one line.
+        Corners are given by their ids in `map.geojson`. Raises UsageError for another id, and for a corner whose walls
+        lie on one line.
         """
         mapped = read_corners(self.folder)
         if first is None or second is None:

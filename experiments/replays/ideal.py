@@ -43,29 +43,35 @@ class IdealEkf(Ekf[DenseMap]):
     def _position(self) -> Float[np.ndarray, "2"]:
         return self._drive.true_poses_world[self._scan, :2]
 
-    def _motion(self, odometry: Odometry) -> Motion:
+    def motion(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
+        """Return the motion with the Jacobians of the true one."""
         before, F, W = self._drive.true_poses_world[self._scan], np.eye(3), np.eye(3)
         self._scan += 1
         F[:2, 2], W[:2, :2] = J @ (self._position - before[:2]), rotation(float(before[2]))
-        return Motion(move(self._map.pose_world, odometry.motion).pose_world, F, W)
+        motion = Motion(move(self.map.pose_world, odometry.motion).pose_world, F, W)
+        return motion, motion.noise(odometry.cov)
 
-    def _innovations(
+    def compare(
         self,
         rows: Int[np.ndarray, " m"],
         seen: Observations,
         pose_world: Float[np.ndarray, "3"],
         means: Float[np.ndarray, "m 2"],
     ) -> Innovations:
-        here = innovations(pose_world, self._map.anchors[rows], means, seen.lines, seen.cov)
+        """Compare observations with what pose and lines predict, with the Jacobian at the truth."""
+        here = innovations(pose_world, self.map.anchors[rows], means, seen.lines, seen.cov)
         pose = np.append(self._position, self._drive.true_poses_world[self._scan, 2])
         true = np.stack([self._alpha[rows], means[:, 1]], axis=-1)
-        there = innovations(pose, self._map.anchors[rows], true, seen.lines, seen.cov)
+        there = innovations(pose, self.map.anchors[rows], true, seen.lines, seen.cov)
         return replace(there, e=here.e, R=here.R)
 
-    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
-        new, walls = initialise(self._map.pose_world, lines, centres), self._drive.first[self._scan].walls
+    def first_sight(
+        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
+    ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
+        """Return new lines with the Jacobians of the true ones."""
+        new, walls = initialise(self.map.pose_world, lines, centres), self._drive.first[self._scan].walls
         alpha = np.array([self._drive.true_lines_world[wall][0] for wall in walls.tolist()])
         n, lever = normals(alpha), np.vecdot(directions(alpha), self._position - new.anchors)
         new.G_pose[:, 1, :2], new.G_pose[:, 1, 2] = n, lever
         self._alpha = np.concatenate([self._alpha, alpha])
-        return new
+        return new, new.noise(cov)

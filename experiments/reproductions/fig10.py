@@ -6,8 +6,7 @@ from matplotlib.figure import Figure
 
 from chainslam.slam.evaluation.consistency import bound_margins
 from chainslam.viz import palette
-from chainslam.viz.figures.curves import paint_map
-from chainslam.viz.figures.panels import MARGIN_M, paint_curves, paint_ellipses, panels
+from chainslam.viz.figures.panels import MARGIN_M, paint_curves, paint_ellipses, paint_map, panels
 from chainslam.viz.shapes import ellipses
 
 from ..scenario import TrialConfig

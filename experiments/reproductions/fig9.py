@@ -3,8 +3,7 @@
 import numpy as np
 
 from chainslam.explore.step import Step
-from chainslam.viz.figures.curves import SmallMap
-from chainslam.viz.figures.panels import map_panels
+from chainslam.viz.figures.panels import SmallMap, map_panels
 
 from ..scenario import TrialConfig
 from .reproduction import Numbers, Reproduction, Said

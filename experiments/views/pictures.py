@@ -6,7 +6,7 @@ one log) come together; the map, the visibility graph, the model space and the t
 
 import csv
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,9 +19,10 @@ from PIL import Image
 
 from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M, read_log, within
+from chainslam.slam.evaluation.consistency import chi2_band
 from chainslam.viz import palette
 from chainslam.viz.figures.maps import Picture, draw_map, saved
-from chainslam.viz.figures.plots import draw_model_space, draw_nees, draw_trajectories, draw_traversal
+from chainslam.viz.figures.plots import NeesCurve, draw_model_space, draw_nees, draw_trajectories, draw_traversal
 from chainslam.viz.figures.visibility import draw_graph
 from chainslam.viz.shapes import hessian_cov
 
@@ -43,6 +44,7 @@ from .saved_map import saved_map
 from .timelines import true_rings
 
 BAD_USAGE = 2
+POSE_DOF = 3
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,7 @@ class PicturedRun:
     walls: dict[str, Any]
     estimated_world: Float[np.ndarray, "s 3"]
     nees: Float[np.ndarray, " s"]
+    path_m: Float[np.ndarray, " s"]
 
 
 def read_pictured(folder: Path) -> PicturedRun:
@@ -92,13 +95,14 @@ def read_pictured(folder: Path) -> PicturedRun:
             " keep a run's files together"
         )
     arrays = {"true_poses": run.true_poses_world, "start_pose": run.start_pose, "odometry": run.recording.odometry}
-    return PicturedRun(run.trial, arrays, walls, steps[:, :3], steps[:, 3])
+    return PicturedRun(run.trial, arrays, walls, steps[:, :3], steps[:, 3], steps[:, 4])
 
 
-def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
-    """Return the estimated poses (m, m, rad) and the NEES of the pose from a run's `steps.csv`; raises UsageError.
+def read_steps(folder: Path) -> Float[np.ndarray, "s 5"]:
+    """Return estimated poses (m, m, rad), the NEES of the pose and path lengths (m) from `steps.csv`.
 
-    It is that of the pose relative to the start, and of an older run without it the pose's own.
+    The NEES is that of the pose relative to the start, and of an older run without it the pose's own. Raises
+    UsageError.
     """
     path, columns = folder / "steps.csv", ("x_m", "y_m", "heading_rad")
     with told(path, REMEDY):
@@ -106,16 +110,16 @@ def read_steps(folder: Path) -> Float[np.ndarray, "s 4"]:
             with regular(path).open(newline="", encoding="utf-8") as stream:
                 table = csv.DictReader(stream)
                 nees = "pose_nees_from_start" if "pose_nees_from_start" in (table.fieldnames or ()) else "pose_nees"
-                rows = [[float(row[name] or "nan") for name in (*columns, nees)] for row in table]
+                rows = [[float(row[name] or "nan") for name in (*columns, nees, "path_length_m")] for row in table]
         except (ValueError, KeyError, TypeError, csv.Error) as error:
             raise UnfitError("another table, or one that was cut short") from error
-        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns) + 1)
+        steps = np.array(rows, dtype=np.float64).reshape(-1, len(columns) + 2)
         if not within(steps[:, :3], MOST_M):
             raise UnfitError(f"poses that are NaN or beyond {MOST_M:g} m")
     return steps
 
 
-def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
+def draw_all(runs: Sequence[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     """Return, by name, what draws each picture of runs in one world; nothing for no run."""
     if not runs:
         return {}
@@ -132,10 +136,15 @@ def draw_all(runs: list[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     colours = [palette.of_backend(trial.backend)] * count
     return {
         "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and believed", wheels),
-        "nees": lambda: draw_nees({run.trial.backend: run.nees for run in runs}, f"{title}: NEES of the pose"),
+        "nees": lambda: draw_nees([_curve(run) for run in runs]),
         "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
         "traversals": lambda: draw_traversal(true, rings, f"{title}: how often each stretch was driven"),
     }
+
+
+def _curve(run: PicturedRun) -> NeesCurve:
+    band = np.tile(np.array(chi2_band(POSE_DOF))[:, None], len(run.nees))
+    return NeesCurve(run.trial.backend, run.path_m, run.nees, band)
 
 
 def draw_maps(folder: Path, shown: Picture) -> dict[str, Callable[[], Figure]]:

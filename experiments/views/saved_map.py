@@ -13,8 +13,9 @@ from chainslam.slam.estimation.backend import Belief, Joint, StaleBeliefError
 from chainslam.slam.map.chains import HEAD, TAIL, Chain, OpenEnd
 from chainslam.slam.map.stochastic_map import StochasticMap
 from chainslam.viz.figures.maps import Picture
+from chainslam.viz.figures.panels import SmallMap
 
-from ..artifacts.maps.map_files import read_features
+from ..artifacts.maps.map_files import read_features, read_map
 from ..artifacts.maps.picture import over_truth
 from ..artifacts.reading import told
 from ..artifacts.saved import REMEDY, read_summary
@@ -55,15 +56,32 @@ def saved_map(
         SetAside(end["wall"], end["side"], np.array(end["position_m"]), end["why"])
         for end in summary.get("set_aside") or ()
     ]
+    world = load_world(trial.world, trial.start, trial.drawing)
+    return over_truth(
+        world, trial, summary, _map(walls), _chains(features["chain"]),
+        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
+    )  # fmt: skip
+
+
+def picture_alone(folder: Path, path_world: Float[np.ndarray, "s 3"]) -> Picture:
+    """Return the picture of a map with nothing under it, from a run's folder; raises UsageError."""
+    walls = read_map(folder)
+    return Picture(_map(walls), _chains(read_features(folder, walls["ids"])["chain"]), path_world, "")
+
+
+def _map(walls: Mapping[str, np.ndarray]) -> StochasticMap:
     belief = Belief(
         walls["pose"], walls["cov"][:3, :3], walls["ids"], walls["anchors"], walls["lines"], _not_to_be_asked
     )
-    marks = walls["sightings"], walls["tentative"], walls["crooked"]
-    world = load_world(trial.world, trial.start, trial.drawing)
-    return over_truth(
-        world, trial, summary, StochasticMap(belief, walls["extents"], *marks), _chains(features["chain"]),
-        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
-    )  # fmt: skip
+    return StochasticMap(belief, walls["extents"], walls["sightings"], walls["tentative"], walls["crooked"])
+
+
+def small_map(shown: Picture) -> SmallMap:
+    """Return the map of a picture as one that stands beside others."""
+    closed = [wall for chain in shown.chains if chain.is_closed for wall in chain.walls]
+    walls = shown.map
+    is_closed = np.isin(walls.ids, closed)
+    return SmallMap("", walls.ends_world, is_closed, walls.tentative, shown.path_world[:, :2], shown.true_floor)
 
 
 def _not_to_be_asked(ids: np.ndarray) -> Joint:

@@ -1,7 +1,6 @@
 """The settings of a trial as a JSON Schema: their ranges and units, and the words that stand below them."""
 
 import inspect
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +9,9 @@ from docstring_parser import parse_from_object
 from msgspec.json import schema
 
 from chainslam.sim.logs.recorded_robot import FORMAT
-from chainslam.slam.geometry.quantities import allowed
 
 from ..artifacts.saved import SavedConfig
 from ..artifacts.schema import group_of, settings_in
-from ..artifacts.settings import defaults, leaves
 from ..scenario import TrialConfig
 
 
@@ -35,36 +32,6 @@ def groups() -> Iterator[Group]:
         yield group
         inner = [(name, group_of(kind)) for name, kind in settings_in(group.kind).items()]
         waiting += [Group(f"{group.key}.{name}".strip("."), kind) for name, kind in reversed(inner) if kind is not None]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A setting of a trial, in words."""
-
-    group: Group
-    name: str
-    default: str
-    """As JSON."""
-    allows: str
-    """What it may be: a kind of value, from where to where, in which unit."""
-    says: str
-    """What it is."""
-
-    @property
-    def key(self) -> str:
-        """Dotted, as `--set` takes it."""
-        return f"{self.group.key}.{self.name}".strip(".")
-
-
-def settings() -> Iterator[Setting]:
-    """Yield every setting of a trial, group by group."""
-    known = dict(leaves(defaults()))
-    for group in groups():
-        told = words_of(group.kind)
-        for name, kind in settings_in(group.kind).items():
-            if group_of(kind) is None:
-                key = f"{group.key}.{name}".strip(".")
-                yield Setting(group, name, json.dumps(known[key]), allowed(schema(kind)), told.get(name, ""))
 
 
 def config_schema(some: bool = False) -> dict[str, Any]:

@@ -18,26 +18,26 @@ from .kept_scans import NO_PLACES, KeptScan, beside, told
 
 @dataclass(frozen=True)
 class FloorMemoryConfig:
-    """Which scans are kept, and when the grid is drawn anew."""
+    """Which scans are kept, and when the floor grid is redrawn because the map moved."""
 
     robot: RobotSpec = of_robot()
     spacing_m: Size = 0.25
-    """Of the scans taken in one square of this side the last one is kept."""
+    """Side of the squares in each of which only the latest scan is kept."""
     walls: Count = 8
-    """So many of the nearest walls carry a kept scan with them."""
+    """Number of nearest walls that carry a kept scan along when they move."""
     moved_m: Distance = 0.1
-    """The grid is drawn anew once floor seen from a kept scan has moved this far with its walls."""
+    """The grid is redrawn once the floor seen by a kept scan has moved this far with its walls."""
     arm_m: Distance = 2.0
-    """How far that floor lies from the scan, for what a turn of the walls moves."""
+    """Distance of the floor from the scan that saw it, by which a turn of the walls becomes a displacement."""
     rest_steps: Number = 20
-    """So many steps at least, and a tenth of the scans kept, lie between two looks at how far the walls have moved."""
+    """Smallest number of steps between two checks of how far the walls have moved; at least a tenth of the number of
+    kept scans."""
     faith_m: Size = 0.01
-    """Where no wall nearby tells, a scan moves as the one kept before it did: worth this many metres of wall."""
+    """Weight, in metres of wall, of the assumption that a kept scan moves as the one before it did."""
     redrawn: Count = 500
-    """So many kept scans are drawn anew in one step, in 30 to 50 ms; where there are more, the old grid stays in use
-    for as long."""
+    """Number of kept scans that are redrawn in one step; meanwhile the old grid stays in use."""
     last_m: Size = 15.0
-    """The last scans, of the steps that so long a way takes, are enough to begin the grid anew."""
+    """Path length whose scans are kept to begin the grid anew."""
 
     @property
     def last_scans(self) -> int:

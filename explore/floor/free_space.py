@@ -22,22 +22,21 @@ _FARTHEST_M = 1e9
 
 @dataclass(frozen=True)
 class FreeSpaceConfig:
-    """The grid and how evidence gathers in it."""
+    """The occupancy grid of the floor."""
 
     robot: RobotSpec = of_robot()
     cell_m: Size = 0.05
-    """Side of a cell: a third of a step."""
+    """Cell size."""
     hit: Count = 3
-    """What one hit adds to a cell; a beam that passes takes one away."""
+    """Evidence that a hit adds to a cell; a beam that passes through subtracts 1."""
     limit: Count = 6
-    """Evidence stays within plus and minus this, so that a wrong cell is soon mended."""
+    """Largest absolute evidence of a cell; the lower, the sooner a wrong cell is corrected."""
     fence: Annotated[tuple[tuple[Place, Place], ...], Meta(min_length=3)] | None = None
-    """Corners of a polygon that the robot keeps within, m, world frame; None where nothing bounds it. What lies beyond
-    is no floor: nothing there is driven to or looked for."""
+    """Corners of a polygon in the world frame that the robot stays within; what lies beyond is not explored."""
     cells_max: Count = 100_000_000
-    """A grid of more cells is refused: 500 m by 500 m, 0.6 GB."""
+    """Largest number of cells; the default allows 500 m by 500 m, which take 0.6 GB."""
     clearance_beyond_m: Distance = 0.8
-    """Clearances are exact up to the radius and this; beyond, they are at least that."""
+    """Clearances are exact up to the robot's radius plus this distance, and bounded from below beyond it."""
 
     @property
     def body_m(self) -> float:

@@ -10,43 +10,43 @@ from chainslam.slam.robot import RobotSpec, of_robot
 
 @dataclass(frozen=True)
 class DrivingConfig:
-    """How fast one step goes, and how near to a return it may bring the disc."""
+    """How the robot drives along a path, and how close to the returns of a scan it may come."""
 
     robot: RobotSpec = of_robot()
     spin_rad: Angle = float(np.deg2rad(30.0))
-    """With more than this to turn, the robot turns on the spot first."""
+    """The robot turns on the spot first if its aim is more than this to one side."""
     lookahead_m: Size = 0.6
-    """How far ahead on its path the robot aims; half as far, and half again, where no step towards that is safe ..."""
+    """Distance ahead on the path at which the robot aims; it is halved while no safe step leads there."""
     least_lookahead_m: Size = 0.15
-    """... but no less than this, ..."""
+    """Lookahead at which `lookahead_m` is no longer halved."""
     short_points: Number = 8
-    """... for so many points of the path, 0.05 m apart."""
+    """Number of path points, 0.05 m apart, over which a shortened lookahead stays in use."""
     margin_m: Distance = 0.02
-    """Least distance kept between disc and returns, unless the step leads away from them."""
+    """Smallest distance kept between the body and any return, unless the step leads away from it."""
     careful_m: Size = 0.05
-    """Longest step onto floor that was not seen yet."""
+    """Longest step onto floor that no scan has seen, and through narrow gaps."""
     narrow_beyond_m: Distance = 0.15
-    """Where returns on both sides of the way leave less than this beside the body, the robot aims for the middle,
-    slowly ..."""
+    """A gap is narrow if it is wider than the body by less than this; there the robot aims for the middle and drives
+    slowly."""
     narrow_margin_m: Distance = 0.01
-    """... keeps at least this from them, ..."""
+    """Smallest distance kept from any return in a narrow gap."""
     narrow_spin_rad: Angle = float(np.deg2rad(4.0))
-    """... turns on the spot first with more than this to turn, ..."""
+    """In a narrow gap the robot turns on the spot first if its aim is more than this to one side."""
     give_m: Distance = 0.003
-    """Where less than that is left between two sides already, a step may take this much of it, ..."""
+    """In a narrow gap, how much closer to a return one step may lead if less than `narrow_margin_m` is left."""
     least_margin_m: Distance = 0.004
-    """... down to this. Beside a lone return there is room: that much is below a range's noise."""
+    """Smallest distance kept from any return in a narrow gap, whatever `give_m` allows."""
     fits_beyond_m: Distance = 0.025
-    """... and does not try where they leave less than this beside the body: returns tell the width to a centimetre.
-    Where it stands between the two, it does fit: """
+    """A gap that is wider than the body by less than this is not entered."""
     within_m: Distance = 0.05
-    """the line from one to the other passes so near to the robot's middle."""
+    """The robot counts as inside a gap, and drives on, if its middle is this close to the line between the gap's
+    sides."""
     beside_m: Distance = 0.1
-    """Beside the way are returns from this far behind the robot to this far beyond its aim."""
+    """Returns from this far behind the robot to this far beyond its aim count as the sides of a gap."""
     obstructed_within_m: Distance = 0.03
-    """A return nearer to the path ahead than the radius less this is in the way, since the path keeps to a grid."""
+    """A return that reaches into the body's path by more than this is an obstacle, and another path is planned."""
     arrived_m: Distance = 0.08
-    """The end of the path counts as reached within this."""
+    """The end of a path counts as reached within this distance."""
 
     @property
     def radius_m(self) -> float:

@@ -34,35 +34,37 @@ Following = Literal["viewpoints", "paper"]
 
 @dataclass(frozen=True)
 class FollowingConfig:
-    """The rules of the lowest layer."""
+    """How the robot approaches and explores an open end."""
 
     robot: RobotSpec = of_robot()
     method: Following = "viewpoints"
-    """How an open end is explored: from viewpoints, or by following its wall to and fro, as the paper does."""
+    """How an open end is explored: from viewpoints, or by following its wall back and forth as in the paper."""
     ping_pongs: Count = 1
-    """By the paper's following, a wall is given up after so many times to and fro along it without a change of the
+    """By the paper's method, a wall is given up after it was followed back and forth this often without a change of the
     map."""
     navigation: Navigation = "floor"
-    """How the robot finds its way: over the floor seen free, or by sequences of walls."""
+    """How paths are planned: over the floor seen free, or along sequences of walls in the visibility graph."""
     paths: PathConfig = field(default_factory=PathConfig)
     driving: DrivingConfig = field(default_factory=DrivingConfig)
     viewpoints: ViewpointsConfig = field(default_factory=ViewpointsConfig)
     window_m: Size = 6.0
-    """Paths are sought this far around the robot first, then along the route of walls, then everywhere."""
+    """A path is first searched within this distance of the robot, then along the planned walls, then on the whole
+    floor."""
     moved_m: Distance = 0.2
-    """An end that moved by more than this is looked at afresh."""
+    """An open end whose estimate moves farther than this is viewed again from the beginning."""
     tries: Number = 4
-    """A place to which the way was blocked this often is given up."""
+    """A viewpoint is given up once its path was blocked this often."""
     squeezes: Number = 2
-    """A gap hardly wider than the body is tried this often."""
+    """A gap barely wider than the body is given up after this many failed attempts."""
     stall_m: Size = 9.0
-    """An errand ends when the way to its place grew no shorter for the steps that so long a way takes."""
+    """A goal is given up if its remaining path has not become shorter within as many steps as a path of this length
+    takes."""
     shorter_m: Distance = 0.02
-    """Shorter by less than this is no shorter: a path over cells of 0.05 m differs so much from step to step."""
+    """Smallest decrease of the remaining path that counts as progress."""
     wider_m: Distance = 0.01
-    """So much farther from walls the way is sought after each failure."""
+    """Additional clearance demanded of a path after each failure to drive it."""
     apart_m: Distance = 0.12
-    """No look is made from a place this near to an earlier one."""
+    """No view is taken from a place this close to an earlier one."""
 
     @property
     def stall_steps(self) -> int:

@@ -14,34 +14,37 @@ from .sweep import SweepConfig
 
 @dataclass(frozen=True)
 class ExplorerConfig:
-    """When an end is given up, and for how long."""
+    """When an open end is blacklisted (no longer a goal), and when it is tried again."""
 
     robot: RobotSpec = of_robot()
     following: FollowingConfig = field(default_factory=FollowingConfig)
     near_beyond_m: Distance = 0.1
-    """Ends, and places to be visited, no farther apart than the radius and this, the errors of a map, are one."""
+    """Open ends, and places to be visited, that are closer together than the robot's radius plus this count as one
+    place."""
     moved_m: Distance = 0.2
-    """An end that was set aside is tried again when it has moved this far."""
+    """A blacklisted open end is tried again once its estimate has moved this far."""
     attempts: Count = 3
-    """So many ends set aside at one place (as above) are enough: it is not tried again."""
+    """A place at which open ends were blacklisted this often is not tried again."""
     returns: Number = 8
-    """An end that was gone so often while the robot was about it, and came back, is set aside."""
+    """An open end that has disappeared and come back this often while the robot explored it is blacklisted."""
     grown: Share = 0.1
-    """An end that could not be looked at is tried again when so much more of the floor around it is known."""
+    """An open end that could not be viewed is tried again once the known floor around it has grown by this share."""
     round_things: RoundConfig = field(default_factory=RoundConfig)
-    """Ends on these are set aside without a look of their own."""
+    """Open ends on these obstacles are blacklisted without being viewed."""
     patience_m: Size = 60.0
-    """A goal that takes more steps than so long a way is set aside."""
+    """A goal that takes more steps than a path of this length is blacklisted."""
     wait_s: Wait = 10.0
-    """Where something moved, what was given up is tried again so long after the last of it was, ..."""
+    """Time after the last goal was given up before all of them are tried again, if something in the building moved."""
     again: Number = 3
-    """... at most so often in a run, ..."""
+    """How often in a run all goals are tried again because something moved."""
     moving_scans: Count = 3
-    """... and something moved if so many scans show it."""
+    """Number of scans that must show a moving object before goals are tried again for that reason."""
     second_looks: Number = 4
-    """Before it ends, the robot turns on the spot this often while there are tentative walls."""
+    """Number of additional scans, each after a turn on the spot, taken before the run ends if there are tentative
+    walls."""
     sweep: bool = True
-    """After the last chain, visit what is reachable and unseen."""
+    """After the last open end, visit reachable floor that no scan has seen and obstacles that are no wall of the
+    map."""
     sweeping: SweepConfig = field(default_factory=SweepConfig)
 
     @property

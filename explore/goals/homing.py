@@ -22,11 +22,11 @@ from .explorer import Explorer
 
 @dataclass(frozen=True)
 class HomingConfig:
-    """When the robot is at its start again."""
+    """The drive back to the start."""
 
     robot: RobotSpec = of_robot()
     rounds: Number = 5
-    """What the way home shows is explored too, and the robot goes home again; a bound, so that every mission ends."""
+    """How often the robot drives home and explores what came into sight on the way before it ends."""
 
     @property
     def home_m(self) -> float:

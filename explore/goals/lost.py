@@ -27,11 +27,11 @@ from .decider import Decision, Driver
 
 @dataclass(frozen=True)
 class LostConfig:
-    """How long a robot looks for itself."""
+    """How long a lost robot searches for its place."""
 
     robot: RobotSpec = of_robot()
     turns: Factor = 1.1
-    """A robot that found nowhere after so many turns on the spot gives up."""
+    """Number of full turns on the spot after which a robot that finds no place in the map gives up."""
 
     @property
     def steps(self) -> int:

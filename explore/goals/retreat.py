@@ -27,19 +27,19 @@ from .decider import Decider, Decision
 
 @dataclass(frozen=True)
 class RetreatConfig:
-    """How far back, and how often."""
+    """How the robot backs out where it is locked in, and when it begins its floor grid anew."""
 
     robot: RobotSpec = of_robot()
     locked_back_m: Distance = 1.0
-    """So far the robot backs out where it believed itself locked in: through a door."""
+    """Distance that the robot backs out where it believed itself locked in."""
     last_m: Size = 2.0
-    """A robot that cannot drive back along so much of its way, is locked in."""
+    """A robot that cannot drive back along this much of its path is locked in."""
     near_m: Distance = 0.3
-    """It is back if it gets so near: the odometry tells the way no better."""
+    """Distance from a place on its path within which the robot counts as back there."""
     way_share: Share = 0.9
-    """Where it could drive to less of all its way, the floor contradicts the map: it begins the floor anew."""
+    """If the robot has no goal left and could drive to less than this share of its path, it begins the grid anew."""
     rounds: Number = 8
-    """So often at most, and never twice within `last_m` of way."""
+    """How often the grid may be begun anew in one run; in between the robot must have driven `last_m`."""
 
     @property
     def touched_back_m(self) -> float:

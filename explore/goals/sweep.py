@@ -19,12 +19,12 @@ from .ledger import Event, Ledger
 
 @dataclass(frozen=True)
 class SweepConfig:
-    """How often a place is visited."""
+    """How places are visited after the last open end."""
 
     visits: Number = 2
-    """A border of unseen floor, or a thing that is no wall, that is still one after so many visits is left."""
+    """Unseen floor, or an obstacle that is no wall of the map, is left alone after this many visits."""
     reach: Part = 0.8
-    """Unseen floor in a hall is looked at from within this share of the scanner's range."""
+    """Unseen floor far from walls is viewed from within this share of the scanner's range."""
 
 
 class Sweep:

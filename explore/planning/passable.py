@@ -21,30 +21,28 @@ COAST_SHARE = 0.75
 
 @dataclass(frozen=True)
 class PathConfig:
-    """How near to walls a path may lead, and what it pays for it."""
+    """How close to walls a path may pass, and what that costs."""
 
     robot: RobotSpec = of_robot()
     margin_m: Distance = 0.025
-    """Least distance m kept beyond the radius, between cell centres."""
+    """Smallest clearance beside the body on a regular path, between cell centres."""
     squeeze_beyond_m: Distance = 0.0
-    """Through gaps narrower than that, down to this clearance beyond the radius, between cell centres, the robot
-    squeezes where no other way leads: a door 0.05 m wider than the body shows no more on the grid. The scan tells
-    whether it fits."""
+    """Smallest clearance beside the body in narrow gaps, which are used only where no regular path exists."""
     squeeze_cost: Weight = 20.0
-    """What a metre of squeezing costs on top."""
+    """Additional cost of a metre with less clearance than `margin_m`; a metre on open floor costs 1."""
     tight_beyond_m: Distance = 0.1
-    """Within the radius and this of a place where the body did not fit it is not tried again."""
+    """A gap is not tried again within this distance, beside the body, of a place where the body did not fit."""
     standoff_beyond_m: Distance = 0.15
-    """A body this far from walls pays nothing; it yields in narrow passages, the margin does not."""
+    """Clearance beyond the body's radius from which on a path costs nothing extra."""
     narrow_cost: Weight = 4.0
-    """A metre at the least clearance costs this much more than one at the stand-off."""
+    """Additional cost of a metre at the smallest regular clearance; it falls to 0 at that of `standoff_beyond_m`."""
     coast_m: Size = 3.0
-    """Farther than this from any wall, or than three quarters of its range, the scanner shows too little to tell where
-    the robot is, ..."""
+    """Distance from the nearest wall beyond which localisation counts as poor, at most three quarters of the scanner's
+    range."""
     blind_cost: Weight = 4.0
-    """... and a metre costs so much more: a way along the walls is worth a detour."""
+    """Additional cost of a metre where localisation counts as poor."""
     escape_beyond_m: Distance = 0.1
-    """So far around the body free cells count as passable however near a wall is: it may have to get away."""
+    """Free cells this close to the body count as passable at any clearance, so that the robot can leave a wall."""
 
     def coast_of(self, range_m: float) -> float:
         """Return how far from walls a scanner of this range shows enough of them."""

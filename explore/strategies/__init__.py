@@ -15,7 +15,7 @@ from .uncertainty import Uncertainty
 
 @dataclass(frozen=True)
 class StrategyEntry:
-    """How to make a strategy, and what it is."""
+    """An entry of the registry of strategies."""
 
     make: Callable[[], Strategy]
     description: str

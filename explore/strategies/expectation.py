@@ -1,5 +1,5 @@
 """What the map says about a place before the robot goes there: how well it would know where it stands, and what it
-would learn about the walls (derived in docs/exploration.md). Pure functions of the joint covariance.
+would learn about the walls (derived in docs/concepts/exploration.md). Pure functions of the joint covariance.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How inconsistent a filter must be, from what it cannot hide (derived in docs/exploration.md); never from the truth.
+"""How inconsistent a filter must be, without the truth (docs/contributing/exploration-notes.md).
 
 Three signs: information gained along directions that no scan can tell, innovations larger than stated, and heading
 lost while no wall was in sight. They predict by how much a wall that is met again will be off.
@@ -31,7 +31,7 @@ def gained_information(joint: Joint, start_world: Float[np.ndarray, 3], start_co
     """Return how many times the information about a shift and turn of everything exceeds the start's, at its worst.
 
     Nothing that the robot sees can raise it: an honest belief has at most 1, whatever lines are in `joint`
-    (docs/estimation.md, "The bound"). Infinite for a covariance that is none.
+    (docs/concepts/consistency.md, "The bound"). Infinite for a covariance that is none.
     """
     N = motion_of_everything(joint)
     to_start = np.eye(POSE)

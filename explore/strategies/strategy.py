@@ -1,4 +1,4 @@
-"""The protocol that every exploration strategy keeps: from what is known to a goal and the reason for it."""
+"""The protocol of exploration strategies: from the present knowledge to a goal and the reason for it."""
 
 from __future__ import annotations
 
@@ -24,43 +24,43 @@ from ..survey.viewpoints import ideal_places
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Somewhere to stand; any of its points will do."""
+    """A goal that is reached at any one of its points."""
 
     points_world: Float[np.ndarray, "n 2"]
     what: str
-    """What it is, in words: the robot drives `to where {what}`."""
+    """Completes the sentence "to where ...", which describes the goal."""
     kind: str = "unseen"
-    """The kind of `Goal` that it makes."""
+    """Kind of the goal in reports."""
     about_world: Float[np.ndarray, 2] | None = None
-    """What is to be seen from there, m, if it is something else than the place itself."""
+    """Position of what is viewed from there, m, if it is not the place itself."""
 
     @property
     def centre_world(self) -> Float[np.ndarray, 2]:
-        """What it is about, else the middle of its points, m."""
+        """Position of what is viewed, or the middle of the points, m."""
         return self.points_world.mean(axis=0) if self.about_world is None else self.about_world
 
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """What a strategy may read: the map and its covariance, the floor seen free, never the truth.
+    """What a strategy may read: the map with its covariance and the free floor, but never the truth.
 
-    What costs time is computed when it is first asked for.
+    Costly properties are computed when they are first used.
     """
 
     around: Surroundings
     chains: tuple[Chain, ...]
     open_ends: tuple[OpenEnd, ...]
-    """The open ends that exploration has not set aside; there may be none."""
+    """The open ends that are not blacklisted; there may be none."""
     graph: nx.DiGraph[int]
-    """The visibility graph: an edge from one wall to another means that this was seen while that was followed."""
+    """The visibility graph: an edge leads from a wall to one that was seen while the robot followed it."""
     start_world: Float[np.ndarray, 2]
-    """Where the robot began, m."""
+    """Position of the start, m."""
     step: int
-    """Number of the step, from 0."""
+    """Index of the step, from 0."""
     was_in_vain: Callable[[Float[np.ndarray, 2]], bool]
-    """Whether going to a place was of no use before."""
+    """Whether earlier visits to a place brought nothing."""
     following: FollowingConfig
-    """How the robot drives to what is chosen: its paths, its places to look from."""
+    """Settings by which the robot drives to its goals and views them."""
 
     @cached_property
     def current_wall(self) -> int | None:
@@ -69,22 +69,22 @@ class Situation:
 
     @property
     def map(self) -> StochasticMap:
-        """The walls, and through `map.belief` their covariance."""
+        """The walls; `map.belief` has their covariance."""
         return self.around.walls
 
     @cached_property
     def field(self) -> DrivingField:
-        """How far it is to drive from the robot to anywhere."""
+        """Driving distances from the robot to all reachable floor."""
         return DrivingField(self.around.free_space, self.around.pose_world[:2], self.following.paths)
 
     @cached_property
     def end_metres(self) -> Float[np.ndarray, " n"]:
-        """How far it is to drive to where each open end can be looked at, m; infinite where no way is known."""
+        """Driving distance to a viewpoint of each open end, m; infinite if no path is known."""
         return self._end_metres(beyond_nearest=True)
 
     @cached_property
     def nearest_end_metres(self) -> Float[np.ndarray, " n"]:
-        """The same, but only the least of them counts: any other may be infinite. Much cheaper in a large building."""
+        """As `end_metres`, but only the smallest distance is exact: much cheaper in a large building."""
         return self._end_metres(beyond_nearest=False)
 
     def _end_metres(self, beyond_nearest: bool) -> Float[np.ndarray, " n"]:
@@ -94,12 +94,12 @@ class Situation:
 
     @cached_property
     def frontiers(self) -> tuple[Place, ...]:
-        """The frontiers between floor that can be driven to and floor never seen, the useless ones left out."""
+        """Frontiers between reachable and unseen floor, without those that were visited in vain."""
         return self._places(frontiers(self.around.free_space, self.field))
 
     @cached_property
     def frontiers_near(self) -> tuple[Place, ...]:
-        """Pieces of those frontiers that lie near to the robot: a fraction of the cost in a large building."""
+        """Pieces of the frontiers close to the robot, at a fraction of the cost in a large building."""
         borders = frontiers(self.around.free_space, self.field, only_near=True)
         return self._places([piece for border in borders for piece in pieces(border) if len(piece) >= LEAST_CELLS])
 
@@ -109,7 +109,7 @@ class Situation:
 
     @cached_property
     def unmapped_obstacles(self) -> tuple[Place, ...]:
-        """Where to stand before each thing that stopped beams and is no wall of the map, the useless ones left out."""
+        """Viewpoints of each obstacle that is no wall of the map, without those that were visited in vain."""
         floor = self.around.free_space
         things = [thing for thing in unmapped_obstacles(floor, self.map) if not self.was_in_vain(thing.mean(axis=0))]
         places = [(obstacle_viewpoints(thing, self.field), thing) for thing in things]
@@ -123,28 +123,27 @@ def _always(around: Surroundings) -> bool:
 
 @dataclass(frozen=True)
 class Choice:
-    """Where to go and why."""
+    """A goal and the reason for it."""
 
     target: OpenEnd | Place
     reason: str
     holds: Callable[[Surroundings], bool] = _always
-    """Asked at every step on the way: the goal is dropped once it answers no. (An end that is no longer open is dropped
-    anyway.)"""
+    """Called at every step; the goal is dropped once this returns False, or its end is no longer open."""
 
 
 @runtime_checkable
 class Strategy(Protocol):
-    """Chooses where to explore next; it may keep a memory between choices."""
+    """Chooses where to explore next; it may keep a state between choices."""
 
     def choose(self, situation: Situation) -> Choice | None:
-        """Return the choice, or None where there is nothing it would drive to now."""
+        """Return the next goal, or None if there is none at present."""
         ...
 
 
 @runtime_checkable
 class Watchful(Strategy, Protocol):
-    """A strategy that looks at every step, and not only where it is to choose."""
+    """A strategy that is called at every step, not only for a choice."""
 
     def watch(self, around: Surroundings) -> None:
-        """Take note of one more scan."""
+        """Take in one more scan."""
         ...

@@ -1,4 +1,4 @@
-"""The open end with the best expected gain for its way, by the joint covariance (D-optimality; docs/exploration.md)."""
+"""The open end of the best expected gain a metre, by the joint covariance (docs/concepts/exploration.md)."""
 
 import numpy as np
 from jaxtyping import Float

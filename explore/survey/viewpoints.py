@@ -23,21 +23,22 @@ LANE_EVERY_M = 0.25
 
 @dataclass(frozen=True)
 class ViewpointsConfig:
-    """The places from which an end is looked at."""
+    """The places from which an open end is viewed."""
 
     robot: RobotSpec = of_robot()
     standoff_beyond_m: Distance = 0.15
-    """Distance of the body at which a wall is followed and its end rounded."""
+    """Distance between body and wall while a wall is followed and its end is rounded."""
     close_beyond_m: Distance = 0.05
-    """Distance of the body at the last, close look."""
+    """Distance between body and wall at the last, close view."""
     slack_m: Distance = 0.25
-    """A place this near to the ideal one will do."""
+    """Largest distance between the ideal viewpoint and the one that is used."""
     near_m: Distance = 1.2
-    """Where none of the ideal places can be reached, any place within this that sees the end."""
+    """If no ideal viewpoint can be reached, any place this close to the open end that sees it is used."""
     far_m: Distance = 3.5
-    """And where there is none, any place within this, and not too far for the scanner."""
+    """If there is none within `near_m`, any place this close that sees the open end is used, up to 0.875 of the
+    scanner's range."""
     short_m: Distance = 0.12
-    """A line of sight need not come nearer than this to the end itself."""
+    """A line of sight may stop this far short of the open end."""
 
     @property
     def standoff_m(self) -> float:

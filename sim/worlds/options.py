@@ -11,22 +11,22 @@ from .drawing import WorldError, shorten
 
 @dataclass(frozen=True)
 class DrawingOptions:
-    """How to read a drawing; what is not said is as the file says, or as it is assumed where the file is silent."""
+    """How to read a drawing; what is not given here is taken from the file, or assumed where the file does not say."""
 
     scale: Factor | None = None
-    """Metres per pixel or drawing unit, for files that do not say."""
+    """Metres per drawing unit or pixel, in place of what the file states."""
     layers: tuple[str, ...] = ()
-    """Layers, groups or classes of an SVG or DXF file that are drawn, and no others; * stands for any letters."""
+    """Only these layers, groups or classes of an SVG or DXF file are drawn; `*` matches any letters."""
     ids: tuple[str, ...] = ()
-    """Shapes and groups of an SVG file that are drawn, by their id, beside those of --layers."""
+    """Shapes and groups (in a DXF file: blocks) that are drawn by their id, in addition to those of `layers`."""
     without: tuple[str, ...] = ()
-    """Layers, groups, classes and ids that are left out: dimensions, furniture, door swings."""
+    """Layers, groups, classes, ids or blocks that are left out, such as dimensions, furniture and door swings."""
     level: str | None = None
-    """The storey, of a GeoJSON file with several."""
+    """Storey to read of a GeoJSON file with several; by default 0, or the lowest above it."""
     threshold: Part | None = None
-    """Lightness, 0 to 1, below which a pixel of a bare picture is a wall; 0.63 where none is named."""
+    """Pixels of a picture darker than this lightness (0 is black, 1 is white) are walls; 0.63 if not given."""
     negate: bool = False
-    """In a bare picture, light is wall and dark is free."""
+    """In a picture, light pixels are walls and dark ones are free space."""
 
     def __post_init__(self) -> None:
         """Refuse what means nothing; raises WorldError."""

@@ -24,28 +24,29 @@ MatchingMethod = Literal["joint", "paper"]
 
 @dataclass(frozen=True)
 class MatchingConfig:
-    """When a segment and a wall are one."""
+    """How segments are associated with the walls of the map."""
 
     shared: SharedConfig = of_shared()
     method: MatchingMethod = "joint"
-    """All segments of a scan together, or each alone by `gate` and `shared.within_m`, as in the paper (`methods`)."""
+    """Associate all segments of a scan jointly, or each one alone by `gate` and `mission.mapper.shared.within_m` as in
+    the paper."""
     gate: Probability = 0.99
-    """Probability level of the chi-square gate. By as much as its level any other wall has to cost more, for a match to
-    be clear."""
+    """Probability level of the chi-square gate; a match is unambiguous if every other wall has a cost higher by the
+    gate's chi-square value."""
     angle_rad: Angle = 1.05
-    """Normals that differ by more than this are never compared (the other side of a wall differs by pi)."""
+    """Segments and walls whose normals differ by more than this are never compared; those of a wall's two faces differ
+    by pi."""
     beside_rad: Angle = 0.35
-    """Largest turn of a short segment that lies along a wall, beyond what is not known of its direction."""
+    """Largest angle between a short segment and the wall that it lies along, beyond the uncertainty of its
+    direction."""
     one_wall: Probability = 0.9999
-    """Probability level within which two landmarks of the map may be one wall, so that either will do; where they lie
-    along each other they are made one. One true pair in 10,000 is refused, and stays, since each observation goes to
-    the landmark that it fits better, which keeps them apart."""
+    """Probability level of the chi-square gate within which two walls of the map may be one, and are merged if they
+    overlap."""
     overlap_m: Distance = 0.02
-    """A segment and its wall overlap along the line by at least this: two rooms' walls on one line stand no farther
-    apart than a wall is thick."""
+    """Smallest overlap of a segment and its wall along the line."""
     density: Factor = 0.1
-    """Walls that nobody has seen, per radian of direction and metre of offset: five in sight of 4 m. The only wall in
-    sight is matched beyond the gate too where a new one would be less likely."""
+    """Density of unmapped walls, per radian and metre: the higher it is, the sooner a segment outside the gate of the
+    only wall in sight is a new wall."""
 
     @property
     def doubt(self) -> float:

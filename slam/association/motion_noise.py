@@ -22,12 +22,11 @@ from .kernels import motion_kernels
 
 @dataclass(frozen=True)
 class MotionNoiseConfig:
-    """When the stated noise of the wheels is no longer believed."""
+    """When the wheels are taken to be noisier than stated."""
 
     shared: SharedConfig = of_shared()
     window: Count = 50
-    """Scans that are weighed together. Honest wheels are taken for worse by chance alone (`shared.chance`), by the
-    likelihood ratio."""
+    """Number of scans whose innovations are tested together."""
 
 
 FACTORS = np.array([0.5, 0.7, 1.5, 2.0, 3.0, 4.0, 6.0])

@@ -27,21 +27,20 @@ FINE = 0.5
 
 @dataclass(frozen=True)
 class PlaceSearchConfig:
-    """How finely places are tried, and what proves that one is right."""
+    """How finely a pose is searched, and when the best one is accepted."""
 
     cell_m: Size = 0.1
-    """Size of a cell of the search, and the standard deviation by which likelihood falls with the distance from a
-    known point."""
+    """Cell size of the search, and standard deviation of the likelihood field around each known point."""
     step_rad: Turn = ScanMatchingConfig.step_rad
-    """Between two turns that are tried."""
+    """Step between the headings that are tried."""
     least: Share = ScanMatchingConfig.slip_score
-    """A place must have so large a mean likelihood, ..."""
+    """Smallest mean likelihood of an accepted pose."""
     rival: Share = 0.9
-    """... and no other place more than this share of it, ..."""
+    """Largest likelihood of any other place, relative to the accepted one."""
     apart_m: Distance = 0.5
-    """... where places farther apart than this, or than ..."""
+    """Poses farther apart than this are different places."""
     apart_rad: Angle = float(np.deg2rad(10.0))
-    """... this, are others."""
+    """Poses whose headings differ by more than this are different places."""
 
     @property
     def cov(self) -> Float[np.ndarray, "3 3"]:

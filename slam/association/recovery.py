@@ -33,26 +33,26 @@ from .view import View
 
 @dataclass(frozen=True)
 class RecoveryConfig:
-    """How far a robot may have moved without saying so, what proves that it did, and when it is lost."""
+    """How an unmodelled motion (slip, bump, kidnapping) is detected, and how a lost robot is relocalised."""
 
     shared: SharedConfig = of_shared()
     shift_m: Deviation = 0.3
-    """Standard deviation of the place after a motion that was not reported."""
+    """Standard deviation of the position after an unmodelled motion."""
     turn_rad: Spread = float(np.deg2rad(15.0))
-    """Standard deviation of the heading after it."""
+    """Standard deviation of the heading after an unmodelled motion."""
     least_segments: Number = 3
-    """So many segments more must belong to known walls than without the motion, ..."""
+    """Number of segments that an unmodelled motion must explain beyond those explained without it."""
     least_share: Share = 0.5
-    """... and so large a share of all. The robot is lost if more than this share of the beams towards known walls goes
-    through them, ..."""
+    """Share of the segments that it must explain; also, the robot is lost if more than this share of its beams passes
+    through known walls."""
     least_beams: Number = 20
-    """... of so many at least, towards walls a short face from their ends and the beams as far past them."""
+    """Smallest number of beams towards known walls by which the robot can count as lost."""
     noise: MotionNoiseConfig | None = field(default_factory=MotionNoiseConfig)
-    """None where the wheels are never taken for worse than they state."""
+    """Without it, the stated noise is always believed."""
     place: PlaceSearchConfig = field(default_factory=lambda: PlaceSearchConfig(least=0.7))
-    """One scan proves less than a submap: more of it must lie on walls."""
+    """Used for global relocalisation: one scan against the whole map."""
     diagnosis: DiagnosisConfig | None = field(default_factory=DiagnosisConfig)
-    """None where the map is rescued without end, and nobody asks why."""
+    """Without it, the robot is relocalised without limit and its faults are not identified."""
 
 
 @dataclass(frozen=True)

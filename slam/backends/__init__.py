@@ -16,14 +16,14 @@ from .kalman.config import EkfConfig
 
 @dataclass(frozen=True)
 class BackendOptions:
-    """What can be set of the back ends; each takes what is of its type."""
+    """Options of the estimators."""
 
     ekf: EkfConfig = field(default_factory=EkfConfig)
-    """Of every Kalman filter."""
+    """Used by every Kalman filter."""
     graph: GraphConfig = field(default_factory=GraphConfig)
-    """Of both factor graphs."""
+    """Used by both factor graphs."""
     own: dict[str, dict[str, Any]] = field(default_factory=dict, hash=False)
-    """Of back ends that do not come along: by the name of the class of their options, and the name of each option."""
+    """Options of your own estimators: by the name of their options class, and the name of each option."""
 
     def of(self, kind: type) -> Any:
         """Return the options of a class; raises msgspec.ValidationError for values that are not of it."""
@@ -33,23 +33,21 @@ class BackendOptions:
 
 @dataclass(frozen=True)
 class BackendEntry:
-    """How to make a back end, what it is, and what can be set of it."""
+    """An entry of the registry of back ends."""
 
     kind: Callable[..., Backend]
-    """Makes one from the first pose, its covariance and, if it has some, its options."""
+    """Class or function that makes one from the initial pose, its covariance and, if there are any, its options."""
     description: str
     options: type | None = None
-    """A dataclass of its options: its maker takes one after the pose and its covariance (`BackendOptions`)."""
+    """Dataclass of its options, if it has any."""
     covariance: Literal["exact", "blocks", "bound"] = "exact"
-    """What its covariance is: that of its errors to first order; what is left of it where correlations are dropped; or
-    a bound of it, whatever the correlations are."""
+    """Whether its covariance is that of its errors to first order, only the diagonal blocks of it, or a bound."""
     is_about_origin: bool = False
-    """Whether its answer depends on where the world's origin lies."""
+    """Whether its estimate depends on the position of the world's origin."""
     keeps_frame: bool = False
-    """Whether it never learns where the world lies, which no scan tells (docs/estimation.md)."""
+    """Whether it gains no information along the unobservable directions: the position and heading of everything."""
     carries_start: bool = False
-    """Whether the error of the start is in the pose's covariance as it was at first, carried along, and what was lost
-    since is added to it: nothing is ever learnt of where the world lies, exactly."""
+    """Whether the pose's covariance is exactly the start's, transported along the path, plus the error since then."""
 
     def make(
         self,
@@ -57,7 +55,7 @@ class BackendEntry:
         pose_cov: Float[np.ndarray, "3 3"],
         options: BackendOptions = BackendOptions(),
     ) -> Backend:
-        """Return a back end at a pose with its covariance and an empty map."""
+        """Return a back end with this initial pose and covariance, and an empty map."""
         return self.kind(pose_world, pose_cov, *([] if self.options is None else [options.of(self.options)]))
 
 

@@ -1,6 +1,4 @@
-"""First-estimates Jacobians: an EKF that gains no information about where the world lies (docs/estimation.md)."""
-
-from collections.abc import Sequence
+"""First-estimates Jacobians: no information about where the world lies (docs/concepts/consistency.md)."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,27 +18,22 @@ class FejEkf(Ekf[DenseMap]):
 
     def _begin(self) -> None:
         super()._begin()
-        self._position = self._map.pose_world[:2]
+        self._position = self.map.pose_world[:2]
         self._alpha = np.zeros(0)
         """Direction of each line when it was first seen, in the order of the map's ids."""
 
-    def remove(self, ids: Sequence[int]) -> None:
-        """Forget lines; raises KeyError where an id is not in the map."""
-        self._alpha = np.delete(self._alpha, self.belief.rows(ids))
-        super().remove(ids)
+    def forget(self, rows: Int[np.ndarray, " m"]) -> None:
+        """Forget lines and their first directions."""
+        self._alpha = np.delete(self._alpha, rows)
+        super().forget(rows)
 
-    def merge(self, keep: int, drop: int) -> None:
-        """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
-        row = self.belief.rows([keep, drop])[1]
-        super().merge(keep, drop)
-        self._alpha = np.delete(self._alpha, row)
-
-    def _motion(self, odometry: Odometry) -> Motion:
-        motion = move(self._map.pose_world, odometry.motion, self._position)
+    def motion(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
+        """Return the motion, its Jacobian from one predicted position to the next, and the noise that it adds."""
+        motion = move(self.map.pose_world, odometry.motion, self._position)
         self._position = motion.pose_world[:2]
-        return motion
+        return motion, motion.noise(odometry.cov)
 
-    def _innovations(
+    def compare(
         self,
         rows: Int[np.ndarray, " m"],
         seen: Observations,
@@ -48,18 +41,21 @@ class FejEkf(Ekf[DenseMap]):
         means: Float[np.ndarray, "m 2"],
     ) -> Innovations:
         """Compare observations with what a pose and lines predict, the Jacobian staying at the first estimates."""
-        anchors, first = self._map.anchors[rows], self._alpha[rows]
+        anchors, first = self.map.anchors[rows], self._alpha[rows]
         return innovations(pose_world, anchors, means, seen.lines, seen.cov, self._position, first)
 
-    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
-        new = initialise(self._map.pose_world, lines, centres, self._config.at_wall, self._position)
+    def first_sight(
+        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
+    ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
+        """Return new lines as seen from the predicted position, and their noise."""
+        new = initialise(self.map.pose_world, lines, centres, self.config.at_wall, self._position)
         self._alpha = np.concatenate([self._alpha, new.means[:, 0]])
-        return new
+        return new, new.noise(cov)
 
-    def _align(self, rows: Int[np.ndarray, "2"]) -> float:
+    def unite(self, rows: Int[np.ndarray, "2"]) -> None:
         """Turn the first direction of the line dropped to that of the line kept: else their equality says where."""
         turned = self._alpha.copy()
         turned[rows[1]] = turned[rows[0]]
-        self._map.shear(*carry(self._position, self._position, self._alpha, turned, self._map.anchors))
+        self.map.shear(*carry(self._position, self._position, self._alpha, turned, self.map.anchors))
         self._alpha = turned
-        return float(turned[rows[0]])
+        self._equate(rows, float(turned[rows[0]]))

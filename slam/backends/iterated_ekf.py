@@ -18,17 +18,17 @@ class IteratedEkf(Ekf[DenseMap]):
 
     new_map = DenseMap
 
-    def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
+    def linearise(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Linearise a scan at its own solution by Gauss-Newton iterations of the pose and the lines seen."""
-        model = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
-        prior, place = self._map.joint(model.rows), np.argmax(model.rows == rows[:, None], axis=1)
+        model = stack(rows, self.compare(rows, seen, self.map.pose_world, self.map.means[rows]))
+        prior = self.map.joint(model.rows)
         step: Float[np.ndarray, " s"] = np.zeros(len(prior.mean))
-        for _ in range(MOST if self._config.relinearise else 0):
+        for _ in range(MOST if self.config.relinearise else 0):
             before, PHt = step, prior.cov @ model.H.T
             step = PHt @ np.linalg.solve(model.H @ PHt + model.R, model.e)
             at = prior.mean + step
-            there = stack(rows, self._innovations(rows, seen, at[:POSE], at[POSE:].reshape(-1, 2)[place]))
-            model = Linear(there.rows, there.H, there.e + there.H @ step, there.R)
+            means = at[POSE:].reshape(-1, 2)[model.place]
+            model = stack(rows, self.compare(rows, seen, at[:POSE], means)).before(step)
             if np.abs(step - before).max() < STILL:
                 break
         return model

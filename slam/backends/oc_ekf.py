@@ -23,17 +23,17 @@ class OcEkf(InvariantEkf):
 
         W holds one over the variances, so that errors count in units of their sigmas.
         """
-        unseen_before, unseen_after = (unseen(*point, self._map.anchors) for point in (before, after))
-        variances = self._map.variances
+        unseen_before, unseen_after = (unseen(*point, self.map.anchors) for point in (before, after))
+        variances = self.map.variances
         variances[:2] = variances[:2].mean()  # As they are in a world that is turned.
         weighted = unseen_before / np.maximum(variances, LEAST_SIGMA**2)[:, None]
-        self._map.follow(unseen_after - unseen_before, np.linalg.solve(unseen_before.T @ weighted, weighted.T).T)
+        self.map.follow(unseen_after - unseen_before, np.linalg.solve(unseen_before.T @ weighted, weighted.T).T)
 
 
 def unseen(
     position: Float[np.ndarray, "2"], alpha: Float[np.ndarray, " n"], anchors: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, "s 3"]:
-    """Return N: what a shift and a turn of everything do to pose and lines, s = 3 + 2 n (docs/estimation.md)."""
+    """Return N: how a shift and a turn move pose and lines, s = 3 + 2 n (docs/concepts/consistency.md)."""
     N, n = np.zeros((POSE + 2 * len(alpha), 3)), normals(alpha)
     N[:POSE] = np.eye(POSE)
     N[:2, 2] = J @ position

@@ -46,7 +46,7 @@ class RelocationEkf(Ekf[RelocationMap]):
     """Moves the robot alone by the first matches, then the map alone by the second, seen from where the robot is now.
 
     The noise of an observation that moved the robot is in the robot's error when the map is fused: both gains act on
-    the errors there were before, so that no observation counts twice (docs/estimation.md).
+    the errors there were before, so that no observation counts twice (docs/contributing/estimation-notes.md).
     """
 
     new_map = RelocationMap
@@ -57,15 +57,13 @@ class RelocationEkf(Ekf[RelocationMap]):
         if not len(moving) + len(fused):
             return
         self._move_on()
-        relocation = stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
-        pose, moved = self._map.pose_world, self._map.relocated(relocation)
-        again = innovations(moved, self._map.anchors[fused], self._map.means[fused], second.lines, second.cov)
+        relocation = stack(moving, self.compare(moving, first, self.map.pose_world, self.map.means[moving]))
+        pose, moved = self.map.pose_world, self.map.relocated(relocation)
+        again = innovations(moved, self.map.anchors[fused], self.map.means[fused], second.lines, second.cov)
         step = moved - pose
         step[2] = wrap(step[2])
-        fusion = stack(fused, again)
-        # What the innovation is from the pose before, with the Jacobian of the pose now.
-        fusion = Linear(fusion.rows, fusion.H, fusion.e + fusion.H[:, :POSE] @ step, fusion.R)
-        self._map.fuse(relocation, fusion, moved, _shared_noise(first, second, relocation, fusion))
+        fusion = stack(fused, again).before(step)
+        self.map.fuse(relocation, fusion, moved, _shared_noise(first, second, relocation, fusion))
 
 
 def _shared_noise(

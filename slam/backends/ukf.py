@@ -67,33 +67,34 @@ class Ukf(Ekf[DenseMap]):
 
     new_map = DenseMap
 
-    def _moved(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
-        both = np.concatenate([self._map.pose_world, odometry.motion])
-        spread = unscented(_ends, both, block_diag(self._map.pose_cov, odometry.cov))
+    def motion(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
+        """Return the motion of the points of pose and odometry, and what it adds to the pose's covariance."""
+        both = np.concatenate([self.map.pose_world, odometry.motion])
+        spread = unscented(_ends, both, block_diag(self.map.pose_cov, odometry.cov))
         pose, F, W = spread.mean, spread.A[:, :POSE], spread.A[:, POSE:]
         pose[2] = wrap(pose[2])
         return Motion(pose, F, W), W @ odometry.cov @ W.T + spread.rest
 
-    def _grown(
+    def first_sight(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
         """Return new lines, each from the points of the pose and its own noise."""
-        new, pose = self._initialisation(lines, centres), self._map.pose_world
-        noise = np.empty((len(lines), 2, 2))
+        (new, noise), pose = super().first_sight(lines, cov, centres), self.map.pose_world
         for k, anchor in enumerate(new.anchors):
             both = np.concatenate([pose, lines[k]])
-            spread = unscented(partial(_about, anchor), both, block_diag(self._map.pose_cov, cov[k]))
+            spread = unscented(partial(_about, anchor), both, block_diag(self.map.pose_cov, cov[k]))
             new.means[k], new.G_pose[k], new.G_line[k] = spread.mean, spread.A[:, :POSE], spread.A[:, POSE:]
             noise[k] = new.G_line[k] @ cov[k] @ new.G_line[k].T + spread.rest
         new.means[:, 0] = wrap(new.means[:, 0])
         return new, noise
 
-    def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
+    def linearise(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Return the innovations of a scan as the points of pose and lines have them."""
-        here = stack(rows, self._innovations(rows, seen, self._map.pose_world, self._map.means[rows]))
-        prior, place = self._map.joint(np.sort(here.rows)), np.searchsorted(np.sort(here.rows), rows)
-        spread = unscented(partial(_off, self._map.anchors[rows], seen, place), prior.mean, prior.cov)
-        return Linear(np.sort(here.rows), -spread.A, spread.mean, here.R + spread.rest)
+        here = stack(rows, self.compare(rows, seen, self.map.pose_world, self.map.means[rows]))
+        ordered = np.sort(here.rows)
+        prior, place = self.map.joint(ordered), np.searchsorted(ordered, rows)
+        spread = unscented(partial(_off, self.map.anchors[rows], seen, place), prior.mean, prior.cov)
+        return Linear(ordered, -spread.A, spread.mean, here.R + spread.rest, place)
 
 
 def _ends(x: Float[np.ndarray, "q 6"]) -> Float[np.ndarray, "q 3"]:

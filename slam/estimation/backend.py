@@ -1,7 +1,7 @@
-"""What an estimator offers: the `Backend` protocol, and the `Belief` that it hands out.
+"""The interface of estimators: the `Backend` protocol, and the `Belief` that it returns.
 
-A line's state is (alpha, d) about a constant anchor c, with r = d + n(alpha)·c: its error is attached to the
-wall where it was seen, not to the world's origin. The anchor c = 0 is the paper's Hessian form.
+The state of a line is (alpha, d) about a constant anchor c, with r = d + n(alpha)·c: its error is attached to the
+wall, not to the world's origin. The anchor c = 0 is the paper's Hessian form.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,11 +17,11 @@ from ..robot import Odometry
 
 
 class StaleBeliefError(RuntimeError):
-    """A belief was asked for its joint covariance after its back end had moved on: ask for the present belief."""
+    """The joint covariance of a belief was asked for after its back end had changed; ask for the present belief."""
 
 
 class ContradictionError(RuntimeError):
-    """Observations with which no estimate agrees: they are left out again, and the rest holds."""
+    """Observations with which no estimate agrees: they are left out, and everything else is kept."""
 
 
 POSE = 3
@@ -39,44 +39,44 @@ def columns_of(rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
 
 @dataclass(frozen=True)
 class Joint:
-    """A Gaussian of the pose and some lines together: (x, y, heading, alpha_1, d_1, alpha_2, d_2, ...)."""
+    """Joint Gaussian of the pose and m lines: (x, y, heading, alpha_1, d_1, alpha_2, d_2, ...)."""
 
     mean: Float[np.ndarray, " s"]
     cov: Float[np.ndarray, "s s"]
     anchors: Float[np.ndarray, "m 2"]
-    """Anchor of each of the lines, world frame, m; s = 3 + 2 m."""
+    """Anchor of each line, world frame, m; s = 3 + 2 m."""
 
     def take(self, rows: Int[np.ndarray, " k"]) -> "Joint":
-        """Return the Gaussian of the pose and some of the lines."""
+        """Return the Gaussian of the pose and the lines in these rows."""
         columns = columns_of(rows)
         return Joint(self.mean[columns], self.cov[columns[:, None], columns], self.anchors[rows])
 
 
 @dataclass(frozen=True)
 class Belief:
-    """The estimate at one moment, in the world frame."""
+    """The estimate of the pose and n lines at one moment, in the world frame."""
 
     pose_world: Float[np.ndarray, "3"]
     pose_cov: Float[np.ndarray, "3 3"]
     ids: Int[np.ndarray, " n"]
-    """Ids of the lines in ascending order; an id is never used again."""
+    """Ids of the lines, ascending; an id is never used twice."""
     anchors: Float[np.ndarray, "n 2"]
-    """A constant point c near each wall, m."""
+    """Anchor c of each line, a constant point near its wall, m."""
     means: Float[np.ndarray, "n 2"]
     """(alpha rad, d m) of each line about its anchor."""
     query: Callable[[Int[np.ndarray, " m"]], Joint]
-    """How the back end answers `joint`; raises `StaleBeliefError` once it has moved on."""
+    """How the back end computes `joint`; raises `StaleBeliefError` once it has changed."""
 
     @cached_property
     def lines_world(self) -> Float[np.ndarray, "n 2"]:
-        """The lines in the paper's Hessian form (alpha, r), world frame. Read-only."""
+        """The lines in Hessian form (alpha rad, r m), world frame; read-only."""
         r = self.means[:, 1] + np.vecdot(normals(self.means[:, 0]), self.anchors)
         lines = np.stack([self.means[:, 0], r], axis=-1)
         lines.flags.writeable = False
         return lines
 
     def rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return where the ids stand in `ids`; raises KeyError for an id that is not in the map."""
+        """Return the rows of these ids; raises KeyError for an id that is not in the map."""
         wanted = np.asarray(ids, dtype=np.int64)
         if not len(self.ids):
             if len(wanted):
@@ -88,19 +88,19 @@ class Belief:
         return rows
 
     def joint(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Joint:
-        """Return mean and covariance of the pose and the chosen lines; zeros where a back end keeps none."""
+        """Return the joint Gaussian of the pose and these lines, with zeros for blocks that a back end drops."""
         return self.query(np.asarray(ids, dtype=np.int64))
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Lines seen in the robot frame and the map lines that they were matched to."""
+    """Lines observed in the robot's frame, and the lines of the map that they were matched to."""
 
     ids: Int[np.ndarray, " m"]
-    """In any order, and one id several times where a scan shows a wall in several pieces: one scan in two hundred does.
-    Each piece is an observation of its own, with its own noise."""
+    """In any order; an id is repeated if a scan shows a wall in several pieces (one in two hundred does), each an
+    observation with independent noise."""
     lines: Float[np.ndarray, "m 2"]
-    """(alpha rad, r m), alpha pointing into the wall."""
+    """(alpha rad, r m); the normal alpha points into the wall."""
     cov: Float[np.ndarray, "m 2 2"]
 
     def __len__(self) -> int:
@@ -109,17 +109,17 @@ class Observations:
 
 @runtime_checkable
 class Backend(Protocol):
-    """An estimator of the stochastic map: a few verbs, its state hidden, its belief shown.
+    """An estimator of the stochastic map.
 
-    It is made from a pose (x m, y m, heading rad), world frame, and its covariance (3, 3), with an empty map; a third
-    argument is its options, if its `BackendEntry` names their type. Every verb but one that raises makes beliefs handed
-    out before stale. No verb may keep or change the arrays that it is given. `chainslam.check_backend` holds a class
-    against all this.
+    Its constructor takes a pose (x m, y m, heading rad) in the world frame and its covariance (3, 3), and, if its
+    `BackendEntry` names a type of options, these as a third argument; the map is then empty. Each method that does not
+    raise makes earlier beliefs stale. No method may keep or change the arrays that it is given.
+    `chainslam.check_backend` tests a class against this contract.
     """
 
     @property
     def belief(self) -> Belief:
-        """The estimate now."""
+        """The present estimate."""
         ...
 
     def predict(self, odometry: Odometry) -> None:
@@ -127,38 +127,38 @@ class Backend(Protocol):
         ...
 
     def update(self, first: Observations, second: Observations) -> None:
-        """Take in one scan: the matches made before the robot was relocated, and those made after.
+        """Fuse one scan, given by the matches of the first pass and by those of the second.
 
-        Both describe the same scan. A relocation-fusion back end moves the robot by `first` and the map by
-        `second`; a joint back end uses `second` alone, so that each observation counts once. One that keeps all
-        observations may raise ContradictionError when its belief is asked for next: no estimate agrees with these.
+        Both describe the same scan. A relocation-fusion back end corrects the pose by `first` and the map by `second`;
+        a joint back end uses `second` alone, so that each observation counts once. A back end that keeps all
+        observations may raise ContradictionError when its belief is asked for next.
         """
         ...
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> Int[np.ndarray, " m"]:
-        """Initialise lines seen in the robot frame (with the middle of each seen piece) and return their new ids."""
+        """Initialise lines observed in the robot's frame, each with the middle of its segment; return their ids."""
         ...
 
     def merge(self, keep: int, drop: int) -> None:
-        """Make two lines one, because they were found to be one wall; `keep` survives.
+        """Merge two lines that are one wall, and keep the id `keep`.
 
-        Raises KeyError where an id is not in the map, and ValueError for one line twice.
+        Raises KeyError for an id that is not in the map, and ValueError if both are the same.
         """
         ...
 
     def remove(self, ids: Sequence[int]) -> None:
-        """Forget lines; raises KeyError where an id is not in the map."""
+        """Remove lines; raises KeyError for an id that is not in the map."""
         ...
 
 
 @runtime_checkable
 class Smoother(Backend, Protocol):
-    """A back end that can solve everything once more when a run has ended."""
+    """A back end that can smooth the whole path when a run has ended."""
 
     def finish(self) -> Float[np.ndarray, "n 3"]:
-        """Return the poses, world frame, at the start and after every prediction; beliefs then are of that solution."""
+        """Return the smoothed poses at the start and after each prediction; later beliefs are of that solution."""
         ...
 
 

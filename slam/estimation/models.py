@@ -4,7 +4,7 @@ A line is (alpha, d) about a constant anchor c, r = d + n(alpha)·c in the world
 90-degree rotation and n' = J n. Jacobians are taken at the estimate, or where the caller says (`position`, `alpha`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -23,6 +23,10 @@ class Motion:
     """Derivative by the pose before."""
     W: Float[np.ndarray, "3 3"]
     """Derivative by the odometry's motion."""
+
+    def noise(self, cov: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+        """Return the covariance that odometry of this covariance adds to the pose's."""
+        return self.W @ cov @ self.W.T
 
 
 def move(
@@ -114,6 +118,13 @@ class Linear:
     """By the pose and those lines, s = 3 + 2 u."""
     e: Float[np.ndarray, " k"]
     R: Float[np.ndarray, "k k"]
+    place: Int[np.ndarray, " m"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Where in `rows` the line of each observation stands; observation i has rows 2 i and 2 i + 1 of H, e and R. Empty
+    for a measurement that is of no observation, as that two lines are one."""
+
+    def before(self, step: Float[np.ndarray, " p"]) -> "Linear":
+        """Return the measurement as one of the errors before a step of the first p parts of the state: e + H step."""
+        return replace(self, e=self.e + self.H[:, : len(step)] @ step)
 
 
 def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
@@ -121,7 +132,7 @@ def stack(rows: Int[np.ndarray, " m"], model: Innovations) -> Linear:
     each = np.arange(len(rows))
     lines, place = (rows, each) if len(set(rows.tolist())) == len(rows) else np.unique(rows, return_inverse=True)
     H, R = stacked(place, len(lines), model.H_pose, model.H_line, model.R)
-    return Linear(lines, H, model.e.ravel(), R)
+    return Linear(lines, H, model.e.ravel(), R, place)
 
 
 @dataclass(frozen=True)
@@ -132,6 +143,10 @@ class Initialisation:
     means: Float[np.ndarray, "m 2"]
     G_pose: Float[np.ndarray, "m 2 3"]
     G_line: Float[np.ndarray, "m 2 2"]
+
+    def noise(self, cov: Float[np.ndarray, "m 2 2"]) -> Float[np.ndarray, "m 2 2"]:
+        """Return the covariance that each line has of a measurement of this covariance."""
+        return self.G_line @ cov @ self.G_line.swapaxes(1, 2)
 
 
 def initialise(

@@ -11,47 +11,51 @@ from ..robot import STATED
 
 @dataclass(frozen=True)
 class SharedConfig:
-    """Sizes of what walls are made of, turns, and how sure a refusal has to be."""
+    """Sizes and thresholds."""
 
     chance: Probability = 1e-6
-    """What is rarer than this is ruled out: a pair of segment and wall, honest wheels that look worse than they
-    state."""
+    """Hypotheses less likely than this are rejected, such as that a segment belongs to a wall or that the wheels are as
+    good as stated."""
     beams_m: Size = 0.04
-    """Four sigmas of a beam: what lies as near to a line may be on it."""
+    """Distance from a line within which a beam may belong to it: four standard deviations of a range."""
     resolution_m: Distance = 0.05
-    """Ends and crossings of lines are known no better: half of a thin wall."""
+    """Accuracy of the ends of walls and of the points where their lines cross."""
     within_m: Distance = 0.07
-    """Less than a wall is thick: what stands as near along a line may be one wall, or a corner that was seen."""
+    """Largest distance along a line between two pieces that may be one wall, or between a corner and its last beam."""
     beside_m: Distance = 0.08
-    """The same across a line, for faces whose direction is known badly."""
+    """Largest distance across a line between two pieces that may be one wall, if one is too short to have a reliable
+    direction."""
     thickness_m: Distance = 0.1
-    """Of a thin wall: ends that are nearer may be one corner; beams that go on so far beyond a line have passed through
-    it."""
+    """Thickness of a thin wall: ends closer together may be one corner, and beams this far behind a line have passed
+    through it."""
     beyond_m: Distance = 0.15
-    """Beams that go on so far past a gap or a bend lead on: from 4 m one meets a wall every 0.14 m."""
+    """How far beams must reach past a gap to have passed through it, and a wall past a breakpoint to lie across it."""
     face_m: Size = 0.2
-    """Two thicknesses: a shorter face has no direction of its own (`straightness`)."""
+    """Length below which a face has no reliable direction of its own."""
     short_m: Distance = 0.3
-    """Shorter segments are too poor in direction for the gate alone; lines of walls so near to each other may meet."""
+    """Length below which a segment's direction is too uncertain for the gate alone, and reach of a corner from the ends
+    of its walls."""
     door_m: Distance = 0.35
-    """No robot passes a narrower gap, and no door is narrower: across it ends may join that were looked at."""
+    """Gaps narrower than this are no doors: two open ends that were viewed may be joined across them."""
     far_m: Distance = 0.5
-    """Beams on a wall stand no farther apart."""
+    """Largest distance between neighbouring beams on one wall, and between a wall and a segment that is compared with
+    it."""
     long_m: Distance = 1.0
-    """Walls that lie beside each other over so much of their way are no two faces that meet."""
+    """Overlap from which two walls beside each other may be one, and length from which a wall shows how the map has
+    moved."""
     known_rad: Spread = float(np.deg2rad(1.0))
-    """A turn is known where it is known to this, sigma; a smaller one no scan shows."""
+    """Standard deviation up to which the angle between two walls counts as known, and smallest angle of a
+    breakpoint."""
     straight_rad: Angle = float(np.deg2rad(5.0))
-    """Walls that turn by less run on straight, or may be one."""
+    """Angle below which two walls may be one, or one may continue the other."""
     sharp_rad: Angle = float(np.deg2rad(30.0))
-    """Walls that turn by more meet in a corner, and the beams tell where it is."""
+    """Angle above which two walls meet in a corner that a single scan shows."""
     noise_sigmas: Sigmas = 4.0
-    """What is off by more is no noise: the surface breaks off, the beam is not the line's, the wall is not straight.
-    One of 16,000 beams is that far off by chance."""
+    """Deviation, in standard deviations, above which a beam does not belong to a line, or a wall is not straight."""
     outlier_sigmas: Sigmas = 3.0
-    """What is off by more is hardly noise: a beam is better left loose, and a wall has a misfit of its own."""
+    """Deviation, in standard deviations, above which a beam is not assigned to a line, and a wall has a lack of fit."""
     scans: Count = 2
-    """So many scans that say one thing are believed, and so many beams of one scan."""
+    """Number of scans, or of beams in one scan, that must agree before the map is changed on their evidence."""
 
 
 def of_shared() -> Any:

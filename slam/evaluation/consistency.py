@@ -2,7 +2,7 @@
 
 The error of a pose is the right-invariant one, X_est = Exp(xi) X_true in SE(2): a turn and a shift of the whole
 world, the directions that no scan can observe, then have the same coordinates wherever the robot stands. The
-errors of lines are taken after undoing that motion, so that they are the walls' own (docs/estimation.md).
+errors of lines are taken after undoing that motion, so that they are the walls' own (docs/concepts/scores.md).
 """
 
 from collections.abc import Sequence
@@ -68,7 +68,7 @@ def bound_margins(
     """Return the smallest eigenvalue of P_k - A P_0 A' at each step, over tr P_0; negative below the bound.
 
     A = [I, J (p_k - p_0); 0, 1]. An estimator that gains nothing about where the world lies never falls below 0
-    (docs/estimation.md, "The bound").
+    (docs/concepts/consistency.md, "The bound").
     """
     A = np.tile(np.eye(3), (len(covs), 1, 1))
     A[:, :2, 2] = (poses_world[:, :2] - poses_world[0, :2]) @ J.T

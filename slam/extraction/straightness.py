@@ -20,16 +20,15 @@ from .straightness_kernels import faces_cov, misfit_variances
 
 @dataclass(frozen=True)
 class StraightnessConfig:
-    """How far short faces are off their lines, sigma."""
+    """Lack of fit of single segments."""
 
     shared: SharedConfig = of_shared()
     edge_m: Distance = 0.01
-    """The shortest; one as long as `shared.face_m` is half as far off, a longer one falls with the fourth power. 0
-    where every segment is known to be of one face."""
+    """Standard deviation of the lack of fit of the shortest segments; longer ones have less."""
     bow_rad: Angle = 0.0
-    """How far the direction of a wall of any length is off, where one scan sees another part of it than the next ..."""
+    """Standard deviation of a wall's direction from one scan to the next, since no real wall is straight."""
     bow_m: Distance = 0.0
-    """... and how far it is off across; 0 where walls are drawn with a ruler."""
+    """Standard deviation of a wall's offset from one scan to the next, since no real wall is straight."""
 
 
 def cov_of_faces(segments: Segments, config: StraightnessConfig = StraightnessConfig()) -> Float[np.ndarray, "s 2 2"]:

@@ -12,20 +12,20 @@ from .quantities import Count, Distance, Size, Turn
 
 @dataclass(frozen=True)
 class RoundConfig:
-    """When short walls are chords and tangents of one circle."""
+    """When short walls count as chords and tangents of one curved obstacle."""
 
     radius_m: Size = 1.0
-    """Largest radius: what is larger shows walls that are long enough to be joined."""
+    """Largest radius of a curved obstacle."""
     wall_m: Distance = 0.8
-    """Longer walls are none of a circle's."""
+    """Longest wall that can be part of a curved obstacle."""
     off_m: Distance = 0.02
-    """A tangent passes no farther than this from the circle."""
+    """Largest distance between the line of such a wall and the circle."""
     beside_m: Distance = 0.1
-    """And it touches it no farther than this past its ends."""
+    """How far past an end of such a wall the circle may touch its line."""
     walls: Count = 4
-    """So many walls must lie on it: any three do on some circle."""
+    """Smallest number of walls on one circle."""
     step_rad: Turn = float(np.deg2rad(60.0))
-    """Neighbours on it turn by less than this: a box is no circle, though one touches all its faces."""
+    """Largest turn between neighbouring walls on the circle, so that a box does not count as one."""
 
 
 DEFAULT = RoundConfig()

@@ -27,23 +27,25 @@ NOWHERE = np.full(2, np.inf)
 
 @dataclass(frozen=True)
 class ExistenceConfig:
-    """What the first segment and each look say: shares in apartments, by true faces (docs/association.md)."""
+    """Probabilities by which a wall is believed to exist.
+
+    They are shares in apartments, by the true faces of segments and walls.
+    """
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
     over_faces: Probability = 0.07
-    """Of segments that no wall explains, with enough beams to be sure, so many lie over two faces ..."""
+    """Share of the new segments with `sure_beams` beams or more that span two faces."""
     few_over_faces: Probability = 0.27
-    """... and of those with fewer."""
+    """Share of the new segments with fewer beams that span two faces."""
     shown: Probability = 0.9
-    """A look shows a line where enough beams reach it: so often where it is of one face ..."""
+    """Probability that a scan with enough beams on a wall shows it, if it is a single face."""
     shown_over_faces: Probability = 0.2
-    """... so often where it lies over two, and two beams more reach it than make a sure segment, one for each end that
-    may lose its last ..."""
+    """Probability that a scan with enough beams on a wall shows it, if it spans two faces."""
     few_shown_over_faces: Probability = 0.5
-    """... and so often where it has few beams, and as many reach it as make a segment."""
+    """Probability that a scan shows a candidate with few beams again, if it spans two faces."""
     slack_m: Distance = 0.01
-    """What the pose may have drifted between two observations of a line of few beams, sigma."""
+    """Standard deviation of the pose's drift between two observations of a candidate with few beams."""
 
     def odds(self, sure_beams: int) -> Odds:
         """Return what a look says of a wall, as logarithms of odds; a segment is sure with so many beams."""

@@ -27,20 +27,20 @@ NO_ODDS: Mapping[int, float] = {}
 
 @dataclass(frozen=True)
 class WallsConfig:
-    """When a wall is tentative, cut back and forgotten.
+    """How walls are confirmed, cut back and removed.
 
-    It is cut back once two scans in turn have shown a beam passing through it: one that goes on beyond it by a wall's
-    thickness, and as far from its ends, or in its middle half. A wall cut back to less than ends are known to is
-    forgotten: so is what stood there for a while.
+    A wall is cut back once two scans in turn show a beam that passes through it: one that reaches beyond it by a wall's
+    thickness and crosses it as far from its ends, or in its middle half. What is left is removed once it is shorter
+    than the accuracy of its ends, so that objects that stood there for a while disappear from the map.
     """
 
     shared: SharedConfig = of_shared()
     existence: ExistenceConfig = field(default_factory=ExistenceConfig)
-    """It is tentative until it is likely enough to exist, and forgotten once it is likelier not to."""
+    """A wall is tentative until it is likely enough to exist, and removed once it is likelier not to."""
     reliability: ReliabilityConfig = field(default_factory=ReliabilityConfig)
-    """How far walls may be off the lines that stand for them."""
+    """It inflates the stated covariance."""
     housekeeping: bool = True
-    """Whether walls are cut back and forgotten; where it is known whose each segment is, nothing needs mending."""
+    """Prune the map: cut walls back where beams pass through them, and remove walls that no longer exist."""
 
 
 class Extents:

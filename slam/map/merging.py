@@ -22,19 +22,18 @@ from .stochastic_map import StochasticMap
 
 @dataclass(frozen=True)
 class MergingConfig:
-    """When two landmarks of a map may be one wall.
+    """When two walls of the map are merged.
 
-    They lie no farther apart than ends are known, at both ends of the shorter one, and overlap by as much: a niche is a
-    wall's thickness deep, however little is known about where the two stand, and two rooms' walls on one line stand as
-    far apart. The turn between them is known to a degree: a wall that turns by as much would be made straight for good.
+    At both ends of the shorter one they are no farther apart than the accuracy of ends, and overlap by as much: a niche
+    is a wall's thickness deep, and the walls of two rooms on one line are as far apart, however uncertain both are. The
+    angle between them must be known to a degree, since merging a wall that bends by as much makes it straight for good.
+    With `hidden_m` at 0.02 m, 8 mergers in 121 apartments were false; with the gate alone, none.
     """
 
     shared: SharedConfig = of_shared()
     hidden_m: Distance = 0.01
-    """Two faces on one side no farther apart than this, at both ends of the shorter one, are one to a laser whose
-    beams are as far off: the nearer hides the farther. With 0.02 m eight mergers in 121 apartments were false, none
-    by the gate alone: a landmark across a step of 2 cm from wall to wall lies near both. They overlap over a long
-    way."""
+    """Two long walls that overlap on the same side and are no farther apart than this are merged, however well both are
+    known."""
 
 
 def duplicate_of(

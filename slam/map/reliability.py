@@ -20,19 +20,20 @@ from .records import Merger, Records
 
 @dataclass(frozen=True)
 class ReliabilityConfig:
-    """When a direction is clear, and how far a face may be from its line."""
+    """When the direction of a segment is reliable, and how large the lack of fit of a wall is.
+
+    Walls have less of it than single segments, since few lines over two faces stay in the map: with `edge_m` the short
+    walls alone have a map ANEES near 1 (`python -m studies.exploration.map_causes`).
+    """
 
     shared: SharedConfig = of_shared()
     heading_rad: Angle = 0.15
-    """A segment of five beams or more is clear where its direction is known better than this, sigma, that of short
-    faces included (`straightness`). One of fewer beams may be turned by as much: it may lie over two faces, and has too
-    few beams to show it."""
+    """Standard deviation of the direction below which a segment is reliable; that of tentative segments is inflated by
+    as much."""
     straightness: StraightnessConfig = field(default_factory=StraightnessConfig)
-    """How far a face may be from its line."""
+    """It inflates the covariance of an observation."""
     edge_m: Distance = 0.002
-    """How far the shortest wall may be from its line, sigma: less than a single segment (`straightness.edge_m`), since
-    few lines over two faces stay in the map. By this the short walls alone have a map ANEES near 1
-    (`python -m studies.exploration.map_causes`)."""
+    """Standard deviation of the lack of fit of the shortest walls in the map; longer ones have less."""
 
 
 def are_clear(segments: Segments, config: ReliabilityConfig = ReliabilityConfig()) -> Bool[np.ndarray, " s"]:

@@ -9,39 +9,37 @@ from ..geometry.quantities import Angle, Count, Deviation, Distance, Part, Pitch
 
 @dataclass(frozen=True)
 class ScanMatchingConfig:
-    """How a scan is laid onto the scans before it; the same for all robots and logs."""
+    """Scan matching against the latest keyframes."""
 
     keyframes: Count = 20
-    """A scan is matched to the points of so many scans before it."""
+    """Number of latest keyframes to whose points a scan is matched."""
     reach_m: Size = 15.0
-    """Returns from farther away are left out: there the beams are too far apart to tell walls."""
+    """Returns farther away than this are not used."""
     cell_m: Size = 0.05
-    """Size of a cell of the likelihood field; a scan's points are thinned to one for each."""
+    """Cell size of the likelihood field; the scan is thinned to one point a cell."""
     gap_m: Distance = 0.3
-    """Neighbouring returns that are nearer to each other are of one surface, which is likely between them too; else a
-    scan would match the gaps between the beams of the one before."""
+    """Neighbouring returns closer together than this are connected to one surface."""
     kernel_m: Deviation = 0.06
-    """How fast the likelihood falls with the distance from a point, as a standard deviation."""
+    """Standard deviation of the likelihood field around each point."""
     gate_sigmas: Sigmas = 3.0
-    """The search goes so many standard deviations of the wheels to each side of where they say."""
+    """Half-width of the search window, in standard deviations of the wheel odometry."""
     step_rad: Turn = float(np.deg2rad(1.0))
-    """Between two turns that are tried; places are tried cell by cell."""
+    """Step between the headings that are tried."""
     slip_score: Share = 0.5
-    """A match whose points score less on the mean is no match: the wheels have slipped, and the search goes wide."""
+    """Mean likelihood below which a match is rejected and the search is widened, since the wheels have slipped."""
     slip_rad: Angle = float(np.deg2rad(54.0))
-    """How far to each side the wide search turns."""
+    """Half-width of the heading window in the widened search."""
     finest_m: Pitch = 0.005
-    """The search ends with steps of this size; the last of the way is drawn onto the surfaces."""
+    """Step at which the search ends; point-to-line matching refines the result."""
     sigma_m: Deviation = 0.03
-    """Error of a point about the walls that the points before it tell."""
+    """Standard deviation of a point's distance from the surface of earlier points."""
     surface_m: Distance = 2.0
-    """A point tells where its surface is if its neighbours are nearer to each other than this."""
+    """Largest distance between neighbouring points from which a surface normal is computed."""
     independent: Part = 0.1
-    """Share of a scan's points that count as independent: neighbours share the errors of walls that are not straight,
-    and the same scans tell the map its lines."""
+    """Share of a scan's points that count as independent in the covariance of the match."""
     floor_m: Deviation = 0.005
-    """Standard deviation that no match is better than ..."""
+    """Smallest standard deviation of the position of a match."""
     floor_rad: Spread = float(np.deg2rad(0.15))
-    """... and of the turn."""
+    """Smallest standard deviation of the heading of a match."""
     least_points: Count = 20
-    """With fewer points nothing is matched, and the wheels have the last word."""
+    """With fewer points the scan is not matched, and the wheels give the motion."""

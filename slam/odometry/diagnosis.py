@@ -35,19 +35,18 @@ SLIPS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 
 @dataclass(frozen=True)
 class DiagnosisConfig:
-    """How many scans prove a fault, and how often a map is rescued."""
+    """How faults of the robot are identified, and when a map is given up."""
 
     robot: RobotSpec = of_robot()
     shared: SharedConfig = of_shared()
     window: Count = 20
-    """Faults are tried on so many of the last scans, and on the last few of these alone."""
+    """Number of the latest scans on which faults are tested."""
     agree: Count = 5
-    """So many scans must speak for a fault, one more for each that speaks against it. It is proved where what is stated
-    is so much less likely (`shared.chance`)."""
+    """Number of scans that must support a fault, and one more for each that contradicts it."""
     rescues: Count = 20
-    """A map that was rescued at so many ..."""
+    """A map is given up if the robot had to be relocalised this often within the last `within` steps."""
     within: Count = 40
-    """... of so many steps is given up, whatever the reason."""
+    """Number of steps over which relocalisations are counted."""
 
 
 @dataclass

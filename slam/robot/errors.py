@@ -2,4 +2,4 @@
 
 
 class RobotError(ValueError):
-    """What no robot is or reports, told in one line: what was expected, what was found, what to do."""
+    """A value that no robot can state or report: what was expected, what was found, and what to do, in one line."""

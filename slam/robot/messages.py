@@ -17,28 +17,28 @@ UNEVEN = 0.05
 
 @dataclass(frozen=True)
 class Scan:
-    """One turn of the range finder, in its own frame: where it sits on the body says `RobotSpec`.
+    """One revolution of the range finder with k beams, in its own frame; `RobotSpec` states where it is mounted.
 
-    Raises RobotError for what no scan is. `Scan.ordered` takes bearings as drivers give them.
+    Raises RobotError for values that no scan can have. `Scan.ordered` takes beams in the order of a driver.
     """
 
     bearings_rad: Float[np.ndarray, " k"]
     """Strictly increasing, evenly spaced beam directions, counter-clockwise from straight ahead."""
     ranges_m: Float[np.ndarray, " k"]
-    """Distance along each beam. As ROS drivers say it (REP 117): +inf where nothing came back, NaN where the beam tells
-    nothing, as below the scanner's minimum range."""
+    """Range of each beam, as in REP 117: +inf for no return, NaN for an invalid beam, such as one below the minimum
+    range."""
     sigma_m: float | Float[np.ndarray, " k"]
-    """Standard deviation of the radial error, one for all beams or one for each."""
+    """Standard deviation of the range error, for all beams or for each."""
     range_max_m: float
-    """Returns beyond this are rejected; a beam without a return is free up to here."""
+    """Maximum range: returns beyond it are rejected, and a beam without a return is free up to it."""
     time_s: float
-    """When the scan was complete."""
+    """Time at which the scan was complete."""
     sigma_share: float = 0.0
-    """Standard deviation as a share of the range, beside `sigma_m`; both add by squares."""
+    """Additional standard deviation as a share of the range; both add in quadrature."""
     start_s: float = np.nan
-    """When its first beam was taken; NaN where nobody tells."""
+    """Time of the first beam; NaN if unknown."""
     resolution_m: float = 0.0
-    """Ranges are rounded to multiples of this; 0 where they are not, or by far less than their noise."""
+    """Ranges are rounded to multiples of this; 0 if they are not, or by far less than their noise."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for bearings out of order and for returns that are none."""
@@ -74,9 +74,9 @@ class Scan:
         range_min_m: float = 0.0,
         resolution_m: float = 0.0,
     ) -> "Scan":
-        """Return a scan of evenly spaced beams in either order, from any start, whose last may repeat the first.
+        """Return a scan of evenly spaced beams in either order, from any first bearing; the last may repeat the first.
 
-        Returns below the scanner's minimum range tell nothing, and so does -inf: too near, as ROS drivers say it.
+        Returns below the minimum range, and -inf, are invalid.
         """
         ranges_m = without_near(ranges_m, range_min_m)
         bearings = np.unwrap(bearings_rad)
@@ -90,9 +90,9 @@ class Scan:
 
     @cached_property
     def passed_m(self) -> Float[np.ndarray, " k"]:
-        """How far each beam surely went on, m: to its return, or to the maximum range; 0 where it tells nothing.
+        """How far each beam certainly passed, m: up to its return, or up to the maximum range; 0 if it is invalid.
 
-        Scanners lose single returns. So a beam without one went on only where both its neighbours have none either.
+        Scanners lose single returns, so a beam without one counts as free only if its neighbours have none either.
         """
         before, after = self._beside
         sure = np.isposinf(self.ranges_m) & np.isposinf(before) & np.isposinf(after)
@@ -100,9 +100,9 @@ class Scan:
 
     @cached_property
     def shown_m(self) -> Float[np.ndarray, " k"]:
-        """How far each beam shows free floor, m; where a return is missing alone, the nearer of its neighbours' says.
+        """How far each beam shows free floor, m; a single missing return takes the nearer range of its neighbours.
 
-        0 where beams tell nothing.
+        It is 0 for invalid beams.
         """
         before, after = self._beside
         lone = ~np.isfinite(self.ranges_m) & np.isfinite(np.maximum(before, after))
@@ -119,7 +119,7 @@ class Scan:
 
     @property
     def sigmas_m(self) -> Float[np.ndarray, " k"]:
-        """The standard deviation of each beam's radial error, m; at its measured range, where noise grows with it."""
+        """Standard deviation of each beam's range error at its measured range, m."""
         sigmas = np.broadcast_to(np.asarray(self.sigma_m, dtype=np.float64), self.ranges_m.shape)
         if self.sigma_share > 0.0:
             sigmas = np.hypot(sigmas, self.sigma_share * np.where(np.isfinite(self.ranges_m), self.ranges_m, 0.0))
@@ -137,9 +137,9 @@ class Scan:
         return self.resolution_m * np.sqrt(np.bincount(run)[run] / 12.0)
 
     def within(self, reach_m: float) -> "Scan":
-        """Return the scan of a scanner that reaches so far: what lies beyond is free up to there.
+        """Return the scan as of a scanner with this maximum range; returns beyond it become free beams.
 
-        A beam that never came back tells nothing then: a real one does not from glass and black walls, either.
+        Beams without a return become invalid, since glass and black walls do not return any either.
         """
         reach_m = min(reach_m, self.range_max_m)
         ranges_m = np.where(self.ranges_m > reach_m, np.inf, self.ranges_m)
@@ -147,7 +147,7 @@ class Scan:
 
     @cached_property
     def step_rad(self) -> float:
-        """The angle between neighbouring beams."""
+        """Angle between neighbouring beams."""
         return float((self.bearings_rad[-1] - self.bearings_rad[0]) / (len(self.bearings_rad) - 1))
 
     @cached_property
@@ -188,9 +188,9 @@ def _check_bearings(bearings_rad: Float[np.ndarray, " k"], count: int) -> None:
 
 @dataclass(frozen=True)
 class Odometry:
-    """Motion since the last step as the robot measured it, in the robot frame before the motion.
+    """Motion since the previous step as the robot measured it, in the robot's frame before the motion.
 
-    Raises RobotError for numbers that are none.
+    Raises RobotError for numbers that are not finite.
     """
 
     motion: Float[np.ndarray, "3"]
@@ -198,31 +198,31 @@ class Odometry:
     cov: Float[np.ndarray, "3 3"]
     """Covariance of the motion's error, in the same frame."""
     touched: bool = False
-    """A bumper says that the body met something on the way; a robot without one never says so."""
+    """Whether a bumper was pressed on the way."""
     by_scans: bool = False
-    """The scan after the motion fits those before it where this puts it: nobody has moved the robot on the way."""
+    """Whether scan matching confirmed the motion, so that no unmodelled one is looked for."""
     wheels: "Odometry | None" = None
-    """What the wheels reported, where scans have told the motion instead."""
+    """What the wheels reported, if the motion is that of scan matching."""
 
     def __post_init__(self) -> None:
-        """Raise RobotError for numbers that are none."""
+        """Raise RobotError for numbers that are not finite."""
         if not (np.all(np.isfinite(self.motion)) and np.all(np.isfinite(self.cov))):
             raise RobotError("expected odometry of finite numbers, found others: correct what the wheels report")
 
     @property
     def reported(self) -> "Odometry":
-        """What the wheels reported, whoever told the motion."""
+        """What the wheels reported."""
         return self if self.wheels is None else self.wheels
 
     @property
     def states_its_error(self) -> bool:
-        """Whether anything of a motion is said to be uncertain; a rest may be certain."""
+        """Whether a motion has any uncertainty; a rest may have none."""
         return bool(np.any(self.cov.diagonal() > 0.0)) or not np.any(self.motion)
 
 
 @dataclass(frozen=True)
 class MotionCommand:
-    """One step of driving: an arc of constant curvature."""
+    """One step of driving: an arc of this length, m, and turn, rad."""
 
     forward_m: float
     turn_rad: float
@@ -230,12 +230,12 @@ class MotionCommand:
 
 @runtime_checkable
 class Robot(Protocol):
-    """Anything that senses and drives: the simulated robot, a recorded one, or real hardware."""
+    """Anything that senses and drives step by step: a simulated robot, a recorded one, or real hardware."""
 
     def sense(self) -> Scan:
-        """Return the scan at the present place."""
+        """Return the scan at the present pose."""
         ...
 
     def drive(self, command: MotionCommand) -> Odometry:
-        """Carry out one command and return the odometry."""
+        """Carry out one command and return its odometry."""
         ...

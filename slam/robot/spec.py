@@ -18,14 +18,14 @@ TURN_OF_WAY = float(np.deg2rad(10.0)) / 0.15
 
 @dataclass(frozen=True)
 class ScannerSpec:
-    """Where the range finder sits, in the robot frame: the origin is the middle of the axle, x points ahead."""
+    """Where the range finder is mounted: origin in the middle of the axle, x ahead, y to the left."""
 
     x_m: Offset = 0.0
-    """Ahead of the axle."""
+    """Position of the scanner ahead of the axle."""
     y_m: Offset = 0.0
-    """To the left."""
+    """Position of the scanner to the left of the axle's middle."""
     heading_rad: Heading = 0.0
-    """Where its bearing zero points, counter-clockwise from straight ahead."""
+    """Direction of the scanner's zero bearing, counter-clockwise from straight ahead."""
 
     @property
     def is_at_axle(self) -> bool:
@@ -48,24 +48,24 @@ class LidarSpec:
     """What is asked of the ranges that its scanner measures."""
 
     calibrate: bool = field(default=False, kw_only=True)
-    """Whether a bias and a scale of the ranges are estimated and taken out; else they are only told."""
+    """Correct the ranges by the bias and the scale that the mapper estimates; otherwise both are only reported."""
 
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """What a robot states of itself: planners, mapper, certificate and scores take it from here and nowhere else."""
+    """Description of a robot, which planners, mapper and scores share."""
 
     radius_m: Body = 0.2
-    """Radius of the body, a disc about the middle of the axle; with an outline it is that of its farthest corner,
-    whatever is said here."""
+    """Radius of the body, a disc around the middle of the axle; with an outline, its farthest corner gives the radius
+    instead."""
     outline_m: tuple[tuple[Offset, Offset], ...] | None = field(default=None, kw_only=True)
-    """Corners of a convex body around the middle of the axle, m, counter-clockwise; None for a disc."""
+    """Corners, in order, of a convex body around the middle of the axle; without them the body is a disc."""
     step_m: Body = 0.15
-    """Longest step; longer commands are shortened along the same arc."""
+    """Longest distance driven in one step; longer commands are shortened along the same arc."""
     turn_rad: Turn = float(np.deg2rad(10.0))
-    """Widest turn of one step; wider commands are shortened along the same arc."""
+    """Largest turn in one step; larger commands are shortened along the same arc."""
     can_reverse: bool = True
-    """Whether it can drive backwards."""
+    """Whether the robot can drive backwards."""
     scanner: ScannerSpec = field(default_factory=ScannerSpec)
     wheels: WheelSpec = field(default_factory=WheelSpec)
     lidar: LidarSpec = field(default_factory=LidarSpec)

@@ -33,13 +33,12 @@ STOPPING_S = 3.0
 
 
 class SteppedRobot:
-    """Makes `sense` and `drive` of a streaming robot (`Robot`); it stands still between two steps.
+    """Makes a `Robot` of a streaming robot, which stands still between two steps.
 
-    A command ends where the odometry says that it was driven, or where all of it was sent, whichever comes first. While
-    it waits it sends the twist again. Whatever goes wrong, the robot is stopped first. Raises RobotError where scans or
-    odometry stay away for `wait_s`, where the robot drives 1.3 times as far as it was told or cannot be stopped, and
-    once it was told to go and did not move, three times in turn. `clock` tells the robot's seconds, as a simulator's
-    that is not in real time.
+    A command ends once the odometry has reached it or all of it was sent, whichever comes first; velocities are sent
+    repeatedly. On any error the robot is stopped first. Raises RobotError if scans or odometry fail to arrive for
+    `wait_s`, if the robot drives 1.3 times as far as commanded or cannot be stopped, and if it did not move on three
+    commands in a row. `clock` returns the robot's time in seconds, for simulators that do not run in real time.
     """
 
     def __init__(
@@ -60,7 +59,7 @@ class SteppedRobot:
         self._gains: Gains = {}
 
     def sense(self) -> Scan:
-        """Return the scan at the present place, as if all its beams had been taken at its end."""
+        """Return the scan at the present pose, de-skewed to its last beam."""
         try:
             if self._at is None:
                 self._at = self._stream.after_pause()

@@ -1,4 +1,4 @@
-"""What a robot that streams gives and takes: scans with the times of their beams, and velocities."""
+"""The messages of a streaming robot: scans with the times of their beams, and velocities."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -11,27 +11,27 @@ from .messages import Odometry
 
 @dataclass(frozen=True)
 class TimedScan:
-    """One turn of the range finder as its driver gives it: beams one after another, while the robot may move."""
+    """One revolution of the range finder, as its driver reports it while the robot may move."""
 
     bearings_rad: Float[np.ndarray, " k"]
-    """In the order in which the beams were taken, evenly spaced, ascending or descending."""
+    """Evenly spaced, in the order of time, ascending or descending."""
     ranges_m: Float[np.ndarray, " k"]
-    """As in `Scan`: +inf where nothing came back, NaN where the beam tells nothing."""
+    """As in `Scan`: +inf for no return, NaN for an invalid beam."""
     sigma_m: float
     range_max_m: float
     start_s: float
-    """When the first beam was taken, on the robot's clock."""
+    """Time of the first beam, on the robot's clock."""
     end_s: float
-    """When the last one was."""
+    """Time of the last beam."""
     range_min_m: float = 0.0
-    """Returns below this tell nothing."""
+    """Returns below this are invalid."""
     sigma_share: float = 0.0
-    """As in `Scan`: standard deviation as a share of the range, beside `sigma_m`."""
+    """As in `Scan`: additional standard deviation as a share of the range."""
 
 
 @dataclass(frozen=True)
 class Twist:
-    """What the motors are to do until told otherwise."""
+    """Velocity that the motors keep until the next command."""
 
     speed_m_s: float
     turn_rad_s: float
@@ -39,24 +39,24 @@ class Twist:
 
 @runtime_checkable
 class StreamingRobot(Protocol):
-    """A robot whose scans, odometry and motors go on by themselves."""
+    """A robot that scans and moves continuously."""
 
     def scan(self) -> TimedScan | None:
-        """Wait for the next scan and return it; None where none has come within the driver's own patience.
+        """Wait for the next scan and return it; None if none arrives within the driver's own timeout.
 
-        It is called on a thread of its own, so that a robot whose scanner has died can be stopped.
+        It is called on a separate thread, so that a robot whose scanner has failed can still be stopped.
         """
         ...
 
     def odometry(self, from_s: float, to_s: float) -> Odometry:
         """Return the motion between two times, in the robot's frame at the first; called on the thread of `scan`.
 
-        Wait until the second time is known, if it is not yet.
+        It waits for odometry up to the second time.
         """
         ...
 
     def send(self, twist: Twist) -> None:
-        """Drive like this from now on."""
+        """Drive at this velocity from now on."""
         ...
 
     def stop(self) -> None:

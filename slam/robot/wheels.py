@@ -13,16 +13,17 @@ from .messages import Odometry
 
 @dataclass(frozen=True)
 class WheelSpec:
-    """Two driven wheels and how far they slip; the defaults lose 4 degrees of heading per square root of a metre."""
+    """Two driven wheels and their slip; by default the heading drifts by 4 degrees per square root of a metre."""
 
     base_m: Body = 0.4
-    """Distance m between the wheels."""
+    """Distance between the two wheels."""
     slip: Slip = 0.02
-    """Standard deviation m of a wheel's slip after one metre of its way; it grows with the square root."""
+    """Standard deviation of a wheel's slip after 1 m; it grows with the square root of the distance."""
     lateral_slip: Slip = 0.006
-    """Standard deviation m of the sideways slip after one metre of the wheels' mean way; likewise."""
+    """Standard deviation of the sideways slip after 1 m; it grows with the square root of the wheels' mean distance."""
     floor: Slip = 1e-6
-    """Standard deviation m and rad added to the stated covariance, so that it is positive definite for a rest too."""
+    """Standard deviation (m and rad) added to the odometry's covariance, so that it is positive definite even at
+    rest."""
 
     def ways(self, forward_m: float, turn_rad: float) -> tuple[float, float]:
         """Return the ways m of the left and the right wheel over an arc."""
@@ -51,17 +52,16 @@ class WheelSpec:
         return Odometry(arc(forward_m, turn_rad), 0.5 * (cov + cov.T))
 
     def odometry(self, left_m: float, right_m: float) -> Odometry:
-        """Return the motion that two encoders tell, by the ways of the left and the right wheel since the last one.
+        """Return the motion by two encoders, from the distances of the left and the right wheel since the last one, m.
 
-        A way is the counts of an encoder times what one of them is worth, m. A long drive is many of these, one after
-        another (`along`).
+        It is one arc; `along` combines many of them into a longer drive.
         """
         return self.over_arc(0.5 * (left_m + right_m), (right_m - left_m) / self.base_m)
 
     def along(self, poses: Float[np.ndarray, "n 3"]) -> Odometry:
-        """Return the motion from the first of some poses to the last, with the covariance of the way between them.
+        """Return the motion from the first pose to the last, with the covariance of the path along all of them.
 
-        Each short motion between two poses counts as an arc.
+        Each motion from one pose to the next counts as an arc.
         """
         motion, cov = np.zeros(3), np.zeros((3, 3))
         for before, after in pairwise(poses):

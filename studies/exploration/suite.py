@@ -1,4 +1,4 @@
-"""Many trials on many worlds, and one table of them: what the figures of docs/results.md come from.
+"""Many trials on many worlds, and one table of them: what the figures of docs/contributing/results.md come from.
 
 .venv/bin/python -m studies.exploration.suite --worlds paper-fig8 hall --seeds 20
 .venv/bin/python -m studies.exploration.suite --plans DIR --errorless

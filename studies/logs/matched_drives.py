@@ -19,6 +19,7 @@ from chainslam.experiments.trial import run_trial
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
+ROWS = Path("studies/logs/matched_drives.jsonl")
 NAMES = ("world", "backend", "odometry", "seed")
 SOURCES: tuple[OdometrySource, ...] = ("wheels", "scans")
 SCORES = (
@@ -27,8 +28,8 @@ SCORES = (
     *("false_matches", "duplicate_lines"),
 )
 HEAD = (
-    "world", "back end", "odometry", "runs", "complete", "pose ANEES, mean", "standard error", "median", "in the band",
-    "rms, m", "map ANEES, median", "false matches", "contours", "way, m",
+    "world", "back end", "odometry", "runs", "complete", "pose ANEES, mean", "standard error", "median",
+    "steps in the 95 % band", "pose error, m rms", "map ANEES, median", "false matches", "contours", "path, m",
 )  # fmt: skip
 
 
@@ -46,7 +47,7 @@ class MatchedStudy:
     """The seed of the first; the others follow it."""
     jobs: int = 1
     """Number of processes."""
-    out: Path = Path("studies/logs/matched_drives.jsonl")
+    out: Path = ROWS
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
     def run(self) -> None:

@@ -1,4 +1,4 @@
-"""How large the range noise of each log is, by the scatter of its beams about their lines; see `docs/logs.md`.
+"""How large the range noise of each log is, by the scatter of its beams about their lines (docs/contributing/logs.md).
 
 .venv/bin/python -m studies.logs.noise --logs DIR
 """

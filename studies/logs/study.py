@@ -24,13 +24,17 @@ from chainslam.experiments.usage import UsageError
 from chainslam.slam.backends import BACKENDS
 
 from ..runner.command import run_study
-from ..runner.rows import Row, rows_of
+from ..runner.rows import Row, last, read, rows_of
 
+ROWS = Path("studies/logs/rows.jsonl")
 NAMES = ("log", "backend", "odometry", "every")
 HEAD = (
-    "log", "back end", "odometry", "scans", "at scans, m", "degrees", "60 s apart, m", "interpolated, m",
-    "reference, m", "relations, median", "reference, median", "walls", "twice", "ms a scan", "status",
+    "log", "back end", "odometry", "scans", "relations at scans, m", "degrees", "60 s apart, m", "interpolated, m",
+    "reference, m rms", "normalised error of relations, median", "of poses, median", "poses in the 95 % band",
+    "pose error, m rms: true, stated", "walls", "duplicate walls", "ms a scan", "status",
 )  # fmt: skip
+REFINED = "_smoothed"
+"""In the names of what is scored after offline refinement."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class LogsStudy:
     """One of so many keyframes is mapped."""
     second_looks: bool = True
     """Whether all segments are associated anew once the drive has ended."""
-    out: Path = Path("studies/logs/rows.jsonl")
+    out: Path = ROWS
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
     def run(self) -> None:
@@ -82,35 +86,55 @@ def _one(study: LogsStudy, task: tuple[str, str]) -> list[Row]:
     return [of | told | {"cpu_ms_a_scan": ms, "log_s": float(run.log.scan_time_s[-1] - run.log.scan_time_s[0])}]
 
 
+def stored(path: Path) -> list[Row]:
+    """Return the last row of each run, each with the last scores after offline refinement of its log.
+
+    Refinement starts from scans and odometry alone, so that it gives the same path after any back end.
+    """
+    refined: dict[tuple[Any, ...], Row] = {}
+    for row in read(path, NAMES, any_code=True):
+        scores = {key: value for key, value in row.items() if REFINED in key}
+        refined |= {_log(row): scores} if scores else {}
+    rows = [row | refined.get(_log(row), {}) for row in last(path, NAMES)]
+    return sorted(rows, key=lambda row: (row["log"], row["every"], list(BACKENDS).index(row["backend"])))
+
+
+def _log(row: Row) -> tuple[Any, ...]:
+    return row["log"], row["odometry"], row["every"]
+
+
 def table(rows: Sequence[Row]) -> Table:
-    """Return a row for each run; what nobody measured is left out."""
+    """Return a row for each run and one for each refined log; what nobody measured is left out."""
     shown = Table(title="Logs of real robots", title_justify="left")
     for column in HEAD:
         shown.add_column(column, justify="left" if column in HEAD[:3] else "right")
-    for row in rows:
-        for tail in ("", "_smoothed"):
-            if not tail or f"relations{tail}" in row or f"reference{tail}" in row:
-                shown.add_row(*_cells(row, tail))
+    for log in dict.fromkeys(map(_log, rows)):
+        own = [row for row in rows if _log(row) == log]
+        for row in own:
+            counts = str(row["lines"]), str(row["duplicate_lines"]), f"{row['cpu_ms_a_scan']:.0f}", row["status"]
+            shown.add_row(row["log"], row["backend"], *_cells(row, ""), *counts)
+        if refined := [row for row in own if any(REFINED in key for key in row)]:
+            shown.add_row(log[0], "offline refinement", *_cells(refined[-1], REFINED), *["-"] * 4)
     return shown
 
 
 def _cells(row: Row, tail: str) -> list[str]:
     relations, reference = row.get(f"relations{tail}"), row.get(f"reference{tail}")
     at = relations["at_scans"] if relations else None
-    honest = [(row.get(f"{kind}_normalised") or {}).get("all") for kind in ("relations", "reference")]
+    pairs, poses = ((row.get(f"{kind}{tail}_normalised") or {}).get("all") for kind in ("relations", "reference"))
     numbers = [
         at and at["all"]["translation_m"]["mean"],
         at and float(np.rad2deg(at["all"]["rotation_rad"]["mean"])),
         at and at["far"]["translation_m"]["mean"],
         relations and relations["interpolated"]["all"]["translation_m"]["mean"],
         reference and reference["ate_aligned_m"],
-        *(found and found["median"] for found in honest),
+        pairs and pairs["median"],
+        poses and poses["median"],
+        poses and poses["in_band"],
     ]
-    return [
-        row["log"], row["backend"] + tail.replace("_", ", "), row["odometry"], str(row["steps"]),
-        *("-" if number is None else f"{number:.3f}" for number in numbers),
-        str(row["lines"]), str(row["duplicate_lines"]), f"{row['cpu_ms_a_scan']:.0f}", row["status"],
-    ]  # fmt: skip
+    off = f"{poses['error_m']:.3f}, {poses['stated_m']:.3f}" if poses else "-"
+    words = ("-" if number is None else f"{number:,.0f}" if number >= 1000 else f"{number:.3f}" for number in numbers)
+    return [row["odometry"], str(row["steps"]), *words, off]
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ from chainslam.slam.geometry.poses import rotation
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
 
+ROWS = Path("studies/logs/surveys.jsonl")
 NAMES = ("world", "bow_m", "seed")
 PIECE_M = 1.0
 """A wall that bows has a corner about so often."""
@@ -43,8 +44,8 @@ EVERY = 5
 WAY_M = 5.0
 """... that are farther apart than this along the path."""
 HEAD = (
-    "world", "walls bow by, m", "runs", "poses: ANEES", "median", "in the band", "rms, m", "stated, m",
-    "relations: ANEES", "median", "in the band", "rms, m", "stated, m",
+    "world", "walls bow by, m", "runs", "poses: ANEES", "median", "in the 95 % band", "error, m rms", "stated, m",
+    "relations: ANEES", "median", "in the 95 % band", "error, m rms", "stated, m",
 )  # fmt: skip
 
 
@@ -62,7 +63,7 @@ class SurveyStudy:
     """The seed of the first; the others follow it."""
     jobs: int = 1
     """Number of processes."""
-    out: Path = Path("studies/logs/surveys.jsonl")
+    out: Path = ROWS
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
 
     def run(self) -> None:

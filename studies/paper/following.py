@@ -92,7 +92,7 @@ class FollowingStudy:
             check(trial(task, self.max_steps))
         numbered = [(task, [task]) for task in tasks]
         rows = list(rows_of(self.out, NAMES, numbered, partial(_one, self.max_steps), self.jobs))
-        print(f"{len(rows)} rows in {self.out}; `python -m studies.paper.page` writes their tables")
+        print(f"{len(rows)} rows in {self.out}; `make results` makes their tables")
 
 
 def trial(task: Task, max_steps: int) -> TrialConfig:

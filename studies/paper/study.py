@@ -1,4 +1,4 @@
-"""The numbers of the paper's figures, one drive for each seed, and the page of their tables.
+"""The numbers of the paper's figures, one drive for each seed, stored; `make results` makes their tables.
 
 .venv/bin/python -m studies.paper.study --seeds 20      # goes on where it was interrupted
 """
@@ -12,16 +12,15 @@ from chainslam.experiments.usage import choose
 
 from ..runner.command import run_study
 from ..runner.rows import Row, rows_of
-from .page import PAGE, ROWS, write_page
+from .page import NAMES, ROWS
 
-NAMES = ("figure", "seed")
 TOGETHER = (("table1", "fig8"), ("fig9",), ("fig10", "fig11"), ("fig5", "fig6"), ("eq4",), ("fig4",))
 """Figures of one drive, which is made once for all of them."""
 
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """Drive for each of the paper's figures with each seed, store the numbers, and write the page of their tables."""
+    """Drive for each of the paper's figures with each seed, and store the numbers."""
 
     figures: tuple[str, ...] = tuple(REPRODUCTIONS)
     """Names as of `chainslam reproduce`."""
@@ -33,10 +32,9 @@ class PaperStudy:
     """Number of processes."""
     out: Path = ROWS
     """A line of JSON for each figure and seed, as it comes. What it holds of the same code is not run again."""
-    page: Path = PAGE
 
     def run(self) -> None:
-        """Run what is to be run and write the page; raises UsageError for bad names and another file."""
+        """Run what is to be run; raises UsageError for bad names and another file."""
         for name in self.figures:
             choose("figure", name, REPRODUCTIONS)
         groups = [tuple(name for name in group if name in self.figures) for group in TOGETHER]
@@ -47,8 +45,7 @@ class PaperStudy:
             if group
         ]
         rows = list(rows_of(self.out, NAMES, tasks, numbers_of, self.jobs))
-        write_page(rows, self.page)
-        print(f"{len(rows)} rows in {self.out}, their tables in {self.page}")
+        print(f"{len(rows)} rows in {self.out}; `make results` makes their tables")
 
 
 def numbers_of(task: tuple[tuple[str, ...], int]) -> Sequence[Row]:

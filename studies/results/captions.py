@@ -86,7 +86,7 @@ def _traversals(runs: Sequence[Path]) -> str:
 
 
 def _one_run(runs: Sequence[Path]) -> str:
-    return f"{_where(runs[0])} in the viewer: the map, what the estimator holds inside, the reasons"
+    return f"{_where(runs[0])} in the viewer: the map, the state of the estimator, the reasons for each decision"
 
 
 def _side_by_side(runs: Sequence[Path]) -> str:
@@ -102,12 +102,13 @@ def _looked(runs: Sequence[Path]) -> str:
     metres, walls = said["path_length_m"], said["second_looks"]["lines"]
     errors = said.get("relations_smoothed")
     error = "" if errors is None else f", {errors['at_scans']['all']['translation_m']['mean']:.3f} m off on average"
-    walls_and_path = f"{walls} walls and a path of {metres:.0f} m after second looks{error}"
+    walls_and_path = f"{walls} walls and a path of {metres:.0f} m after offline refinement{error}"
     return f"{_log(runs[0])}: {walls_and_path}; grey: wheel odometry"
 
 
 def _floor(runs: Sequence[Path]) -> str:
-    return f"{_log(runs[0])}: the floor that {read_summary(runs[0])['steps']} scans show, at the poses of second looks"
+    scans = read_summary(runs[0])["steps"]
+    return f"{_log(runs[0])}: the floor that {scans} scans show, at the poses of offline refinement"
 
 
 def _log_view(runs: Sequence[Path]) -> str:

@@ -1,26 +1,22 @@
 """What many rows come to, in the words of a table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
+import rich.table
 
 from chainslam.slam.evaluation.consistency import verdict_on_noise
 
+from ..runner.marks import short
 from ..runner.rows import Row
 
 Table = list[list[str]]
 
 
-@dataclass(frozen=True)
-class Found:
-    """What rows came to."""
-
-    table: Table
-    """The first row holds the columns' names."""
-    verdict: str
-    parts: Mapping[str, "Found"] = field(default_factory=dict)
-    """Of several tables each one, by its title; the table above is then none."""
+def of_console(table: rich.table.Table) -> Table:
+    """Return the cells of a table that a study prints."""
+    columns = [[str(column.header), *map(str, column.cells)] for column in table.columns]
+    return [list(cells) for cells in zip(*columns, strict=True)]
 
 
 def grouped(rows: Sequence[Row], name: str) -> Mapping[str, list[Row]]:
@@ -48,7 +44,7 @@ def median_of(rows: Sequence[Row], name: str, digits: int = 3) -> str:
 
 def typical(rows: Sequence[Row], name: str) -> str:
     """Return their mean and their median, in words."""
-    return f"{mean_of(rows, name):.3g}, {median_of(rows, name)}"
+    return f"{short(mean_of(rows, name))}, {median_of(rows, name)}"
 
 
 def pose_score(rows: Sequence[Row]) -> tuple[str, str]:
@@ -86,14 +82,3 @@ def closed_contours(rows: Sequence[Row]) -> str:
 def false_matches(rows: Sequence[Row]) -> list[int]:
     """Return the false matches of each row that are of segments of five beams or more: older rows have no others."""
     return [row["false_matches"] - row.get("false_matches_few_beams", 0) for row in rows]
-
-
-def touches_of(rows: Sequence[Row]) -> str:
-    """Return how often a wall was touched, in words."""
-    count = total(rows, "collisions")
-    return "no collision" if not count else f"{count} collisions"
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names in words."""
-    return ", ".join(names) if names else "none"

@@ -1,12 +1,11 @@
 """Tables of results in real plans: apartments, schools, courts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from ..runner.rows import Row
 from .figures import (
-    Found,
     Table,
     closed_contours,
     completed,
@@ -27,7 +26,7 @@ LOST = 3.0
 """A run whose mean NEES is this many times what the estimator expects no longer knows where it is."""
 
 
-def apartments(rows: Sequence[Row]) -> Found:
+def apartments(rows: Sequence[Row]) -> Table:
     """Return what exploring apartments with noise came to, by back end."""
     by = grouped(rows, "backend")
     table: Table = [["measure", *(f"`{name}`" for name in by)]]
@@ -53,26 +52,15 @@ def apartments(rows: Sequence[Row]) -> Found:
     }
     for words, figure in measures.items():
         table.append([words, *(figure(mine) for mine in by.values())])
-    return Found(table, " ".join(f"`{name}`: {completed(mine)} complete, {_anees(mine)}." for name, mine in by.items()))
+    return table
 
 
-def _anees(rows: Sequence[Row]) -> str:
-    """Return the map's ANEES and what it says of the covariance, in words."""
-    median = float(np.median(numbers(rows, "map_anees")))
-    told = "as wide as they should be" if 0.9 <= median <= 1.15 else "too narrow" if median > 1.15 else "too wide"
-    anees = f"map ANEES {mean_of(rows, 'map_anees'):.3g} in the mean, {median:.3g} at the median"
-    return f"{anees}: covariances are typically {told}"
-
-
-def real_plans(rows: Sequence[Row]) -> Found:
+def real_plans(rows: Sequence[Row]) -> Mapping[str, Table]:
     """Return how sure each back end is of the same drives in apartments, by its own matches and by the true ones.
 
     Rows of several versions of the code, of other apartments or other back ends, make a table each.
     """
-    made = list(grouped([{"code": ""} | row for row in rows], "code").values())
-    if len(made) == 1:
-        return _real_plans(made[0])
-    return Found([], "", {_counted(own): _real_plans(own) for own in made})
+    return {f"#### {_counted(own)}": _real_plans(own) for own in grouped(rows, "code").values()}
 
 
 def _counted(rows: Sequence[Row]) -> str:
@@ -80,7 +68,7 @@ def _counted(rows: Sequence[Row]) -> str:
     return f"{len(names)} back ends in {len(plans)} apartments"
 
 
-def _real_plans(rows: Sequence[Row]) -> Found:
+def _real_plans(rows: Sequence[Row]) -> Table:
     words, pose = pose_score(rows)
     head = ["back end", f"{words}: mean, median", "map ANEES: mean, median", "intervals that hold the truth"]
     table: Table = [["matches", *head, WRONG, "duplicate walls", NOISE]]
@@ -98,33 +86,26 @@ def _real_plans(rows: Sequence[Row]) -> Found:
             wrong = float(np.mean(false_matches(mine)))
             doubles = f"{mean_of(mine, 'duplicate_lines'):.2f}"
             table.append([*cells, f"{wrong:.2f}", doubles, innovations(mine)])
-    own = grouped([row for row in rows if row["stage"] == "own"], "backend")
-    plans = len({row["world"] for row in rows})
-    maps = ", ".join(f"`{name}` {mean_of(mine, 'map_anees'):.3g}" for name, mine in own.items())
-    return Found(table, f"The mean map ANEES over {plans} apartments: {maps}.")
+    return table
 
 
-def schools(rows: Sequence[Row]) -> Found:
+def schools(rows: Sequence[Row]) -> Table:
     """Return how back ends fare in schools over a limited number of steps, and which of them loses fewest maps."""
     words, pose = pose_score(rows)
     head = ["back end", "runs", "exceptions", f"{words}: median", "map ANEES: median"]
     lost = f"lost: pose ANEES above {LOST:g}"
     table: Table = [[*head, lost, "coverage by then: mean", f"{WRONG} a run", "collisions", NOISE]]
-    shares = {}
     for backend, mine in grouped(rows, "backend").items():
         medians = [median_of(mine, name) for name in (pose, "map_anees")]
         failed, gone = sum(bool(row["raised"]) for row in mine), sum(v > LOST for v in numbers(mine, "pose_anees"))
-        shares[backend] = f"`{backend}` {gone} of {len(mine)}"
         cells = [f"`{backend}`", str(len(mine)), str(failed), *medians, str(gone)]
         covered, wrong = mean_of(mine, "coverage_own_frame"), np.mean(false_matches(mine))
         cells += [f"{covered:.3f}", f"{wrong:.1f}", str(total(mine, "collisions"))]
         table.append([*cells, innovations(mine)])
-    failed = sum(bool(row["raised"]) for row in rows)
-    verdict = "No run ended by an exception." if not failed else f"Ended by an exception: {failed} runs."
-    return Found(table, f"{verdict} Maps lost: {'; '.join(shares.values())}.")
+    return table
 
 
-def whole_schools(rows: Sequence[Row]) -> Found:
+def whole_schools(rows: Sequence[Row]) -> Table:
     """Return what exploring schools to their end came to, by back end."""
     words, pose = pose_score(rows)
     head = ["back end", "complete", "coverage: mean, least", "own frame: mean", f"{words}: median"]
@@ -135,33 +116,36 @@ def whole_schools(rows: Sequence[Row]) -> Found:
         cells += [f"{mean_of(mine, 'coverage_own_frame'):.4f}", median_of(mine, pose)]
         cells += [typical(mine, "map_anees"), f"{np.mean(false_matches(mine)):.1f}", f"{mean_of(mine, 'steps'):.0f}"]
         table.append([*cells, str(total(mine, "collisions")), innovations(mine)])
-    by = grouped(rows, "backend")
-    return Found(table, " ".join(f"`{name}`: {completed(mine)} complete, {_anees(mine)}." for name, mine in by.items()))
+    return table
 
 
-def courts(rows: Sequence[Row]) -> Found:
+def courts(rows: Sequence[Row]) -> Table:
     """Return what courts come to, where a robot begins without a wall in sight."""
-    table: Table = [["court", "runs", "floor seen: least, mean", "coverage, own frame: mean", "collisions"]]
+    head = ["court", "runs", "complete", "floor seen: least, mean", "coverage, own frame: mean", "collisions"]
+    table: Table = [head]
     for world, mine in grouped(rows, "world").items():
         swept = [row["swept"] for row in mine]
         own = f"{mean_of(mine, 'coverage_own_frame'):.3f}"
-        cells = [f"`{world}`", str(len(mine)), f"{min(swept):.3f}, {np.mean(swept):.3f}", own]
+        cells = [f"`{world}`", str(len(mine)), completed(mine), f"{min(swept):.3f}, {np.mean(swept):.3f}", own]
         table.append([*cells, str(total(mine, "collisions"))])
-    early = sum(row["status"] == "complete" and row["swept"] < 0.99 for row in rows)
-    return Found(table, f"{early} of {len(rows)} runs ended too early. 3,000 steps do not finish such a building.")
+    return table
 
 
-def navigation(rows: Sequence[Row]) -> Found:
+def navigation(rows: Sequence[Row]) -> Table:
     """Return both navigations beside each other, over the plans that both have driven."""
     by = {name: {row["file"]: row for row in mine} for name, mine in grouped(rows, "navigation").items()}
     both = sorted(set.intersection(*(set(mine) for mine in by.values())))
-    head = ["navigation", "runs", "complete", "path: sum", "steps: sum", "planning, mean of a step", "collisions"]
-    table: Table = [head]
+    head = ["navigation", "complete", "path: sum", "over that over the floor", "steps: sum"]
+    table: Table = [[*head, "planning, mean of a step", "collisions"]]
     for name, mine in by.items():
         pairs = [mine[file] for file in both]
-        cells = [f"`{name}`", str(len(pairs)), completed(pairs), f"{total(pairs, 'path_length_m'):.0f} m"]
+        logs = [np.log(row["path_length_m"] / by["floor"][row["file"]]["path_length_m"]) for row in pairs]
+        cells = [
+            f"`{name}`",
+            completed(pairs),
+            f"{total(pairs, 'path_length_m'):.0f} m",
+            f"{np.exp(np.mean(logs)):.2f}",
+        ]
         planning = f"{mean_of(pairs, 'planning_ms_mean'):.1f} ms"
         table.append([*cells, str(total(pairs, "steps")), planning, str(total(pairs, "collisions"))])
-    ratio = [by["visibility"][file]["path_length_m"] / by["floor"][file]["path_length_m"] for file in both]
-    share = float(np.exp(np.mean(np.log(ratio))))
-    return Found(table, f"In the geometric mean ways by walls are {share:.2f} times as long as over the floor.")
+    return table

@@ -1,7 +1,6 @@
-"""What goes wrong with a robot without its saying so: how each fault ends, by a table in docs/robots.md.
+"""What goes wrong with a robot without its saying so: how each fault ends.
 
-.venv/bin/python -m studies.robots.faults              # goes on where it was interrupted, and writes the table anew
-.venv/bin/python -m studies.robots.faults --any-code   # the table of all stored rows, whatever code made them
+.venv/bin/python -m studies.robots.faults     # goes on where it was interrupted; `make results` makes its page
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,19 +18,20 @@ from chainslam.sim.people import PeopleConfig
 from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
+from ..runner.marks import markdown, short
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 
 HEAD = (
-    "fault", "status", "steps", "over those without", "coverage, least", "pose ANEES", "map ANEES",
-    "walls", "contacts", "reason",
+    "fault", "status", "steps", "over those without the fault", "coverage, least", "pose ANEES", "map ANEES",
+    "walls", "collisions", "reason",
 )  # fmt: skip
 NAMES = ("case", "world", "backend", "seed", "max_steps")
 KEPT = (
     "status", "reason", "steps", "coverage", "pose_anees", "map_anees", "collisions", "unstated_motions",
     "lost_steps", "wheel_noise_factor", "lines", "processor_s",
 )  # fmt: skip
-BEGINS, ENDS = "<!-- made by `make robots`: begins -->", "<!-- made by `make robots`: ends -->"
+ROWS = Path("studies/robots/rows.jsonl")
 SOUND = "none"
 FROM = 100
 """From this scan or drive on, of the faults that begin on the way."""
@@ -67,7 +67,7 @@ CASES: Mapping[str, FaultsConfig] = {
 
 @dataclass(frozen=True)
 class FaultsStudy:
-    """Explore a world with each fault, and write a row for each into the page."""
+    """Explore a world with each fault, and print a row for each."""
 
     world: str = "rooms"
     """A bundled world or a file."""
@@ -82,28 +82,21 @@ class FaultsStudy:
     max_steps: int = 1500
     """A run is stopped after this many scans."""
     only: tuple[str, ...] = ()
-    """Faults whose names hold one of these words; all without. The page stays as it is then."""
+    """Faults whose names hold one of these words; all without."""
     jobs: int = 1
     """Number of processes."""
-    any_code: bool = False
-    """Whether rows of other versions of the code count, too."""
-    out: Path = Path("studies/robots/rows.jsonl")
+    out: Path = ROWS
     """A line of JSON for each run, as it ends. What it holds of the same code already is not run again."""
-    page: Path = Path("docs/robots.md")
-    """Where the table goes."""
 
     def run(self) -> None:
-        """Run what is to be run, print the table, and write it into the page; raises UsageError."""
+        """Run what is to be run and print the table; raises UsageError."""
         check(self.trial(SOUND, 1))
         cases = [case for case in CASES if not self.only or any(word in case for word in (SOUND, *self.only))]
         seeds = range(self.first_seed, self.first_seed + self.seeds)
         keys = [(case, self.world, self.backend, seed, self.max_steps) for seed in seeds for case in cases]
         tasks = [((key[0], key[3]), [key]) for key in keys]
-        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, self), self.jobs, self.any_code))
-        lines = lines_of(rows)
-        plain_console(width=250).print("\n".join(lines))
-        if not self.only:
-            self.page.write_text(with_table(self.page.read_text(), lines))
+        rows = list(rows_of(self.out, NAMES, tasks, partial(_one_of, self), self.jobs))
+        plain_console(width=250).print(markdown(table(rows)))
 
     def trial(self, case: str, seed: int) -> TrialConfig:
         """Return the trial of one fault."""
@@ -119,41 +112,35 @@ def _one_of(study: FaultsStudy, task: tuple[str, int]) -> list[Row]:
     return [names | kept]
 
 
-def lines_of(rows: Sequence[Row]) -> list[str]:
-    """Return the table's lines: for each fault what its runs have, one after another, by seed."""
+def table(rows: Sequence[Row]) -> list[list[str]]:
+    """Return for each fault what its runs have, one after another, by seed."""
     without = {row["seed"]: row["steps"] for row in rows if row["case"] == SOUND}
-    lines = [_line(HEAD), _line(["---"] * len(HEAD))]
-    for case in (case for case in CASES if any(row["case"] == case for row in rows)):
-        own = sorted((row for row in rows if row["case"] == case), key=lambda row: row["seed"])
+    found = [list(HEAD)]
+    for case, own in by_case(rows).items():
         ratios = [f"{row['steps'] / without[row['seed']]:.2f}" for row in own if row["seed"] in without]
         reasons = dict.fromkeys(row["reason"] for row in own)
-        cells = (
+        found.append([
             case, _each(dict.fromkeys(row["status"] for row in own)), _each(row["steps"] for row in own),
             "" if case == SOUND else _each(ratios), f"{min(row['coverage'] for row in own):.3f}",
-            *(_each(_short(row[name]) for row in own) for name in ("pose_anees", "map_anees")),
+            *(_each(_score(row[name]) for row in own) for name in ("pose_anees", "map_anees")),
             _each(row["lines"] for row in own), _each(row["collisions"] for row in own), "; ".join(reasons),
-        )  # fmt: skip
-        lines.append(_line(cells))
-    return lines
+        ])  # fmt: skip
+    return found
 
 
-def with_table(page: str, lines: Sequence[str]) -> str:
-    """Return the page with these lines between its two marks; raises ValueError where it has none."""
-    before, rest = page.split(BEGINS)
-    _, after = rest.split(ENDS)
-    return "\n".join([before + BEGINS, *lines, ENDS + after])
+def by_case(rows: Sequence[Row]) -> Mapping[str, list[Row]]:
+    """Return the rows of each fault by seed, in the order of the faults."""
+    ordered = sorted(rows, key=lambda row: row["seed"])
+    found = {case: [row for row in ordered if row["case"] == case] for case in CASES}
+    return {case: own for case, own in found.items() if own}
 
 
 def _each(values: Iterable[object]) -> str:
     return ", ".join(map(str, values))
 
 
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}" if value < 1000.0 else f"{value:,.0f}"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _score(value: float | None) -> str:
+    return "-" if value is None else short(value)
 
 
 if __name__ == "__main__":

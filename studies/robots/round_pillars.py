@@ -21,8 +21,8 @@ from shapely.geometry.polygon import orient
 import chainslam
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.experiments.terminal.console import plain_console
-from chainslam.experiments.terminal.progress import number
 from chainslam.experiments.trial import run_trial
+from chainslam.experiments.views.numbers import number
 from chainslam.sim.lidar import LidarConfig
 from chainslam.sim.robot import RobotConfig
 from chainslam.sim.worlds import World

@@ -1,4 +1,4 @@
-"""The table of docs/rules.md, from what was stored of the tests and of the runs.
+"""The table of docs/contributing/rules.md, from what was stored of the tests and of the runs.
 
 .venv/bin/python -m studies.rules.report
 """
@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import tyro
 
+from ..runner.marks import filled
 from .table import SWITCHES, WHAT
 from .verdicts import BASELINE, LIKELY, Row, changes, worse
-
-BEGIN, END = "<!-- made by `make rules-table` -->", "<!-- end -->"
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Report:
     """Which test holds which rule."""
     rows: Path = Path("studies/rules/rows.jsonl")
     """The runs with all rules and with each off."""
-    page: Path = Path("docs/rules.md")
+    page: Path = Path("docs/contributing/rules.md")
 
 
 def tables(held: Mapping[str, str], rows: Sequence[Row]) -> str:
@@ -89,10 +88,8 @@ def main() -> int:
     """Write the page and return the exit status."""
     report = tyro.cli(Report, prog="studies.rules.report")
     held = {row["rule"]: row["held_by"] for row in read_lines(report.held)}
-    before, _, rest = report.page.read_text().partition(BEGIN)
-    after = rest.partition(END)[2]
     made = tables(held, read_lines(report.rows))
-    report.page.write_text(f"{before}{BEGIN}\n\n{made}\n{END}{after}")
+    report.page.write_text(filled(report.page.read_text(), lambda _: made.rstrip()))
     return 0
 
 

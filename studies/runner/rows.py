@@ -4,6 +4,7 @@ import ast
 import hashlib
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -68,6 +69,23 @@ def read(path: Path, names: Sequence[str] = (), any_code: bool = False) -> list[
             f"expected rows with {', '.join(names)} in {path}, found {error!r}: name another --out"
         ) from error
     return [row for row in rows if any_code or row["code"] == fingerprint()]
+
+
+def newest(path: Path, each: str = "") -> list[Row]:
+    """Return the rows of the code that has most of them in a file, the last one where several have.
+
+    With `each`, of every value under this name: what is made one by one may be of several codes.
+    """
+    groups: dict[str, list[Row]] = {}
+    for row in read(path, any_code=True):
+        groups.setdefault(row[each] if each else "", []).append(row)
+    counts = {name: Counter(row["code"] for row in reversed(rows)) for name, rows in groups.items()}
+    return [row for name, rows in groups.items() for row in rows if row["code"] == counts[name].most_common(1)[0][0]]
+
+
+def last(path: Path, names: Sequence[str]) -> list[Row]:
+    """Return the last row of each key in a file, of whatever code."""
+    return list({key_of(row, names): row for row in read(path, names, any_code=True)}.values())
 
 
 def append(path: Path, rows: Iterable[Row]) -> list[Row]:

@@ -1,4 +1,4 @@
-"""Every command of README and docs: those of the README and the tutorial run, all others name what there is."""
+"""Every command of README and docs names what there is; `test_pages_run.py` runs those of the user's pages."""
 
 import importlib.util
 import re
@@ -17,7 +17,6 @@ PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md")),
     *(page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts),
 ]
-TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("*.md"))
 PROGRAM, PYTHON = ".venv/bin/chainslam", ".venv/bin/python"
 TARGETS = re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
 STAND_INS = {"N": "1", "ADDRESS": "127.0.0.1:8786", "...": "full-ekf"}
@@ -87,27 +86,14 @@ def test_every_option_of_a_module_is_in_its_help():
         if module in ("pytest", "benchmarks.recording_pairs"):
             continue
         if module not in helps:
-            done = _python("-m", module, "--help", cwd=ROOT)
+            done = python("-m", module, "--help", cwd=ROOT)
             assert done.returncode == 0, f"{line}: {done.stderr}"
             helps[module] = done.stdout
         for option in (word.partition("=")[0] for word in rest if word.startswith("--")):
             assert option in helps[module], line
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("page", [ROOT / "README.md", *TUTORIAL], ids=name)
-def test_the_commands_of_readme_and_tutorial_run_one_after_the_other(page, tmp_path):
-    for caption, content in re.findall(r":caption: (\S+)\n\n(.*?)^```", page.read_text(), flags=re.M | re.S):
-        (tmp_path / caption).write_text(content)
-    found = [shlex.split(line)[1:] for line in commands(page) if line.startswith(PROGRAM)]
-    assert len(found) >= 3
-    for words in found:
-        done = _python("-m", "chainslam.experiments.commands.cli", *words, cwd=tmp_path)
-        assert done.returncode == 0, f"{words}: {done.stderr}"
-    for report in (words[1] for words in found if words[0] == "report"):
-        assert re.search("<svg|<img", (tmp_path / report / "report.html").read_text())
-
-
-def _python(*words, cwd):
+def python(*words, cwd):
+    """Run Python on these sources in a folder, and return what came of it."""
     env = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "OMP_NUM_THREADS": "1", "HOME": str(Path.home())}
     return subprocess.run([sys.executable, *words], cwd=cwd, capture_output=True, text=True, env=env, check=False)

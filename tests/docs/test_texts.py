@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from chainslam.experiments.artifacts.schema import settings_in
 from chainslam.experiments.artifacts.settings import record_of
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.views.settings_schema import settings
+from chainslam.experiments.views.settings_schema import groups
 
 ROOT = Path(__file__).parents[2]
 DOCS = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
@@ -31,7 +32,7 @@ def test_every_setting_that_a_text_names_is_one():
             yield from keys(value, f"{before}{key}.") if isinstance(value, dict) else ()
 
     known = set(keys(record_of(TrialConfig("paper-fig4"))))
-    of_classes_known = {f"{each.group.kind.__name__}.{each.name}" for each in settings()}
+    of_classes_known = {f"{group.kind.__name__}.{name}" for group in groups() for name in settings_in(group.kind)}
     for page in PAGES:
         text = page.read_text()
         named = re.findall(r"`(?:--set )?((?:mission|robot|backend_options)\.[a-z_.0-9]+)(?:=[^`]*)?`", text)
@@ -53,12 +54,12 @@ def test_the_figures_of_the_readme_are_those_of_the_drive_in_its_picture(tmp_pat
     told = re.search(r"filter has (\S+), the full EKF (\S+) and the graph (\S+)\.\n", (ROOT / "README.md").read_text())
     assert [float(value) for value in told.groups()] == pytest.approx(scores, rel=0.005)
     run = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert f"`make demo`: {run['steps']} steps, {run['path_length_m']:.1f} m." in (ROOT / "README.md").read_text()
+    assert f"`make demo`: {run['steps']} steps, {run['path_length_m']:.1f} m." in (ROOT / "docs/index.md").read_text()
 
 
-def test_the_animation_of_the_readme_is_small():
+def test_the_animation_of_the_first_page_is_small():
     path = ROOT / "docs" / "pictures" / "exploration.gif"
-    assert "(docs/pictures/exploration.gif)" in (ROOT / "README.md").read_text()
+    assert "(pictures/exploration.gif)" in (ROOT / "docs" / "index.md").read_text()
     assert path.stat().st_size < 3e6
     with Image.open(path) as animation:
         assert animation.n_frames > 50
@@ -68,7 +69,7 @@ def test_every_page_is_shown_for_a_screen_and_for_a_phone():
     shown = sorted((ROOT / "docs" / "pictures" / "pages").iterdir())
     assert {path.stem.rpartition("-")[0] for path in shown} == {"run", "replay", "campaign", "site"}
     for path in shown:
-        assert f"({Path('..') / 'pictures' / 'pages' / path.name})" in (ROOT / "docs/reference/pages.md").read_text()
+        assert f"({Path('..') / 'pictures' / 'pages' / path.name})" in (ROOT / "docs/contributing/pages.md").read_text()
         assert path.stat().st_size < 250_000
         with Image.open(path) as picture:
             assert picture.width == int(path.stem.rpartition("-")[2])

@@ -3,8 +3,8 @@
 import pytest
 
 from chainslam.experiments.scenario import TrialConfig
-from chainslam.experiments.terminal.progress import range_errors_of, words_on_ranges
 from chainslam.experiments.trial import run_trial
+from chainslam.experiments.views.run_lines import range_errors_of, words_on_ranges
 from chainslam.sim.faults import FaultsConfig
 from chainslam.sim.lidar import LidarConfig
 from chainslam.sim.robot import RobotConfig

@@ -1,6 +1,6 @@
 """How many inputs of each kind are read rightly, refused in one line, or read wrongly.
 
-.venv/bin/python -m tests.kinds --count 40 --page docs/testing.md
+.venv/bin/python -m tests.kinds --count 40 --page docs/contributing/testing.md
 """
 
 import sys

@@ -13,7 +13,7 @@ from .case import Case, verdict
 from .registry import KINDS
 
 DRAWS = range(2)
-PAGE = Path(__file__).parents[2] / "docs" / "testing.md"
+PAGE = Path(__file__).parents[2] / "docs" / "contributing" / "testing.md"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-PAGE = EXAMPLES.parent / "docs" / "python.md"
+PAGE = EXAMPLES.parent / "docs" / "howto" / "python.md"
 SAID = {
     "own_backend": "axioms that fail: 0\n",
     "own_strategy": "farthest: complete",

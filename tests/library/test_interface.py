@@ -138,6 +138,47 @@ def test_a_run_without_a_folder_keeps_its_files_as_long_as_it_lives():
     assert not folder.exists()
 
 
+def test_a_stopped_run_goes_on_as_by_the_command(tmp_path):
+    places = [tmp_path / name for name in ("ours", "theirs")]
+    for place in places:
+        chainslam.explore("paper-fig4", seed=2, max_steps=5, out=place)
+    seen = []
+    run = chainslam.explore(resume=places[0], max_steps=12, watch=lambda step: seen.append(step.index))
+    assert main(["explore", "--resume", str(places[1]), "--max-steps", "12"]) == 0
+    assert run.summary["steps"] == 12
+    assert seen == list(range(12))
+    for name in ("config.json", "map.npz", "log.npz", "trajectory_estimated.tum"):
+        assert (places[0] / name).read_bytes() == (places[1] / name).read_bytes()
+    elsewhere = chainslam.explore(resume=run, max_steps=14, out=tmp_path / "more")
+    assert (elsewhere.summary["steps"], chainslam.load(places[0]).summary["steps"]) == (14, 12)
+    seen.clear()
+    assert chainslam.explore(resume=run, watch=seen.append).folder == run.folder  # finished: nothing to do
+    assert seen == []
+
+
+def test_a_run_without_a_folder_goes_on_and_is_kept_by_whoever_has_it():
+    run = chainslam.explore("paper-fig4", max_steps=3)
+    again = chainslam.explore(resume=run, max_steps=4)
+    del run
+    assert again.summary["steps"] == 4
+
+
+def test_a_saved_run_has_settled_all_but_its_limits(run, tmp_path):
+    for words, said in (
+        ("found world", {"world": "paper-fig4"}),
+        ("found seed", {"seed": 4}),
+        ("found scale", {"scale": 2.0}),
+        ("found set", {"settings": {"seed": 3}}),
+        ("limits beyond the 30 steps", {"max_steps": 10}),
+    ):
+        with pytest.raises(chainslam.UsageError, match=words):
+            chainslam.explore(resume=run, **said)
+    with pytest.raises(chainslam.UsageError, match=r"expected config\.json"):
+        chainslam.explore(resume=tmp_path / "nothing")
+    with pytest.raises(chainslam.UsageError, match="expected a WORLD or --resume DIR"):
+        chainslam.explore()
+
+
 def test_a_log_goes_through_one_back_end_or_several(run):
     assert chainslam.replay(run, backend="full-ekf").summary["backend"] == "full-ekf"
     runs = chainslam.replay(run.folder / "log.npz", backend=["block-ekf", "fej-ekf"])

@@ -1,4 +1,4 @@
-"""Both followings: which runs the study makes, what a row holds, and that the page's words are those of the rows."""
+"""Both followings: which runs the study makes, what a row holds, and what the tables say of the rows."""
 
 from dataclasses import replace
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from chainslam.explore.following.behaviour import Behaviour
-from studies.paper import following
+from studies.paper import following, following_tables
 from studies.paper.following import BY_BACKEND, BY_METHOD, FollowingStudy, trial
-from studies.paper.following_tables import following_section, strategies_in_words
+from studies.paper.following_tables import costs, figures
 
 
 def row(**changes):
@@ -60,23 +60,29 @@ def test_a_row_tells_what_the_steps_were_spent_on():
     assert made["collisions"] == 0
 
 
-@pytest.mark.parametrize(("paper", "verdict"), [(30.0, "changes"), (10.0, "is not shown to change")])
-def test_the_answer_is_that_of_the_rows(paper, verdict):
-    rows = rows_of({"paper": paper, "viewpoints": 10.0})
-    words = following_section(rows)[-2]
-    assert words.count(f"so the following {verdict} what it costs") == 2
-    told = float(words.partition("multiplies the pose ANEES by ")[2].split()[0])
-    assert told == pytest.approx(paper, rel=0.1)
+@pytest.mark.parametrize(("paper", "differs"), [(30.0, True), (10.0, False)])
+def test_the_cost_of_the_shortcut_is_that_of_the_rows(paper, differs):
+    _, table = costs(rows_of({"paper": paper, "viewpoints": 10.0})).values()
+    assert [line[0] for line in table[1:]] == ["pose ANEES", "map ANEES"]
+    for _, own, _, ratio in table[1:]:
+        assert float(own.split()[0]) == pytest.approx(paper, rel=0.1)
+        low, high = map(float, ratio.split("(")[1].rstrip(")").split(" to "))
+        assert not low <= 1.0 <= high if differs else low <= 1.0 <= high
+
+
+def test_the_interval_of_a_comparison_is_wider_since_two_scores_are_compared():
+    logs = np.log([1.0, 2.0, 3.0, 4.0, 5.0])
+    widths = [
+        float(high) / float(low)
+        for level in (0.95, 0.975)
+        for low, high in [following_tables._interval(logs, level).split("(")[1].rstrip(")").split(" to ")]
+    ]
+    assert widths[0] < widths[1]
 
 
 def test_the_factor_between_the_strategies_is_that_of_the_rows():
-    rows = rows_of({"paper": 1.0, "viewpoints": 1.0})
-    lines = following_section(rows)
-    assert next(line for line in lines if line.startswith("| fig6 / fig5")).endswith("| 3; 3 | 3; 3 |")
-    assert "20.0 m by the strategy of figure 5 and 60.0 m by that of figure 6, 3.00 times" in strategies_in_words(rows)
-    assert strategies_in_words([]) == ""
+    assert figures(rows_of({"paper": 1.0, "viewpoints": 1.0}))[-1][-2:] == ["3; 3", "3; 3"]
 
 
-def test_a_table_without_rows_is_none():
-    assert following_section([]) == []
+def test_seeds_may_begin_anywhere():
     assert replace(FollowingStudy(), first_seed=31, seeds=1).tasks()[-1][-1] == 31

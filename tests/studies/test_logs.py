@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from studies.logs.study import LogsStudy, table
+from studies.logs.study import LogsStudy, stored, table
 from studies.runner.command import run_study
 
 
@@ -32,12 +32,24 @@ def test_each_log_has_a_row_for_each_path_and_is_not_run_twice(tmp_path, monkeyp
     assert row["relations"]["at_scans"]["far"]["translation_m"]["mean"] == pytest.approx(0.1, abs=0.03)
     assert "reference" not in row
     found = cells([row])
-    assert found[1] == ["full-ekf", "full-ekf, smoothed"]
+    assert found[1] == ["full-ekf", "offline refinement"]
     assert found[4][0] == f"{row['relations']['at_scans']['all']['translation_m']['mean']:.3f}"
     assert found[8] == ["-", "-"]
     monkeypatch.setattr("studies.logs.study.replay_real", None)
     study.run()
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 1
+
+
+def test_a_log_has_the_last_refinement_of_its_path_whichever_run_made_it(tmp_path):
+    path, run = tmp_path / "rows.jsonl", {"code": "a", "log": "hall", "odometry": "scans", "every": 1}
+    rows = [
+        run | {"backend": "graph", "steps": 1, "reference_smoothed": 1.0},
+        run | {"backend": "full-ekf", "steps": 2, "reference_smoothed": 2.0},
+        run | {"backend": "graph", "steps": 3},
+        run | {"backend": "graph", "every": 2, "steps": 4},
+    ]
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert [(row["steps"], row.get("reference_smoothed")) for row in stored(path)] == [(2, 2.0), (3, 2.0), (4, None)]
 
 
 def test_an_unknown_back_end_is_told_in_one_line(tmp_path, monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""The page of the paper's figures says what the stored drives say, of each figure and back end."""
+"""The tables of the paper's figures say what the stored drives say, of each figure and back end."""
 
 import json
 from pathlib import Path
@@ -17,8 +17,7 @@ from chainslam.slam.evaluation.consistency import bound_margins
 from chainslam.slam.geometry.poses import wrap
 from studies.paper import following, page, rivals, study
 from studies.paper.following import ROWS as FOLLOWED
-from studies.paper.following_tables import read_following
-from studies.runner.rows import fingerprint
+from studies.runner.rows import last
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,6 +35,8 @@ def row(figure, seed, **numbers):
         ([True, False, True], "2 of 3"),
         (["2 of 2", "2 of 2"], "2 of 2"),
         (["2 of 2", "1 of 2", "2 of 2"], "2 of 2 in 2; 1 of 2 in 1"),
+        (list("abcd"), "4 different ones"),
+        ([12345.0, 999.0], "6,670 (999 to 12,300)"),
         ([4.0, None], "4; 1 without"),
         ([None, None], "-"),
     ],
@@ -54,23 +55,16 @@ def test_a_table_has_the_papers_value_beside_each_back_end():
     assert lines[1] == ["path, m", "33.0", "2 (1 to 3)", "3 (2 to 4)"]
     assert lines[2] == ["walls", "", "-", "1; 1 without"]
     rows = [row("fig8", 2, **drives[1]), row("fig8", 1, **drives[0])]
-    assert "| path, m | 33.0 | 2 (1 to 3) | 3 (2 to 4) |" in page.page_of(rows).splitlines()
+    ((above, table),) = page.figures(rows).items()
+    assert above.startswith("## Figure 8: the map of the cyclic environment")
+    assert table[1] == ["path, m", "33.0", "2 (1 to 3)", "3 (2 to 4)"]
     assert page.tables_of(rows)[0].rows[0] == ("path, m", "33.0", "2 (1 to 3)", "3 (2 to 4)")
 
 
-def test_stale_tables_are_those_of_other_code():
-    fresh = row("fig8", 1) | {"code": fingerprint()}
-    assert page.stale([fresh, row("fig9", 1)]) == ["fig9"]
-    assert page.stale([fresh, row("fig8", 2)]) == ["fig8"]
-    assert page.stale([fresh]) == []
-
-
-def test_the_page_is_what_the_stored_rows_give():
-    rows = page.read_rows(ROOT / page.ROWS)
+def test_every_figure_has_stored_rows():
+    rows = last(ROOT / page.ROWS, page.NAMES)
     assert {each["figure"] for each in rows} <= set(REPRODUCTIONS)
     assert len(rows) >= len(REPRODUCTIONS)
-    followed = read_following(ROOT / FOLLOWED)
-    assert (ROOT / page.PAGE).read_text() == page.page_of(rows, followed)
 
 
 def test_a_row_holds_the_numbers_of_one_drive_by_each_back_end(monkeypatch):
@@ -105,7 +99,7 @@ def alike(stored, made):
 @pytest.mark.parametrize("figures", [("table1", "fig8"), ("fig9",), ("fig10", "fig11")])
 def test_the_stored_rows_of_the_figures_are_of_todays_behaviour(figures):
     """One drive of each is made anew: a row of an older behaviour tells what the code no longer does (`make paper`)."""
-    rows = page.read_rows(ROOT / page.ROWS)
+    rows = last(ROOT / page.ROWS, page.NAMES)
     for made in study.numbers_of((figures, 1)):
         (stored,) = [each for each in rows if (each["figure"], each["seed"]) == (made["figure"], 1)]
         assert alike(stored["numbers"], json.loads(json.dumps(made["numbers"])))
@@ -114,7 +108,7 @@ def test_the_stored_rows_of_the_figures_are_of_todays_behaviour(figures):
 @pytest.mark.long
 @pytest.mark.usefixtures("_unchecked")
 def test_the_stored_rows_of_both_followings_are_of_todays_behaviour():
-    stored = {tuple(row[name] for name in following.NAMES): row for row in read_following(ROOT / FOLLOWED)}
+    stored = {tuple(row[name] for name in following.NAMES): row for row in last(ROOT / FOLLOWED, following.NAMES)}
     for task in following.FollowingStudy(seeds=1).tasks():
         figure, backend, strategy = task[1], task[4], task[3]
         if figure in ("fig4", "fig8", "fig9") and backend != "graph" and strategy == "nearest-robot":

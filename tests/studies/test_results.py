@@ -1,16 +1,21 @@
-"""The page of results: its tables are those of the stored rows, and rows of other code are called stale."""
+"""The generated tables: those on the pages are of the stored rows, and rows of other code are called stale."""
 
 import json
+import re
 
 import pytest
+from rich.table import Table as ConsoleTable
 
-from studies.results.figures import pose_score
-from studies.results.headlines import HEADLINES, Headline
-from studies.results.page import BEGIN, END, Results, newest, section, state
-from studies.results.plans import apartments, schools, whole_schools
-from studies.results.shortcut import rides
+from studies.results import benchmarks
+from studies.results.figures import of_console, pose_score
+from studies.results.page import PAGES, Results, part, state
+from studies.results.plans import apartments, courts, navigation, schools, whole_schools
+from studies.results.rivals import rides
+from studies.results.sources import SOURCES, Source
 from studies.results.worlds import bundled
-from studies.runner.rows import fingerprint
+from studies.robots.faults import SOUND
+from studies.runner.marks import PART, filled, short
+from studies.runner.rows import fingerprint, last, newest
 
 
 def row(code, world, **more):
@@ -20,13 +25,30 @@ def row(code, world, **more):
 
 def test_the_pages_are_those_that_the_stored_rows_make(request, tmp_path, capsys):
     docs = request.config.rootpath / "docs"
-    texts = {name: (docs / name).read_text() for name in {headline.page for headline in HEADLINES}}
+    texts = {name: (docs / name).read_text() for name in PAGES}
+    copy = tmp_path / "docs"
+    (copy / "contributing").mkdir(parents=True)
     for name, text in texts.items():
-        (tmp_path / name).write_text(text[: text.index(BEGIN)] + BEGIN + END + text[text.index(END) + len(END) :])
-    Results(tmp_path).run()
-    assert {name: (tmp_path / name).read_text() for name in texts} == texts, "run `make results`"
-    assert len(texts) == 3
-    assert len(capsys.readouterr().out.splitlines()) == len(HEADLINES) <= 12
+        (copy / name).write_text(PART.sub(r"\1\3", text))
+    Results(copy).run()
+    assert {name: (copy / name).read_text() for name in texts} == texts, "run `make results`"
+    assert len(capsys.readouterr().out.splitlines()) == len(SOURCES)
+    shown = [name for text in texts.values() for _, name, _ in PART.findall(text)]
+    assert sorted(shown) == sorted(SOURCES)
+
+
+def test_the_page_of_benchmarks_is_short(request):
+    """Words that a reader sees: prose and cells, neither marks nor rules of tables."""
+    text = (request.config.rootpath / "docs" / "benchmarks.md").read_text()
+    assert len(re.findall(r"[^\s|]*\w[^\s|]*", re.sub(r"<!--.*?-->|\]\([^)]*\)", "", text))) <= 1500
+
+
+def test_only_what_lies_between_the_marks_is_written_anew():
+    page = "before\n<!-- table: a -->\nold\n<!-- end -->\nmiddle\n<!-- table: b-c -->\n<!-- end -->\nafter\n"
+    once = filled(page, str.upper)
+    assert once.split() == page.replace("old", "A").replace("b-c -->", "b-c --> B-C").split()
+    assert filled(once, str.upper) == once
+    assert filled("no marks", str.upper) == "no marks"
 
 
 def test_rows_of_the_code_that_has_most_of_them_count_and_the_last_of_equals(tmp_path):
@@ -41,19 +63,38 @@ def test_rows_of_the_code_that_has_most_of_them_count_and_the_last_of_equals(tmp
     assert state([row(fingerprint(), "x"), row("a", "y")]) == "stale"
 
 
+def test_of_each_key_the_last_row_counts(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    rows = [row("a", "x", steps=1), row("a", "y", steps=2), row("b", "x", steps=3)]
+    path.write_text("".join(json.dumps(each) + "\n" for each in rows))
+    assert [each["steps"] for each in last(path, ("world",))] == [3, 2]
+
+
 @pytest.mark.parametrize(("code", "told"), [("other", "stale"), (fingerprint(), "current")])
 def test_rows_of_other_code_are_stale(code, told):
     assert state([row(code, "x")]) == told
     assert state([]) == "missing"
 
 
-def test_a_section_has_aim_table_verdict_and_command(tmp_path):
+def test_a_part_has_its_table_and_the_command_of_its_rows():
     rows = [row("a", "hall"), row("a", "hall", coverage=0.8, status="stopped", collisions=2)]
-    made = section(Headline("Halls", "All.", "make halls", tmp_path, bundled), rows)
-    assert "## Halls\n\n**Aim.** All.\n" in made
-    assert "| `hall` | 1 of 2 | 0.8000 | 2 of 4 | 10.0 m |" in made
-    assert "**Verdict.** 1 of 2 complete, 2 of 4 contours closed, 2 collisions." in made
-    assert "made by `make halls`" in made
+    source = Source("make halls", bundled, lambda: rows)
+    made = part(source, rows)
+    assert "| `hall` | 1 of 2 | 0.8000 | 2 of 4 | 10.0 m | 2 |\n| all | 1 of 2 |" in made
+    assert made.endswith("\n\n2 rows, made by `make halls`.")
+    assert part(source, []) == "`make halls` makes the rows of this table; none are stored."
+
+
+def test_numbers_have_three_digits_and_no_exponent():
+    assert [short(value) for value in (0.8401, 45.67, 999.4, 2345.6, 3_213_615.0)] == [
+        "0.84", "45.7", "999", "2,350", "3,210,000"
+    ]  # fmt: skip
+
+
+def test_a_table_of_the_console_becomes_one_of_a_page():
+    table = ConsoleTable("world", "steps")
+    table.add_row("hall", "7")
+    assert of_console(table) == [["world", "steps"], ["hall", "7"]]
 
 
 def run(backend, seed=1, **more):
@@ -63,34 +104,43 @@ def run(backend, seed=1, **more):
     return row("a", "school", **scores) | own | more
 
 
-def test_apartments_stand_by_back_end_and_the_verdict_says_which_way_the_covariance_is_off():
+def test_apartments_stand_by_back_end():
     rows = [run("graph", map_anees=value) for value in (0.5, 0.7, 4.0)] + [run("full-ekf", map_anees=1.3)]
-    found = apartments(rows)
-    cells = {line[0]: line[1:] for line in found.table}
+    cells = {line[0]: line[1:] for line in apartments(rows)}
     assert cells["measure"] == ["`graph`", "`full-ekf`"]
     assert cells["map ANEES: mean, median"] == ["1.73, 0.7", "1.3, 1.3"]
     assert cells["maps with an ANEES above 3"] == ["1", "0"]
     assert cells["false matches a plan: of five beams or more, of fewer"] == ["2.00, 3.00", "2.00, 3.00"]
     assert cells["duplicate walls a plan, false mergers in all"] == ["1.00, 3", "1.00, 1"]
-    assert (
-        "`graph`: 3 of 3 complete, map ANEES 1.73 in the mean, 0.7 at the median: covariances are typically too wide."
-        in found.verdict
-    )
-    assert found.verdict.endswith("typically too narrow.")
 
 
 def test_schools_count_the_runs_of_each_back_end_that_lost_their_map():
     rows = [run("full-ekf", pose_anees=value) for value in (1.0, 3.1, 9.0)] + [run("graph", 2, raised=True)]
-    found = schools(rows)
-    assert [line[:6] for line in found.table[1:]] == [
+    assert [line[:6] for line in schools(rows)[1:]] == [
         ["`full-ekf`", "3", "0", "3.1", "1", "2"], ["`graph`", "1", "1", "1", "1", "0"]
     ]  # fmt: skip
-    assert found.verdict == "Ended by an exception: 1 runs. Maps lost: `full-ekf` 2 of 3; `graph` 0 of 1."
 
 
 def test_schools_to_their_end_have_means_over_the_runs():
     found = whole_schools([run("graph", coverage=0.8, status="stopped", steps=300), run("graph")])
-    assert found.table[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0", "-"]
+    assert found[1] == ["`graph`", "1 of 2", "0.8500, 0.800", "0.9000", "1", "1, 1", "2.0", "200", "0", "-"]
+
+
+def test_courts_say_how_many_are_complete_and_how_much_of_their_floor_was_seen():
+    rows = [run("graph", swept=0.9), run("graph", 2, swept=0.8, status="stopped")]
+    assert courts(rows)[1] == ["`school`", "2", "1 of 2", "0.800, 0.850", "0.900", "0"]
+
+
+def test_navigations_are_compared_by_the_geometric_mean_over_the_plans_that_both_drove():
+    driven = {"floor": {"a": 10.0, "b": 10.0, "c": 99.0}, "visibility": {"a": 20.0, "b": 5.0}}
+    rows = [
+        run("graph", navigation=way, file=file, path_length_m=metres)
+        for way, plans in driven.items()
+        for file, metres in plans.items()
+    ]
+    assert [line[:4] for line in navigation(rows)[1:]] == [
+        ["`floor`", "2 of 2", "20 m", "1.00"], ["`visibility`", "2 of 2", "25 m", "1.00"]
+    ]  # fmt: skip
 
 
 def ridden(backend, place, seed, **more):
@@ -99,28 +149,76 @@ def ridden(backend, place, seed, **more):
     return {"code": "a", "backend": backend, "place": place, "seed": str(seed)} | scores | precise | more
 
 
-def test_rides_stand_place_by_place_with_intervals_over_drives_and_the_price_of_honesty(tmp_path):
-    """Precision is paired by drive; a score that one drive lacks makes no back end consistent."""
+def rows_of_rides():
     rows = [ridden("full-ekf", place, seed) for place in ("paper-fig8", "plan-a", "plan-b") for seed in range(5)]
     rows += [ridden("intersection-ekf", "paper-fig8", k, pose_rms_m=0.004, pose_sigma_m=0.005) for k in range(5)]
     rows += [ridden("block-ekf", "paper-fig8", k, pose_anees_from_start=2.0 + k, map_anees=9.0) for k in range(5)]
-    rows.append(ridden("ukf", "plan-a", 0, map_anees=None))
-    found = rides(rows).parts
-    assert list(found) == ["Figure 8, 5 drives", "Apartments, with the lines that the extraction finds, 10 drives"]
+    return rows
+
+
+def test_rides_stand_place_by_place_with_intervals_over_drives_and_precision_paired_by_drive():
+    found = rides([*rows_of_rides(), ridden("ukf", "plan-a", 0, map_anees=None)])
+    assert list(found) == ["### Figure 8, 5 drives", "### Apartments, 10 drives"]
     first, second = found.values()
-    assert first.table[1] == ["`full-ekf`", "1 (1 to 1), 1", "1 (1 to 1), 1", "1.00, 95 %", "95.0 %", "2, 1"]
-    low, high = map(float, first.table[3][1].split("(")[1].split(")")[0].split(" to "))
+    assert first[1] == ["`full-ekf`", "1 (1 to 1), 1", "1 (1 to 1), 1", "1.00, 95 %", "95.0 %", "2, 1", "1.00, 1.00"]
+    assert [line[-1] for line in first[2:]] == ["2.00, 5.00", "1.00, 1.00"]
+    low, high = map(float, first[3][1].split("(")[1].split(")")[0].split(" to "))
     assert 1.0 < low < 4.0 < high
-    assert first.table[3][1].startswith("4 (")
-    assert "both means up to 1.5: `full-ekf`, `intersection-ekf`." in first.verdict
-    assert "`intersection-ekf` errs by 2 times as much and states 5 times as much" in first.verdict
-    assert "`block-ekf` errs by 1 times as much and states 1 times as much" in first.verdict
-    assert second.table[2][2] == "-"
-    assert second.verdict == "Consistent, with both means up to 1.5: `full-ekf`."
-    made = section(Headline("Rides", "All.", "make rivals", tmp_path, rides), rows)
-    assert made.count("\n### ") == 2
-    assert made.count("**Verdict.**") == 2
-    assert f"{len(rows)} rows, made by `make rivals`." in made
+    assert first[3][1].startswith("4 (")
+    assert second[2][1:3] == ["1, 1", "-"], "an interval of one drive, or a score that is none"
+
+
+def test_estimators_stand_side_by_side_over_all_places():
+    rows = [*rows_of_rides(), *(ridden(name, "plan-a", 0) for name in ("intersection-ekf", "block-ekf"))]
+    head, *lines = benchmarks.estimators(rows)
+    assert head[1:3] == ["figure 8, 5 drives", "apartments, 10 drives"]
+    assert [line[:3] for line in lines] == [
+        ["`full-ekf`", "1, 1", "1, 1"], ["`intersection-ekf`", "1, 1", "1, 1"], ["`block-ekf`", "4, 9", "1, 1"]
+    ]  # fmt: skip
+    assert lines[1][3] == f"{2 ** (5 / 6):.2f}, {5 ** (5 / 6):.2f}"
+
+
+def test_buildings_stand_by_kind_and_back_end():
+    plan = {"file": "lifull_a", "max_steps": 9, "step_ms_mean": 2.0, "step_ms_p95": 4.0}
+    school = plan | {"file": "cml_b", "max_steps": 1500, "status": "stopped"}
+    times = {"drive_time_s": 30.0, "processor_s": 3.0}
+    rows = [
+        run("graph", **plan, **times),
+        run("graph", pose_anees=4.0, **plan, **times),
+        run("graph", **school, **times),
+    ]
+    apartment, stopped = benchmarks.exploration(rows)[1:]
+    assert apartment[:8] == ["2 apartments", "`graph`", "2 of 2", "0.900, 0.900", "2 of 4", "0", "2.5", "1"]
+    assert stopped[:3] == ["1 schools, first 1,500 steps", "`graph`", "0 of 1"]
+    log = {"log": "intel", "backend": "graph", "every": 1, "cpu_ms_a_scan": 10.0, "steps": 20, "log_s": 4.0}
+    assert benchmarks.speed([*rows, log])[1:] == [
+        ["apartments", "`graph`", "2", "2.0", "4.0", "10"],
+        ["schools, first 1,500 steps", "`graph`", "1", "2.0", "4.0", "10"],
+        ["log of Intel", "`graph`", "1", "10.0", "-", "20"],
+    ]
+
+
+def test_the_papers_figures_are_quoted_beside_what_the_paper_says():
+    drives = [{"block-ekf": {"path, m": metres}, "graph": {"path, m": 20.0}} for metres in (18.0, 22.0)]
+    table = benchmarks.figures([{"figure": "fig8", "numbers": drive} for drive in drives])
+    assert table[1] == ["figure 8: path, m", "33.0", "20 (18 to 22)", "-", "20"]
+
+
+def test_logs_have_the_error_and_the_normalised_error_of_each_step_and_the_error_after_refinement():
+    scored = {"reference": {"ate_aligned_m": 0.5}, "reference_normalised": {"all": {"median": 1234.0}}}
+    own = {"log": "aces", "backend": "graph", "odometry": "scans", "every": 1}
+    table = benchmarks.logs([own | scored | {"reference_smoothed": {"ate_aligned_m": 0.25}}, own | {"every": 2}])
+    assert table[1:] == [["`graph`", "-", "-", "0.500; 1,230", "-"], ["offline refinement", "-", "-", "0.250", "-"]]
+
+
+def test_a_fault_has_its_worst_scores_and_the_last_step_of_runs_that_failed():
+    ended = {"case": SOUND, "coverage": 0.5, "pose_anees": 1.0, "map_anees": 2345.6, "steps": 9, "status": "failed"}
+    rows = [
+        ended | {"seed": 1},
+        ended | {"seed": 2, "coverage": 0.75, "steps": 12},
+        ended | {"seed": 3, "status": "complete"},
+    ]
+    assert benchmarks.endings(rows)[1] == [SOUND, "complete, failed by step 12", "0.50", "1", "2,350"]
 
 
 def test_the_pose_is_scored_from_the_start_where_all_rows_can_tell():
@@ -128,7 +226,7 @@ def test_the_pose_is_scored_from_the_start_where_all_rows_can_tell():
     failed = {"pose_anees": None, "pose_anees_from_start": None}
     assert pose_score([new, failed, new]) == ("pose ANEES from the start", "pose_anees_from_start")
     assert pose_score([new, old]) == pose_score([old]) == pose_score([]) == ("pose ANEES", "pose_anees")
-    assert apartments([run("graph", pose_anees_from_start=3.25)]).table[5][:2] == [
+    assert apartments([run("graph", pose_anees_from_start=3.25)])[5][:2] == [
         "pose ANEES from the start: mean, median",
         "3.25, 3.25",
     ]

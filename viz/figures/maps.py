@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, Patch, PathPatch
 from matplotlib.path import Path
-from matplotlib.ticker import MultipleLocator
 
 from chainslam.explore.goal import SetAside
 from chainslam.slam.map.chains import Chain
@@ -27,14 +26,13 @@ from .. import palette
 from ..shapes import ellipses
 from ..text import literal
 from . import own_look
+from .map_axes import grid_m, prepare, scale_bar
 
 WALL_M = 0.1
 """Line width of the true walls around the floor, m."""
 MARGIN_M = 0.6
 ENLARGED = 10.0
 """Magnification of ellipses that would otherwise be invisible."""
-GRID_ORDER = 1.2
-"""Offset between the true floor and what is drawn on it."""
 LETTER_INCH = 0.072
 """Mean width of a character of the subtitle ..."""
 TITLE_LETTER_INCH = 0.115
@@ -42,10 +40,6 @@ TITLE_LETTER_INCH = 0.115
 LEAST_WIDTH_INCH = 5.0
 LARGEST_INCH = 30.0
 """Longer side of the map in the picture of a map of hundreds of metres, 4,500 pixels."""
-GRID_M = (1.0, 5.0, 10.0, 50.0, 100.0, 500.0, 1e3, 5e3, 1e4, 5e4, 1e5)
-"""Possible spacings of the grid lines ..."""
-GRID_LINES = 45
-"""... the smallest of which is used that needs at most this many lines."""
 LEGEND_INCH = 2.3
 """Width of a column of the legend."""
 
@@ -86,7 +80,7 @@ def draw_map(picture: Picture) -> Figure:
     figure = Figure(dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    _prepare(axes, low, high)
+    prepare(axes, low, high)
     handles = [
         *_floor(axes, picture, 72.0 * inch_per_m),
         *_walls(axes, picture),
@@ -96,12 +90,13 @@ def draw_map(picture: Picture) -> Figure:
         *_robot(axes, picture),
     ]
     title = wrap(picture.title, int(width / TITLE_LETTER_INCH))
-    words = wrap(";  ".join(filter(None, (f"grid {_grid_m(span):g} m", picture.subtitle))), int(width / LETTER_INCH))
+    words = wrap(";  ".join(filter(None, (f"grid {grid_m(span):g} m", picture.subtitle))), int(width / LETTER_INCH))
     columns = int(width // LEGEND_INCH)
-    below, above = 0.45 + 0.17 * -(-len(handles) // columns), 0.4 + 0.16 * len(words) + 0.24 * len(title)
+    below, above = 0.55 + 0.17 * -(-len(handles) // columns), 0.4 + 0.16 * len(words) + 0.24 * len(title)
     whole = np.array([width + 0.8, height + below + above])
     figure.set_size_inches(*whole)
     axes.set_position((0.5 / whole[0], below / whole[1], width / whole[0], height / whole[1]))
+    scale_bar(axes, width / inch_per_m, 0.32 / height)
     _write(axes, words, 0.12 / height, size=9, color="#5A5A5A")
     _write(axes, title, (0.22 + 0.16 * len(words)) / height, size=13, weight="bold")
     figure.legend(handles=handles, loc="lower center", ncols=columns, frameon=False, fontsize=8, handlelength=2.2)
@@ -133,29 +128,11 @@ def _extent(picture: Picture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray,
     wheels = () if picture.odometry_path_world is None else (picture.odometry_path_world[:, :2],)
     points = [picture.path_world[:, :2], *wheels, picture.map.ends_world.reshape(-1, 2), *picture.true_floor]
     stacked = np.concatenate(points)
-    return stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
-
-
-def _prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.set_facecolor(palette.PAGE)
-    step = _grid_m(float((high - low).max()))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MultipleLocator(step))
-        axis.set_major_formatter(lambda value, _: f"{value:.0f}" if round(value / step) % 2 == 0 else "")
-    axes.grid(color=palette.GRID, linewidth=0.6)
-    for axis in (axes.xaxis, axes.yaxis):
-        # Above the floor and below everything else; `axisbelow` cannot place it between floor and paths.
-        axis.set_zorder(GRID_ORDER)
-    axes.tick_params(length=0, labelsize=7, labelcolor="#8A8A8A")
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-
-
-def _grid_m(span_m: float) -> float:
-    return next((step for step in GRID_M if span_m <= GRID_LINES * step), GRID_M[-1])
+    low, high = stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
+    contours = _corner_contours(picture)[0].reshape(-1, 2)
+    # The few corners of which nearly nothing is known do not shrink the map.
+    near = contours[np.all((contours > low - MARGIN_M) & (contours < high + MARGIN_M), axis=1)]
+    return np.minimum(low, near.min(axis=0, initial=np.inf)), np.maximum(high, near.max(axis=0, initial=-np.inf))
 
 
 def _floor(axes: Axes, picture: Picture, points_per_m: float) -> list[Patch | Line2D]:
@@ -241,9 +218,7 @@ def _corner_ellipses(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
     """Draw 3 sigma ellipses of the corners, enlarged if most would be invisible; the few large ones are pale."""
     if not len(picture.corners_world):
         return []
-    radii = 3.0 * np.sqrt(np.maximum(np.trace(picture.corner_covs, axis1=1, axis2=2), 0.0))
-    times = _enlarged(float(np.median(radii)))
-    contours = ellipses(picture.corners_world, picture.corner_covs, times, vertices=33)
+    contours, radii, times = _corner_contours(picture)
     for chosen, alpha in ((radii > 5.0 * np.median(radii), 0.2), (radii <= 5.0 * np.median(radii), 1.0)):
         axes.add_collection(
             PolyCollection(
@@ -252,6 +227,17 @@ def _corner_ellipses(axes: Axes, picture: Picture) -> list[Patch | Line2D]:
             )
         )  # fmt: skip
     return [_marker("o", "none", palette.INK, 7, "3σ ellipse of a corner" + _times_words(times))]
+
+
+def _corner_contours(
+    picture: Picture,
+) -> tuple[Float[np.ndarray, "c 33 2"], Float[np.ndarray, " c"], float]:
+    """Return the ellipses of the corners as they are drawn, their radii m, and how much they are enlarged."""
+    if not len(picture.corners_world):
+        return np.zeros((0, 33, 2)), np.zeros(0), 1.0
+    radii = 3.0 * np.sqrt(np.maximum(np.trace(picture.corner_covs, axis1=1, axis2=2), 0.0))
+    times = _enlarged(float(np.median(radii)))
+    return ellipses(picture.corners_world, picture.corner_covs, times, vertices=33), radii, times
 
 
 def _enlarged(radius_m: float) -> float:

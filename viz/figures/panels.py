@@ -1,10 +1,11 @@
-"""Several panels in one figure: estimators beside each other, as the paper's figures are reproduced."""
+"""Small maps, each in a figure of its own or several panels in one, as the paper's figures are reproduced."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
@@ -14,11 +15,66 @@ from .. import palette
 from ..shapes import ellipses
 from ..text import literal
 from . import own_look
-from .curves import SmallMap, paint_map
 
 MARGIN_M = 0.5
+BARS_M = [step * 10.0**decade for decade in range(4, -3, -1) for step in (5.0, 2.0, 1.0)]
+"""Lengths of scale bars, the first that fits is taken."""
 DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
 """Of curves in turn: those that lie on one before them leave it to be seen."""
+
+
+@dataclass(frozen=True)
+class SmallMap:
+    """One map beside others, all in the true frame."""
+
+    title: str
+    ends_world: Float[np.ndarray, "n 2 2"]
+    is_closed: Bool[np.ndarray, " n"]
+    """Whether a wall is in a closed chain."""
+    is_tentative: Bool[np.ndarray, " n"]
+    path_world: Float[np.ndarray, "s 2"]
+    true_floor: tuple[Float[np.ndarray, "_ 2"], ...] = field(default=())
+    """Rings of the true floor, the exterior first."""
+
+
+def map_figures(maps: Sequence[SmallMap]) -> list[Figure]:
+    """Return a figure for each map of one world, all at one scale."""
+    low, high = _extent(maps)
+    return [_map_figure(small, low, high) for small in maps]
+
+
+def _extent(maps: Sequence[SmallMap]) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+    points = np.concatenate([p for small in maps for p in (small.ends_world.reshape(-1, 2), *small.true_floor)])
+    return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+
+
+@own_look()
+def _map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> Figure:
+    """Draw one map over the true floor, with a scale bar; `low` and `high` are the corners of what is shown."""
+    size = high - low
+    figure = Figure(figsize=(3.2, 3.2 * float(size[1] / size[0])), dpi=150, facecolor=palette.PAGE)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    paint_map(axes, small, low, high)
+    metres = next(length for length in BARS_M if length <= 0.4 * size[0])
+    at = low + 0.02 * size[0]
+    axes.plot([at[0], at[0] + metres], [at[1], at[1]], color=palette.INK, linewidth=2.5, solid_capstyle="butt")
+    axes.text(at[0] + metres + 0.015 * size[0], at[1], f"{metres:g} m", va="center", fontsize=8, color=palette.INK)
+    return figure
+
+
+def paint_map(axes: Axes, small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
+    """Paint one map over the true floor into axes that others may share a figure with."""
+    for index, ring in enumerate(small.true_floor):
+        axes.fill(*ring.T, facecolor=palette.SOLID if index else palette.FLOOR, edgecolor=palette.SOLID, linewidth=4.0)
+    axes.plot(*small.path_world.T, color=palette.PATH_ESTIMATED, linewidth=0.5)
+    for ends, closed, tentative in zip(small.ends_world, small.is_closed, small.is_tentative, strict=True):
+        paint = palette.TENTATIVE if tentative else palette.CLOSED[0] if closed else palette.OPEN
+        axes.plot(*ends.T, color=paint, linewidth=1.7, solid_capstyle="round")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_axis_off()
 
 
 @own_look()
@@ -41,8 +97,7 @@ def panels(title: str, rows: int, columns: int, size_inch: tuple[float, float]) 
 @own_look()
 def map_panels(title: str, maps: Sequence[SmallMap], columns: int) -> tuple[Figure, list[Axes]]:
     """Draw maps of one world beside each other, all at one scale."""
-    points = np.concatenate([p for small in maps for p in (small.ends_world.reshape(-1, 2), *small.true_floor)])
-    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+    low, high = _extent(maps)
     width = 3.4
     size = (width, width * float((high - low)[1] / (high - low)[0]) + 0.3)
     figure, axes = panels(title, -(-len(maps) // columns), columns, size)

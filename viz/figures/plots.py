@@ -1,6 +1,8 @@
 """Pictures for papers beside the map: paths, the model space, NEES curves, and how often each stretch was driven."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,10 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import FuncFormatter, MultipleLocator
 from scipy.spatial import cKDTree
-
-from chainslam.slam.evaluation.consistency import chi2_band
 
 from .. import palette
 from ..shapes import SIGMAS, VAGUE_RAD, ellipses
@@ -27,25 +27,48 @@ PITCH_M = 0.05
 """Points along a path are so far apart at most."""
 ENLARGED = 10.0
 """How much ellipses of the model space are enlarged."""
+NARROW = (5.0, 3.3)
+"""Inches of a figure whose letters are as large as those of the text on a phone."""
+MOST_SPREADS = 4
+"""Curves beyond which pale bands would only cover one another."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 """Driven once, twice, ..., five times or more, as in the paper's figures 5 and 6."""
 
 Rings = Sequence[Float[np.ndarray, "_ 2"]]
 
 
+@dataclass(frozen=True)
+class NeesCurve:
+    """The NEES of the pose of one estimator along its path: of one run, or the median over many."""
+
+    name: str
+    path_m: Float[np.ndarray, " p"]
+    nees: Float[np.ndarray, " p"]
+    band: Float[np.ndarray, "2 p"]
+    """Where that of a consistent estimator lies in 95 % of all cases."""
+    quartiles: Float[np.ndarray, "2 p"] | None = None
+    """Of many runs; drawn as a pale band."""
+
+
 @own_look()
-def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str) -> Figure:
-    """Return the NEES of each back end against the step, on a logarithmic axis, with its 95 % band."""
-    figure, axes = _figure(title, (7.2, 3.2))
-    axes.margins(x=0.01)
-    low, high = chi2_band(3)
-    axes.axhspan(low, high, color=palette.SWEPT, zorder=1, label="95 % band")
-    for backend, values in curves.items():
-        axes.plot(values, color=palette.of_backend(backend), linewidth=1.1, label=backend, zorder=2)
+def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
+    """Return the NEES of estimators against the path length, on a logarithmic axis, with the band of a consistent one.
+
+    It is as wide as a phone's screen, so that its letters can be read there.
+    """
+    figure, axes = _figure("", NARROW)
+    longest = max(curves, key=lambda curve: curve.path_m[-1])
+    axes.fill_between(longest.path_m, *longest.band, color=palette.SOLID, linewidth=0, zorder=1)
+    for curve in curves:
+        colour = palette.of_backend(curve.name)
+        if curve.quartiles is not None and len(curves) <= MOST_SPREADS:
+            axes.fill_between(curve.path_m, *curve.quartiles, color=colour, alpha=0.15, linewidth=0, zorder=2)
+        width = 1.5 if curve.quartiles is not None else 0.9
+        axes.plot(curve.path_m, curve.nees, color=colour, linewidth=width, label=literal(curve.name), zorder=3)
+    axes.fill_between([], [], [], color=palette.SOLID, linewidth=0, label="95 % band")
     axes.set_yscale("log")
-    axes.set_xlabel("step")
-    axes.set_ylabel("NEES of the pose")
-    axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    _label(axes, "path length (m)", "NEES of the pose")
     return figure
 
 
@@ -53,19 +76,25 @@ def draw_nees(curves: Mapping[str, Float[np.ndarray, " _"]], title: str) -> Figu
 def draw_coverage(
     curves: Mapping[str, tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]],
     colours: Mapping[str, str],
-    title: str,
 ) -> Figure:
-    """Return the share of the reachable contour that is mapped against the metres driven, a curve for each name."""
-    figure, axes = _figure(title, (7.2, 3.2))
-    axes.margins(x=0.01)
+    """Return the share of the reachable contour that is mapped against the path length, a curve for each name."""
+    figure, axes = _figure("", NARROW)
     for name, (metres, share) in curves.items():
-        axes.plot(metres, 100.0 * share, color=colours[name], linewidth=1.4, label=literal(name))
+        axes.plot(metres, 100.0 * share, color=colours[name], linewidth=1.5, label=literal(name))
     axes.set_ylim(0.0, 102.0)
-    axes.grid(color=palette.GRID, linewidth=0.5)
-    axes.set_xlabel("way driven, m")
-    axes.set_ylabel("contour mapped, %")
-    axes.legend(frameon=False, fontsize=8, ncols=6, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    _label(axes, "path length (m)", "contour mapped (%)")
     return figure
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    """Name the axes, and the curves above them."""
+    axes.margins(x=0.01)
+    axes.grid(color=palette.GRID, linewidth=0.5)
+    axes.tick_params(labelsize=9)
+    axes.set_xlabel(x, fontsize=9)
+    axes.set_ylabel(y, fontsize=9)
+    look: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 1.4, "columnspacing": 1.2}
+    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
 
 
 @own_look()
@@ -184,7 +213,8 @@ def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
 def _figure(title: str, size: tuple[float, float]) -> tuple[Figure, Axes]:
     figure = Figure(figsize=size, dpi=150, facecolor=palette.PAGE, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(literal(title), x=0.02, ha="left", size=10, weight="bold")
+    if title:
+        figure.suptitle(literal(title), x=0.02, ha="left", size=10, weight="bold")
     axes = figure.subplots()
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=7)

@@ -1,15 +1,18 @@
-"""One self-contained page: words, tables and pictures in one HTML file, and the tables as LaTeX."""
+"""One self-contained page in one HTML file: fixed captions of a template, numbers put in; and its tables as LaTeX."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from jinja2 import Environment, PackageLoader, select_autoescape
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
+from .. import palette
+from ..text import NONE
 from .drawing import PageDrawing
 
 LONG_ROWS = 24
-"""A table of more rows is folded up on a screen; on paper it is all there."""
+"""A table of more rows is folded on a screen; on paper it is all there."""
 
 
 @dataclass(frozen=True)
@@ -20,32 +23,42 @@ class PageTable:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
-    is_wordy: bool = False
-    """Whether its cells are sentences, which break into lines, rather than numbers."""
+
+    def filled(self) -> "PageTable":
+        """Return the table without the columns in which no row has a value."""
+        kept = [k for k in range(len(self.header)) if any(row[k] != NONE for row in self.rows)]
+        rows = tuple(tuple(row[k] for k in kept) for row in self.rows)
+        return replace(self, header=tuple(self.header[k] for k in kept), rows=rows)
+
+
+def table(title: str, columns: Mapping[str, Callable[[Any], str]], rows: Sequence[Any], note: str = "") -> PageTable:
+    """Return a table with a row for each of `rows`; `columns` say, by its name, what a cell of each column holds."""
+    cells = tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
+    return PageTable(title, tuple(columns), cells, note).filled()
 
 
 @dataclass(frozen=True)
 class PagePicture:
-    """A picture with what it shows, in words."""
+    """A picture (PNG or SVG) with what it shows, in words."""
 
-    png: bytes
+    content: bytes
     caption: str
 
     @property
     def source(self) -> str:
         """The picture itself as a data URI: nothing is fetched."""
-        return "data:image/png;base64," + b64encode(self.png).decode()
+        kind = "png" if self.content.startswith(b"\x89PNG") else "svg+xml"
+        return f"data:image/{kind};base64,{b64encode(self.content).decode()}"
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands under it, in this order: words, drawings, tables, what was printed, pictures."""
+    """A heading with what stands under it, in this order: words, tables, what was printed, pictures."""
 
     title: str
     words: tuple[str, ...] = ()
     tables: tuple[PageTable, ...] = ()
-    pictures: tuple[PagePicture, ...] = field(default=())
-    drawings: tuple[PageDrawing, ...] = ()
+    pictures: tuple[PagePicture, ...] = ()
     printed: str = ""
     """What a command said, shown as it stands."""
 
@@ -55,29 +68,37 @@ class Page:
     """A report."""
 
     title: str
-    question: str
-    """What was asked, for a reader who knows nothing yet."""
-    verdict: tuple[str, ...]
-    """The answer, first on the page; a paragraph each."""
+    lines: tuple[str, ...]
+    """What was found, a sentence each, the most important one first."""
     command: str
     """What made the results."""
     made_with: tuple[tuple[str, str], ...]
     """Names and versions."""
-    sections: tuple[Section, ...]
+    template: str = "report"
+    """Whose captions it has: those of a campaign, of a run, or none but the sections'."""
+    told: Mapping[str, Any] = field(default_factory=dict)
+    """What the captions need."""
+    tables: Mapping[str, PageTable] = field(default_factory=dict)
+    pictures: Mapping[str, tuple[PagePicture, ...]] = field(default_factory=dict)
+    drawings: tuple[PageDrawing, ...] = ()
+    sections: tuple[Section, ...] = ()
+    """What stands below all that the template places."""
 
-
-def filled(*sections: Section) -> tuple[Section, ...]:
-    """Return the sections that have a row, a drawing or a picture to show, without tables that have no row."""
-    shown = [replace(section, tables=tuple(table for table in section.tables if table.rows)) for section in sections]
-    return tuple(section for section in shown if section.tables or section.pictures or section.drawings)
+    @property
+    def all_tables(self) -> tuple[PageTable, ...]:
+        """Every table that has a row."""
+        every = (*self.tables.values(), *(each for section in self.sections for each in section.tables))
+        return tuple(each for each in every if each.rows)
 
 
 def html(page: Page) -> bytes:
     """Return the page as one HTML file that fetches nothing."""
     environment = Environment(
-        loader=PackageLoader("chainslam.viz.reports", "."), autoescape=select_autoescape(default=True), trim_blocks=True
-    )
-    return environment.get_template("report.html.j2").render(page=page, long_rows=LONG_ROWS).encode()
+        loader=PackageLoader("chainslam.viz.reports", "."), autoescape=select_autoescape(default=True),
+        trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined,
+    )  # fmt: skip
+    shown = environment.get_template(f"{page.template}.html.j2")
+    return shown.render(page=page, long_rows=LONG_ROWS, colours=palette.backends()).encode()
 
 
 def latex(tables: Sequence[PageTable]) -> bytes:

@@ -1,6 +1,6 @@
 """What this package adds to chainslam: `pyproject.toml` names it, and `pip install` is all that it takes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ import shapely
 import chainslam
 from chainslam.sim.worlds.drawing import Drawing, WorldError
 from chainslam.slam.backends.full_ekf import FullEkf
+from chainslam.slam.estimation.models import Motion
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,10 @@ class CautiousEkf(FullEkf):
         super().__init__(pose_world, pose_cov)
         self._times = config.times
 
-    def predict(self, odometry: chainslam.Odometry) -> None:
-        """Move the pose by the odometry."""
-        super().predict(replace(odometry, cov=self._times**2 * odometry.cov))
+    def motion(self, odometry: chainslam.Odometry) -> tuple[Motion, np.ndarray]:
+        """Return the motion, and the noise that it adds to the pose's error."""
+        motion, noise = super().motion(odometry)
+        return motion, self._times**2 * noise
 
 
 class Farthest:

@@ -43,16 +43,16 @@ Message = TypeVar("Message")
 
 @dataclass(frozen=True)
 class OccupancyGrid:
-    """What a `nav_msgs/OccupancyGrid` holds."""
+    """The content of a `nav_msgs/OccupancyGrid`."""
 
     resolution_m: float
     origin: tuple[float, float]
-    """The outer corner of the first cell, m, in the frame of the map."""
+    """Outer corner of the first cell, m, in the map's frame."""
     cells: Int8[np.ndarray, "h w"]
-    """Rows from the lowest y up, each from the lowest x: 0 free, 100 occupied, -1 unknown."""
+    """Rows by ascending y, columns by ascending x: 0 free, 100 occupied, -1 unknown."""
 
     def written(self, message: Message, frame: str = "map") -> Message:
-        """Return an empty message of that type, filled."""
+        """Fill and return an empty message of this type."""
         filled: Any = message
         filled.header.frame_id, filled.info.resolution = frame, float(self.resolution_m)
         filled.info.height, filled.info.width = self.cells.shape
@@ -63,7 +63,7 @@ class OccupancyGrid:
 
 
 def occupancy_grid(free_space: FreeSpace) -> OccupancyGrid:
-    """Return the floor as ROS publishes it; raises ValueError where nothing was seen."""
+    """Return the floor as a ROS grid; raises ValueError if nothing was seen."""
     cells, origin = _seen(free_space)
     told = np.where(cells < 0, 0, np.where(cells > 0, 100, -1)).astype(np.int8)
     return OccupancyGrid(free_space.config.cell_m, origin, told)

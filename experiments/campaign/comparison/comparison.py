@@ -10,6 +10,7 @@ import numpy as np
 
 from ...scoring.statistics import estimate, paired, share_better
 from ..plan import CLOSED, Campaign
+from .consistency import consistency
 from .families import in_family
 
 Row = dict[str, Any]
@@ -25,6 +26,11 @@ class Measure:
     """Compared by its logarithm, so that a difference is a ratio."""
     floor: float = 0.0
     """Added before the logarithm is taken."""
+
+    @property
+    def ended(self) -> tuple[str, ...]:
+        """How a run must have ended to have a value: a path that a limit cut off is no length of an exploration."""
+        return ("complete",) if self.name == "path_length_m" else SOUND
 
 
 MEASURES = (
@@ -44,7 +50,7 @@ MEASURES = (
 MEANS = (
     "pose_anees_from_start",
     *("pose_anees", "map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "heading_rmse_rad"),
-    *("nis", "nis_in_band", "nis_mean", "nis_whiteness"),
+    *("nis", "nis_in_band", "nis_mean", "nis_whiteness", "path_length_m"),
 )
 MAY_LACK = (
     *("pose_anees_from_start", "pose_anees", "map_anees", "joint_anees", "wall_rmse_m", "wall_shape_m"),
@@ -57,9 +63,10 @@ AT_MARKS = (
     "duplicate_lines",
 )
 SOUND = ("complete", "stopped")
+"""Ends of runs that have scores: complete, or at a limit."""
 SUMS = (
     *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"),
-    *("merges", "false_merges", "sightings", "double_entries"),
+    *("merges", "false_merges", "sightings", "double_entries", "distances"),
 )
 """Columns that are added up over runs."""
 BASELINE_BACKEND, BASELINE_STRATEGY = "full-ekf", "nearest-robot"
@@ -87,12 +94,12 @@ def arm_of(row: Row) -> str:
     return CLOSED if row["mode"] == CLOSED else f"replay-{row['association']}"
 
 
-def runs_of(rows: Iterable[Row], measure: Measure, ended: Sequence[str] = ("complete",)) -> Runs:
-    """Return the measure of each run, averaged over what else differs; others than `ended`, or without it, are out."""
+def runs_of(rows: Iterable[Row], measure: Measure) -> Runs:
+    """Return the measure of each run, averaged over what else differs; without runs that failed or have no value."""
     found: dict[tuple[str, int], list[float]] = {}
     for row in rows:
         value = row.get(measure.name)
-        if value is None or row["status"] not in ended or not math.isfinite(value):
+        if value is None or row["status"] not in measure.ended or not math.isfinite(value):
             continue
         if measure.is_ratio:
             if value + measure.floor <= 0:
@@ -169,23 +176,20 @@ def _cells(rows: Sequence[Row]) -> list[Row]:
 def cell_scores(rows: Sequence[Row]) -> Row:
     """Return the scores of some trials together.
 
-    Means are over the runs that completed, the others are counted; what went wrong in matching, and extremes, are those
-    of all runs that did not break down: one that was lost and drove on to its limit has most to tell there.
+    Means, sums and extremes are over the runs that completed or ended at a limit; those that failed are counted.
     """
     complete = [row for row in rows if row["status"] == "complete"]
     sound = [row for row in rows if row["status"] in SOUND]
     scores: Row = {"trials": len(rows), "complete": len(complete), "sound": len(sound)}
     for name in MEANS:
-        runs = runs_of(complete, Measure(name, False))
+        runs = runs_of(rows, Measure(name, False))
         found = estimate(runs)
         scores[name] = None if found is None else asdict(found) | {"median": float(np.median(list(runs.values())))}
-    scores["without"] = without(complete, MEANS)
+    scores["without"] = without(sound, MEANS)
     for name in SUMS:
         scores[name] = sum(row.get(name) or 0 for row in sound)
-    scores["distances"] = sum(row.get("distances") or 0 for row in complete)
     for name in ("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"):
-        of = SOUND if name in ("missed_share", "doubles_beyond_gate") else ("complete",)
-        found = estimate(runs_of(rows, Measure(name, False), of))
+        found = estimate(runs_of(rows, Measure(name, False)))
         scores[name] = None if found is None else asdict(found)
     for name in ("trace_least", "bound_margin"):
         values = [row[name] for row in sound if row.get(name) is not None]
@@ -194,8 +198,8 @@ def cell_scores(rows: Sequence[Row]) -> Row:
     scores["bound_runs_below"] = len(below)
     for name in ("bound_margin", "bound_first_m", "bound_worst_m"):
         scores[f"{name}_median"] = float(np.median([row[name] for row in below])) if below else None
-    scores["pose_nees_in_band"] = _mean([row.get("pose_nees_in_band") for row in complete])
-    return scores
+    scores["pose_nees_in_band"] = _mean([row.get("pose_nees_in_band") for row in sound])
+    return scores | consistency(scores)
 
 
 def without(rows: Sequence[Row], names: Sequence[str]) -> dict[str, int]:

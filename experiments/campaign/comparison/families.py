@@ -1,10 +1,9 @@
-"""Many comparisons made at once: each is held against the size of its family, so that chance alone finds none."""
+"""Many comparisons made at once: each is corrected for the size of its family, so that chance alone finds none."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ...scoring.statistics import FEW_RUNS, holm
-from ...views.numbers import number
 
 Row = dict[str, Any]
 CLEAR = 0.05
@@ -26,13 +25,6 @@ def is_clear(row: Row) -> bool:
     return row.get("p_holm") is not None and row["p_holm"] < CLEAR
 
 
-def family_words(rows: Sequence[Row]) -> str:
-    """Return how many comparisons a family has, and how many of them are clear."""
-    size = rows[0]["family"] if rows and "family" in rows[0] else 0
-    if not size:
-        return f"None is of {FEW_RUNS} runs or more: none is tested."
-    clear = sum(map(is_clear, rows))
-    return (
-        f"Clear: p below {CLEAR:g} after Holm's correction for the {number(size)} comparisons of this family of"
-        f" {FEW_RUNS} runs or more; {number(clear)} are."
-    )
+def family_of(rows: Sequence[Row]) -> tuple[int, int]:
+    """Return how many comparisons of a family are tested, and how many of them are clear."""
+    return (rows[0].get("family") or 0 if rows else 0), sum(map(is_clear, rows))

@@ -45,7 +45,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
     for kind, backend, words, judge in claims:
         told = {}
         for arm in arms if backend in names else ():
-            if of[backend, arm]["complete"] and not (kind in MATCHING and arm == "replay-true"):
+            if of[backend, arm]["sound"] and not (kind in MATCHING and arm == "replay-true"):
                 numbers, holds = judge(of[backend, arm])
                 told[arm] = {"found": numbers, "holds": holds}
         if told:
@@ -101,7 +101,7 @@ def _anees(row: Row) -> tuple[Row, bool | None]:
 
 def _held(row: Row) -> tuple[Row, bool | None]:
     held = row["distances_in_95"]
-    return dict(held or {}) | {"distances": row["distances"], "replays": row["complete"]}, _mean_in(held, HELD_AIM)
+    return dict(held or {}) | {"distances": row["distances"], "replays": row["sound"]}, _mean_in(held, HELD_AIM)
 
 
 def _doubles(row: Row) -> tuple[Row, bool | None]:

@@ -13,7 +13,7 @@ MATCHES_WITHIN = 1.1
 """Two errors match if the 95 % interval of their ratio stays below this; they do not if it stays above."""
 DECIDING = ("wall_rmse_m", "wall_shape_m")
 """Where the walls of the map lie, and its shape alone: the full EKF moves its map as a whole, which says nothing of
-how well the walls lie to each other (docs/results.md, "Bias and the precision of the scanner")."""
+how well the walls lie to each other (docs/contributing/studies.md, "Bias and the precision of the scanner")."""
 MARKS = ("10", "20", "33")
 """Metres driven at which both are compared; the last that any run reached decides. 33 m is the length of the paper's
 first experiment."""

@@ -14,14 +14,16 @@ from chainslam.slam.association.matching import MatchingConfig
 from chainslam.slam.evaluation.consistency import chi2_band, pooled_band
 
 from ...artifacts.files import csv_bytes, json_bytes, stamp, write
-from ...artifacts.reading import told
+from ...artifacts.reading import read_json, told
 from ...artifacts.schema import UnfitError
 from ...scoring.maps.measurements import Z_95
 from ..plan import Campaign, Trial, gate_of, is_errorless
 from ..scores.score import END, TrialScores
 from .comparison import compare
+from .consistency import consistency
 from .findings import findings
 from .hypothesis import hypothesis
+from .shapes import COMPARISON
 
 FIRST = (
     *("world", "backend", "strategy", "seed", "mode", "association", "status", "reason", "steps", "path_length_m"),
@@ -84,8 +86,9 @@ def distance_errors(record: TrialScores) -> tuple[Float[np.ndarray, " p"], Float
 def mark_rows(record: TrialScores) -> list[Row]:
     """Return the scores of a trial at equal metres driven.
 
-    `state` tells what the robot was doing then: `driving`, `finished` (complete before; its last state counts) or
-    `failed` (it ended before without being complete, and there is nothing to score).
+    `state` tells what the robot was doing then: `driving` (also at the end of a run that a limit ended), `finished`
+    (complete before; its last state counts) or `failed` (it ended before without being complete, and there is nothing
+    to score).
     """
     summary = record.summary
     marks = summary.get("marks") or {}
@@ -96,7 +99,7 @@ def mark_rows(record: TrialScores) -> list[Row]:
         at = marks.get(mark)
         state = "driving" if at is not None else "finished" if complete else "failed"
         if mark == END:
-            state = "finished" if complete else "failed"
+            state = {"complete": "finished", "stopped": "driving"}.get(summary["status"], "failed")
         scores = at if at is not None else marks.get(END) if complete else None
         rows.append({**names, "metres": mark, "state": state, **(scores or {})})
     return rows
@@ -181,6 +184,12 @@ def read_rows(path: Path, columns: Sequence[str] = ()) -> list[Row]:
         if missing:
             raise UnfitError(f"no column {missing[0]}")
     return rows
+
+
+def read_comparison(folder: Path) -> Row:
+    """Return `comparison.json` of a campaign's folder, with the verdicts that an older one lacks; raises UsageError."""
+    said: Row = read_json(folder / "comparison.json", COMPARISON, "run the same `compare` to its end")
+    return said | {"pooled": [row | consistency(row) for row in said["pooled"]]}
 
 
 def band_scores(records: Sequence[TrialScores], steps: Sequence[Row]) -> Row:

@@ -1,147 +1,75 @@
-"""The report of two campaigns held against each other."""
+"""The report of two campaigns compared trial by trial."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite, log
 from pathlib import Path
 from typing import Any
 
-from chainslam.viz.reports.report import Page, PageTable, Section
+from chainslam.viz.reports.report import Page, PageTable, Section, table
 
 from ...scoring.statistics import FEW_RUNS
-from ...views.numbers import NONE, digits_apart, number
+from ...views.numbers import NONE, number
 from ..comparison.comparison import Row, arm_of
-from ..comparison.families import family_words, is_clear
-from ..comparison.words import ARMS_SHORT, MEASURE_WORDS, interval
+from ..comparison.families import CLEAR, is_clear
 from ..contrast import TRIALS, read_contrast
+from .tables import differences, text
 
 MOST_ROWS = 60
-"""Trials that are told one by one, the most different ones; `contrast.csv` has them all."""
+"""Trials that the page shows one by one, the most different ones; `contrast.csv` has them all."""
+SIDES = {"status": ("status", 1.0), "path length, m": ("path_length_m", 1.0), "pose ANEES": ("pose_anees", 1.0),
+         "wall error, cm": ("wall_rmse_m", 100.0), "duplicate walls incl. merged": ("double_entries", 1.0)}  # fmt: skip
+"""Columns of what both sides have: the key without its side, and what it is multiplied by."""
+NOTE = (
+    "Second compared with first, paired by run (the same world, start and noise): a ratio above 1 or a difference above"
+    f" 0 is worse than the first. p is corrected by Holm's method; fewer than {FEW_RUNS} runs are not tested. Left out:"
+    " runs that failed in one of both or lack the value."
+)
 
 
 def contrast_page(folder: Path) -> Page:
     """Return the report of a folder that `compare --against` left; raises UsageError where it is none."""
     said = read_contrast(folder)
-    settings = tuple((name, *(str(value) for value in pair)) for name, pair in said["settings"].items())
-    made = PageTable("Made with other settings or software", ("what", "first", "second"), settings, is_wordy=True)
+    told = [row | {"arm": arm_of(row)} for row in said["differences"]]
+    changes = {"from": lambda item: item[0].partition(" -> ")[0], "to": lambda item: item[0].partition(" -> ")[2]}
+    status = table("Status", changes | {"trials": lambda item: number(item[1])}, list(said["status"].items()))
+    settings = PageTable(
+        "Settings and software that differ", ("setting", "first", "second"),
+        tuple((name, *map(str, pair)) for name, pair in said["settings"].items()),
+    )  # fmt: skip
+    means = differences("Means", told, {"estimator": "backend", "arm": "arm"})
+    sections = (Section("Means", (NOTE,), (means,)), *_trials(said["different_trials"]))
     return Page(
         "Two campaigns, trial by trial",
-        f"First: {said['first']}. Second: {said['second']}. Did anything change, and is it more than chance?",
-        verdict(said),
+        (*lines_of_contrast(said), f"First: {said['first']}. Second: {said['second']}."),
         f"chainslam compare --against {said['first']} {said['second']} --out DIR",
         (),
-        (
-            Section("Trials", tuple(_counts(said)), (made,) if settings else ()),
-            Section("Differences", _WORDS, (_differences(said["differences"]),)),
-            *_trials(said["different_trials"]),
-        ),
+        sections=(*sections, Section("Trials", tables=tuple(each for each in (status, settings) if each.rows))),
     )
 
 
-_WORDS = (
-    "Second against first, paired by run: the same world, start and noise. A ratio above 1, or a difference above 0, is"
-    " worse than the first.",
-)
-
-
-def verdict(said: dict[str, Any]) -> tuple[str, ...]:
-    """Return the answer, a paragraph each."""
+def lines_of_contrast(said: Row) -> tuple[str, ...]:
+    """Return what differs, and which means differ by more than chance."""
     count = said["trials"]
-    if not count["different"]:
-        return (f"No: all {count['shared']} trials that both have came out the same, timings excepted.",)
     told = [row for row in said["differences"] if row["value"] is not None]
-    firm = [row for row in told if row["runs"] >= FEW_RUNS]
-    clear = [row for row in firm if is_clear(row)]
-    first = f"Yes: {count['different']} of {count['shared']} trials that both have came out differently."
-    if firm:
-        first += (
-            f" Of {len(firm)} means, {len(clear)} changed by more than chance (p below 0.05 after Holm's correction for"
-            " all of them)."
-        )
-    if len(firm) < len(told):
-        first += f" {len(told) - len(firm)} means of fewer than {FEW_RUNS} runs cannot be told from chance."
-    worst = sorted(clear, key=_size, reverse=True)[:3]
-    return (first, *map(_in_words, worst))
-
-
-def _in_words(row: Row) -> str:
-    value, between = _value(row)
-    return f"{_subject(row)}: {value} ({between}), {row['kind']}."
-
-
-def _value(row: Row) -> tuple[str, str]:
-    """Return a difference and its interval, with as many digits as tell them from none."""
-    told = [row[name] for name in ("value", "low", "high") if row[name] is not None]
-    digits = digits_apart([*told, _none(row)])
-    return number(row["value"], digits), interval(row, digits=digits)
-
-
-def _none(row: Row) -> float:
-    """Return what no difference is."""
-    return 1.0 if row["kind"] == "ratio" else 0.0
-
-
-def _size(row: Row) -> float:
-    return abs(row.get("effect_size") or 0.0)
-
-
-def _subject(row: Row) -> str:
-    return f"{row['backend']}, {ARMS_SHORT[arm_of(row)]}, {MEASURE_WORDS[row['measure']]}"
-
-
-def _counts(said: dict[str, Any]) -> Sequence[str]:
-    count, changes = said["trials"], said["status"]
-    words = [
-        f"Both have {count['shared']} trials: {count['the_same']} the same, {count['different']} different. Only the"
-        f" first has {count['only_first']}, only the second {count['only_second']} more, which are left out."
-    ]
-    moved = [f"{times} went {change}" for change, times in changes.items() if len(set(change.split(" -> "))) == 2]
-    return [*words, f"Status: {', '.join(moved)}." if moved else "Every trial ended with the same status."]
-
-
-def _differences(rows: Sequence[Row]) -> PageTable:
-    header = (
-        "back end",
-        "arm",
-        "measure",
-        "kind",
-        "value",
-        "95 % interval",
-        "effect size",
-        "runs",
-        "left out",
-        "clear",
+    tested = [row for row in told if row["runs"] >= FEW_RUNS]
+    clear = sum(map(is_clear, tested))
+    lone = f"{count['only_first']} only in the first, {count['only_second']} only in the second"
+    return (
+        f"{count['different']} of {count['shared']} shared trials differ ({lone}).",
+        f"{clear} of {len(tested)} means differ by more than chance (p < {CLEAR} after Holm's correction); too few runs"
+        f" for {len(told) - len(tested)}.",
     )
-    told = tuple(
-        (
-            row["backend"], ARMS_SHORT[arm_of(row)], MEASURE_WORDS[row["measure"]], row["kind"], *_value(row),
-            number(row.get("effect_size"), 2), number(row["runs"]),
-            number(row["pairs_without_value"]), "yes" if is_clear(row) else "",
-        )
-        for row in rows
-        if row["value"] is not None
-    )  # fmt: skip
-    note = f"Left out: runs that did not complete in both, or for which one has no such value. {family_words(rows)}"
-    return PageTable("Second against first", header, told, note)
 
 
 def _trials(rows: Sequence[Row]) -> list[Section]:
     if not rows:
         return []
-    most = sorted(rows, key=_apart, reverse=True)[:MOST_ROWS]
-    header = (
-        *("world", "strategy", "back end", "arm", "seed", "status", "way, m", "pose ANEES", "walls, cm"),
-        "duplicate walls",
-    )
-    told = tuple(
-        (
-            row["world"], row["strategy"], row["backend"], ARMS_SHORT[arm_of(row)], str(row["seed"]),
-            _pair(row, "status"), _pair(row, "path_length_m"), _pair(row, "pose_anees"),
-            _pair(row, "wall_rmse_m", 100.0), _pair(row, "double_entries"),
-        )
-        for row in most
-    )  # fmt: skip
-    note = f"The {len(most)} most different of {len(rows)} by their pose ANEES; all are in {TRIALS}."
-    return [Section("Trials that differ", tables=(PageTable("First, second", header, told, note),))]
+    names = {"world": "world", "strategy": "strategy", "estimator": "backend", "arm": "arm", "seed": "seed"}
+    columns = {name: text(key) for name, key in names.items()}
+    columns |= {words: _pair(key, scale) for words, (key, scale) in SIDES.items()}
+    most = [row | {"arm": arm_of(row)} for row in sorted(rows, key=_apart, reverse=True)[:MOST_ROWS]]
+    words = f"First, second: the {len(most)} most different of {len(rows)} by pose ANEES; {TRIALS} has all."
+    return [Section("Trials that differ", (words,), (table("Trials that differ", columns, most),))]
 
 
 def _apart(row: Row) -> float:
@@ -152,9 +80,12 @@ def _apart(row: Row) -> float:
     return abs(log(pair[1] / pair[0]))
 
 
-def _pair(row: Row, name: str, scale: float = 1.0) -> str:
-    words = [_word(row[f"{name}_{side}"], scale) for side in ("first", "second")]
-    return words[0] if words[0] == words[1] else f"{words[0]}, {words[1]}"
+def _pair(name: str, scale: float) -> Callable[[Row], str]:
+    def shown(row: Row) -> str:
+        words = [_word(row[f"{name}_{side}"], scale) for side in ("first", "second")]
+        return words[0] if words[0] == words[1] else f"{words[0]}, {words[1]}"
+
+    return shown
 
 
 def _word(value: Any, scale: float) -> str:

@@ -1,141 +1,115 @@
 """The pictures of a campaign's report."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 from jaxtyping import Float
-from msgspec import defstruct
 
 from chainslam.explore.strategies import STRATEGIES
 from chainslam.sim.worlds import DrawingOptions
 from chainslam.viz import palette
-from chainslam.viz.figures.curves import Curve, Ratio, SmallMap, anees_figure, map_figure, ratio_figure
-from chainslam.viz.figures.maps import png
-from chainslam.viz.figures.plots import draw_coverage
+from chainslam.viz.figures.maps import saved
+from chainslam.viz.figures.panels import SmallMap, map_figures
+from chainslam.viz.figures.plots import NeesCurve, draw_coverage, draw_nees
 from chainslam.viz.reports.report import PagePicture
 
-from ...artifacts.reading import told
-from ...artifacts.schema import fit, many
 from ...scenario import load_world
 from ...usage import UsageError
 from ..comparison.comparison import BASELINE_BACKEND, BASELINE_STRATEGY
-from ..comparison.tables import read_rows
-from ..comparison.words import ARMS_SHORT
+from ..comparison.curves import along_path
 from ..plan import CLOSED, Campaign, Trial, drawing_of, trials, world_key
+from ..scores.score import TrialScores
 from ..store import Store
+from .tables import ARMS
 
-MARGIN_M = 0.5
-RATIO_LABELS = {
-    "pose_anees_from_start": "pose ANEES from the start over that of full-ekf",
-    "wall_rmse_m": "error of walls over that of full-ekf",
-}
-
-_NAMES = ("world", "strategy", "backend", "mode", "association")
-_CURVE = ("path_length_m", "pose_anees", "band_low", "band_high")
-Row = defstruct("Row", [*((name, str) for name in _NAMES), *((name, float | None) for name in _CURVE)])
+NEES = "pose_nees_from_start"
+Arrays = dict[str, np.ndarray]
 
 
-def curve_pictures(folder: Path, campaign: Campaign) -> tuple[PagePicture, ...]:
-    """Return the ANEES along the way, a picture for each world and arm, by the baseline strategy."""
-    rows = read_rows(folder / "steps.parquet", (*_NAMES, *_CURVE))
-    with told(folder / "steps.parquet", "run the same `compare` to its end"):
-        fit(many(Row), rows, "rows")
-    arrays = {name: np.array([row[name] for row in rows]) for name in (*_NAMES, *_CURVE)}
-    strategy = BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
+def nees_pictures(folder: Path, campaigns: Sequence[Campaign], arms: Sequence[str]) -> tuple[PagePicture, ...]:
+    """Return the NEES along the path, a picture for each arm and world: the median over the runs of each estimator."""
     pictures = []
-    for world in map(world_key, campaign.worlds):
-        for arm in campaign.arms:
-            mode, _, association = arm.partition("-")
-            chosen = (arrays["world"] == world) & (arrays["strategy"] == strategy) & (arrays["mode"] == mode)
-            chosen &= arrays["association"] == (association or "own")
-            curves = [_curve(name, arrays, chosen & (arrays["backend"] == name)) for name in campaign.backends]
-            curves = [curve for curve in curves if len(curve.path_m)]
+    for arm in arms:
+        runs: dict[str, dict[str, list[tuple[np.ndarray, np.ndarray]]]] = {}
+        for trial, record in _stored(folder, campaigns, arm):
+            cell = runs.setdefault(world_key(trial.world), {}).setdefault(trial.backend, [])
+            path = record.arrays.get("path_length_m", np.zeros(0))
+            cell.append((path, record.arrays.get(NEES, np.full(len(path), np.nan))))
+        for world, cells in runs.items():
+            found = {name: along for name, cell in cells.items() if (along := along_path(cell)) is not None}
+            curves = [NeesCurve(name, a.path_m, a.median, a.band, a.quartiles) for name, a in found.items()]
             if curves:
-                caption = f"{world} by {strategy}, {ARMS_SHORT[arm]}: ANEES of the pose over the trials"
-                pictures.append(PagePicture(png(anees_figure(f"{world}, {ARMS_SHORT[arm]}", curves)), caption))
-    return tuple(pictures)
-
-
-def _curve(name: str, arrays: dict[str, np.ndarray], rows: np.ndarray) -> Curve:
-    return Curve(name, *(arrays[column][rows].astype(np.float64) for column in _CURVE))
-
-
-def ratio_pictures(said: dict[str, Any]) -> tuple[PagePicture, ...]:
-    """Return the ratios to the full EKF with their intervals, a picture for each measure."""
-    pictures = []
-    for measure, label in RATIO_LABELS.items():
-        rows = [row for row in said["backends"] if row["measure"] == measure and row["low"] is not None]
-        rows.sort(key=lambda row: row["first"])
-        ratios = [Ratio(row["first"], ARMS_SHORT[row["arm"]], row["value"], row["low"], row["high"]) for row in rows]
-        if ratios:
-            figure = ratio_figure(label, ratios, "ratio, 95 % interval by run")
-            pictures.append(PagePicture(png(figure), f"{label}: right of the line the back end is worse"))
+                caption = f"{world}, {ARMS[arm]}, {max(map(len, cells.values()))} runs"
+                pictures.append(PagePicture(saved(draw_nees(curves), "svg"), caption))
     return tuple(pictures)
 
 
 def coverage_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[PagePicture, ...]:
-    """Return how much was mapped along the way, a picture for each world: the mean over the trials of each strategy.
+    """Return how much was mapped along the path, a picture for each world: the mean over the trials of each strategy.
 
     A run that has ended keeps what it had, up to the longest run of the world.
     """
-    pictures = []
+    runs: dict[str, dict[str, list[Arrays]]] = {}
     for campaign in campaigns:
-        store = Store(folder, campaign)
         backend = BASELINE_BACKEND if BASELINE_BACKEND in campaign.backends else campaign.backends[0]
-        for world in campaign.worlds:
-            cell = [t for t in trials(campaign) if (t.world, t.backend, t.arm) == (world, backend, CLOSED)]
-            runs = [(t.strategy, store.record(t).arrays) for t in cell]
-            runs = [(strategy, arrays) for strategy, arrays in runs if "coverage" in arrays]
-            if not runs:
-                continue
-            metres = np.linspace(0.0, max(float(arrays["coverage_path_m"][-1]) for _, arrays in runs), 101)
-            shares: dict[str, list[np.ndarray]] = {}
-            for strategy, arrays in runs:
-                share = np.interp(metres, arrays["coverage_path_m"], arrays["coverage"])
-                shares.setdefault(strategy, []).append(share)
-            curves = {strategy: (metres, np.mean(found, axis=0)) for strategy, found in shares.items()}
-            colours = {strategy: palette.of_rank(k) for k, strategy in enumerate(dict.fromkeys((*STRATEGIES, *curves)))}
-            title = f"{world_key(world)}, {backend}: mean of {len(runs) // len(curves)} trials a strategy"
-            caption = f"{world_key(world)}: share of the reachable contour mapped, against the way driven"
-            pictures.append(PagePicture(png(draw_coverage(curves, colours, title)), caption))
-    return tuple(pictures)
-
-
-def map_arm(campaign: Campaign) -> str:
-    """Return the arm whose maps are shown."""
-    return CLOSED if CLOSED in campaign.arms else campaign.arms[0]
-
-
-def map_pictures(folder: Path, campaigns: Sequence[Campaign]) -> tuple[PagePicture, ...]:
-    """Return the map of every back end on one seed, a row for each world, all of a row at one scale."""
+        for strategy in campaign.strategies:
+            for trial, record in _stored(folder, [campaign], CLOSED, strategy):
+                if trial.backend == backend and "coverage" in record.arrays:
+                    runs.setdefault(world_key(trial.world), {}).setdefault(strategy, []).append(record.arrays)
     pictures = []
-    for campaign in campaigns:
-        strategy = BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
-        store, known = Store(folder, campaign), set(trials(campaign))
-        for world in campaign.worlds:
-            cell = [
-                Trial(world, strategy, backend, map_arm(campaign), campaign.first_seed) for backend in campaign.backends
-            ]
-            floor = _floor(world, drawing_of(campaign))
-            maps = [found for t in cell if t in known and (found := _map(store, t, floor)) is not None]
-            if maps:
-                points = np.concatenate([*(small.ends_world.reshape(-1, 2) for small in maps), *floor])
-                low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
-                pictures += [PagePicture(png(map_figure(small, low, high)), small.title) for small in maps]
+    for world, cells in runs.items():
+        end = max(float(arrays["coverage_path_m"][-1]) for cell in cells.values() for arrays in cell)
+        metres = np.linspace(0.0, end, 101)
+        curves = {
+            name: (metres, np.mean([np.interp(metres, a["coverage_path_m"], a["coverage"]) for a in cell], axis=0))
+            for name, cell in cells.items()
+        }
+        colours = {name: palette.of_rank(rank) for rank, name in enumerate(dict.fromkeys((*STRATEGIES, *curves)))}
+        caption = f"{world}, mean over {max(map(len, cells.values()))} runs of a strategy"
+        pictures.append(PagePicture(saved(draw_coverage(curves, colours), "svg"), caption))
     return tuple(pictures)
 
 
-def _map(store: Store, trial: Trial, floor: tuple[Float[np.ndarray, "_ 2"], ...]) -> SmallMap | None:
-    record = store.record(trial)
-    if "map_ends" not in record.arrays or not len(record.arrays["map_ends"]):
-        return None
-    arrays = record.arrays
-    title = f"{world_key(trial.world)}, {trial.backend}, seed {trial.seed}: {record.summary['status']}"
+def map_pictures(folder: Path, campaigns: Sequence[Campaign], arm: str) -> dict[str, tuple[PagePicture, ...]]:
+    """Return, by world, the map of each estimator on the first seed, all of a world at one scale."""
+    found: dict[str, tuple[PagePicture, ...]] = {}
+    for campaign in campaigns:
+        for world in campaign.worlds:
+            floor = _floor(world, drawing_of(campaign))
+            maps = {
+                f"{trial.backend}: {record.summary['status']}": _map(record.arrays, floor)
+                for trial, record in _stored(folder, [campaign], arm, world=world, seed=campaign.first_seed)
+                if len(record.arrays.get("map_ends", ()))
+            }
+            if maps:
+                drawn = zip(maps, map_figures(list(maps.values())), strict=True)
+                shown = (PagePicture(saved(figure, "svg"), caption) for caption, figure in drawn)
+                found[world_key(world)] = (*found.get(world_key(world), ()), *shown)
+    return found
+
+
+def strategy_shown(campaign: Campaign) -> str:
+    """Return the strategy whose runs the pictures show."""
+    return BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
+
+
+def _stored(
+    folder: Path, campaigns: Sequence[Campaign], arm: str, strategy: str | None = None,
+    world: str | None = None, seed: int | None = None,
+) -> Iterator[tuple[Trial, TrialScores]]:  # fmt: skip
+    """Yield what trials of one arm left, those of the strategy that is shown where none is named."""
+    for campaign in campaigns:
+        store, by = Store(folder, campaign), strategy or strategy_shown(campaign)
+        for trial in trials(campaign):
+            if (trial.arm, trial.strategy) == (arm, by) and world in (None, trial.world) and seed in (None, trial.seed):
+                yield trial, store.record(trial)
+
+
+def _map(arrays: Arrays, floor: tuple[Float[np.ndarray, "_ 2"], ...]) -> SmallMap:
     return SmallMap(
-        title, arrays["map_ends"], arrays["map_closed"], arrays["map_tentative"], arrays["path_estimated"], floor
+        "", arrays["map_ends"], arrays["map_closed"], arrays["map_tentative"], arrays["path_estimated"], floor
     )
 
 

@@ -12,7 +12,7 @@ from chainslam.slam.geometry.poses import to_world
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.map.stochastic_map import StochasticMap
 from chainslam.viz import palette
-from chainslam.viz.figures.curves import SmallMap
+from chainslam.viz.figures.panels import SmallMap
 
 from ...artifacts.presets import METHODS, preset_of
 from ...artifacts.settings import trial_of

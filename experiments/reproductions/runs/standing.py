@@ -1,7 +1,7 @@
 """A robot that stands still and observes the same walls: how much each back end claims to learn about its pose.
 
 No observation locates the world, so the covariance of the pose must not fall below the transported initial covariance,
-A P0 A' with A = [I, J (p - p0); 0, 1] (docs/estimation.md). The paper's figures 10 and 11 show one that does.
+A P0 A' with A = [I, J (p - p0); 0, 1] (docs/concepts/consistency.md). The paper's figures 10 and 11 show one that does.
 """
 
 from dataclasses import dataclass

@@ -5,8 +5,7 @@ needs none of them.
 """
 
 import re
-from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import yaml
 
@@ -14,11 +13,51 @@ from ..drawing import WorldError, shorten
 
 FILE_MAX = 64 * 2**10
 DEEPEST = 4
-NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
-WORDS: dict[str, bool | None] = {"true": True, "false": False, "null": None, "~": None, "": None}
+NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 
 Value = Any
 """Text, a number, a truth or nothing; a list of values; a mapping of text to values."""
+
+
+class _Plain(yaml.SafeLoader):
+    """PyYAML's safe loader without aliases, tags, keys that stand there twice, and YAML's many words for a value."""
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML says that it is an instance's)
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event = cast(Any, self).peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            raise WorldError(
+                f"expected values in the YAML file, found the alias *{shorten(event.anchor)}: write them out"
+            )
+        if event.tag is not None:
+            raise WorldError(
+                f"expected plain values in the YAML file, found the tag {shorten(event.tag)}: leave it out"
+            )
+        if isinstance(event, yaml.CollectionStartEvent) and self._depth == DEEPEST:
+            raise WorldError(f"expected values at most {DEEPEST} deep in the YAML file, found deeper ones: flatten it")
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Value]:
+        mapping: dict[Any, Value] = {}
+        for key, value in node.value:
+            name = str(self.construct_object(key, deep=True))
+            if name in mapping:
+                raise WorldError(f"expected each key once in the YAML file, found {shorten(name)} twice: take one away")
+            mapping[name] = self.construct_object(value, deep=True)
+        return mapping
+
+
+for _kind, _pattern, _first in (
+    ("float", NUMBER, [*"+-.0123456789"]),
+    ("bool", re.compile(r"(true|false)\Z", re.IGNORECASE), [*"tTfF"]),
+    ("null", re.compile(r"(null|~)?\Z", re.IGNORECASE), ["n", "N", "~", ""]),
+):
+    _Plain.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", _pattern, _first)
 
 
 def plain_mapping(
@@ -32,8 +71,7 @@ def plain_mapping(
         raise WorldError(f"expected a YAML file of at most {FILE_MAX} bytes, found {len(data)}: shorten it")
     try:
         # What reads these files in a robot (yaml-cpp) takes a tab between a key and its value, PyYAML does not.
-        events = yaml.parse(data.replace(b"\t", b" "), Loader=yaml.SafeLoader)
-        documents = [_value(events, next(events), 0) for event in events if isinstance(event, yaml.DocumentStartEvent)]
+        documents = list(yaml.load_all(data.replace(b"\t", b" "), _Plain))
     except WorldError:
         raise
     except (yaml.YAMLError, ValueError, OverflowError) as error:
@@ -47,39 +85,3 @@ def plain_mapping(
 def as_number(value: Value) -> Value:
     """Return a number that stands in quotes, as yaml-cpp, a robot's reader, takes it; other values as they are."""
     return float(value) if isinstance(value, str) and NUMBER.fullmatch(value.strip()) else value
-
-
-def _value(events: Iterator[yaml.Event], event: yaml.Event, depth: int) -> Value:
-    """Return the value that begins with an event, taking the rest of it from `events`."""
-    if isinstance(event, yaml.AliasEvent):
-        raise WorldError(f"expected values in the YAML file, found the alias *{shorten(event.anchor)}: write them out")
-    if (tag := getattr(event, "tag", None)) is not None:
-        raise WorldError(f"expected plain values in the YAML file, found the tag {shorten(tag)}: leave it out")
-    if isinstance(event, yaml.ScalarEvent):
-        return event.value if event.style else _scalar(event.value)
-    if depth == DEEPEST:
-        raise WorldError(f"expected values at most {DEEPEST} deep in the YAML file, found deeper ones: flatten it")
-    if isinstance(event, yaml.SequenceStartEvent):
-        return [_value(events, item, depth + 1) for item in _until(events, yaml.SequenceEndEvent)]
-    mapping: dict[str, Value] = {}
-    for key in _until(events, yaml.MappingEndEvent):
-        name = str(_value(events, key, depth + 1))
-        if name in mapping:
-            raise WorldError(f"expected each key once in the YAML file, found {shorten(name)} twice: take one away")
-        mapping[name] = _value(events, next(events), depth + 1)
-    return mapping
-
-
-def _until(events: Iterator[yaml.Event], end: type[yaml.Event]) -> Iterator[yaml.Event]:
-    """Yield events up to one of a kind; whoever takes them may take more in between."""
-    for event in events:
-        if isinstance(event, end):
-            return
-        yield event
-
-
-def _scalar(text: str) -> str | float | bool | None:
-    """Return what a value without quotes means."""
-    if NUMBER.fullmatch(text):
-        return float(text)
-    return WORDS.get(text.lower(), text)

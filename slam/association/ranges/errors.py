@@ -8,24 +8,23 @@ from ...geometry.quantities import Deviation, Distance, Part, Share, Sigmas, Siz
 
 @dataclass(frozen=True)
 class RangesConfig:
-    """When a bias or a scale of ranges is worth a word, and what is taken for granted of them."""
+    """Estimation of a bias and a scale of the ranges."""
 
     shared: SharedConfig = of_shared()
     bias_m: Deviation = 0.03
-    """Standard deviation of a bias before anything is seen."""
+    """Standard deviation of the bias before any observation."""
     bow_m: Deviation = 0.1
-    """A piece of wall that alone tells the bias to no better than this is left out: what is round bows, too."""
+    """A segment that gives the bias with a larger standard deviation than this is not used."""
     scale: Part = 0.03
-    """Standard deviation of a scale before the robot has driven."""
+    """Standard deviation of the scale before the robot has driven."""
     window_m: Size = 1.0
-    """Over so long a way the scans' motion is held against that of the wheels: where one scan leaves an error of a few
-    millimetres, it is a small share of this."""
+    """Path length over which the motion by scans is compared with that of the wheels."""
     sigmas: Sigmas = 3.0
-    """An error of more than so many sigmas is told ..."""
+    """Significance, in standard deviations, from which a bias or a scale is reported."""
     worth_m: Distance = 0.003
-    """... if a bias is larger than this, ..."""
+    """Smallest bias that is reported."""
     worth_scale: Share = 0.001
-    """... or a scale: it makes as much of 3 m."""
+    """Smallest deviation of the scale from 1 that is reported."""
 
 
 DEFAULTS = RangesConfig()

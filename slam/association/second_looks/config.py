@@ -25,58 +25,56 @@ from ..place_search import PlaceSearchConfig
 
 @dataclass(frozen=True)
 class ClosuresConfig:
-    """Where a place is sought that the robot has been to before, and what proves that it is the same; for all logs."""
+    """Search for loop closures in the offline refinement."""
 
     every_m: Size = 0.5
-    """A search begins wherever the robot has gone so far since the last one."""
+    """Path length between two searches."""
     query_m: Size = 4.0
-    """The scans of so many last metres are laid onto others. A closure is believed with another one, sought no farther
-    from it along the path and not right before it. They are laid onto ..."""
+    """Length of the latest path whose scans are matched together; a second closure within it must agree before either
+    is used."""
     beside_m: Distance = 5.0
-    """... an old scan and those that were taken no farther from it along the path."""
+    """Length of the old path, before and after an old scan, whose scans are matched against."""
     way_m: Distance = 6.0
-    """Old scans that are nearer than this, by the way over motions and closures, need no closure."""
+    """Old scans closer than this along the path, over motions and closures, are not searched."""
     recent: Number = ScanMatchingConfig.keyframes
-    """So many last scans are not old: odometry was matched to them."""
+    """Number of latest scans that are not searched."""
     radius_m: Size = 1.0
-    """A place is sought so far around where it is believed, and on old scans that were taken farther away by as much:
-    they see the same walls, ..."""
+    """Search radius around the believed position, before it grows with the path."""
     radius_share: Weight = 0.04
-    """... and farther by this share of the way since, ..."""
+    """Growth of the search radius per metre of path since the old scan."""
     most_m: Distance = 6.0
-    """... where that makes no more than this in all; ..."""
+    """Largest search radius."""
     turn_rad: Angle = float(np.deg2rad(10.0))
-    """... and turned by so much, ..."""
+    """Half-width of the heading search, before it grows with the path."""
     turn_a_metre: Angle = float(np.deg2rad(0.3))
-    """... and more by so much for each metre of the way, ..."""
+    """Growth of the heading search per metre of path since the old scan."""
     most_rad: Angle = float(np.deg2rad(45.0))
-    """... where that makes no more than this in all."""
+    """Largest half-width of the heading search."""
     slip_fit: Share = 0.4
-    """A scan of which a smaller share of points lies near those before it was taken after a slip: the turn between may
-    have been any."""
+    """If a smaller share of a scan's points lies near the scans before it, the robot has slipped and all headings are
+    searched."""
     fit_scans: Count = 8
-    """So many scans before it are looked at. A point lies near if it is within two cells of the search."""
+    """Number of previous scans that a scan is compared with to detect a slip."""
     places: Count = 3
-    """So many stretches of the old path are tried, the nearest first."""
+    """Number of stretches of the old path that are searched, nearest first."""
     gap_m: Distance = ScanMatchingConfig.gap_m
-    """Neighbouring returns that are nearer to each other are of one surface."""
+    """Neighbouring returns closer together than this are connected to one surface."""
     place: PlaceSearchConfig = field(default_factory=PlaceSearchConfig)
-    """How a place is sought, and when it is believed."""
+    """Used for loop closures: the latest scans against older ones."""
     least_points: Number = 100
-    """With fewer points no place is sought."""
+    """With fewer points no search is made."""
     sigma_m: Deviation = 0.05
-    """Standard deviation of a closure, across both axes ..."""
+    """Standard deviation of the position of a closure, along both axes."""
     sigma_rad: Spread = float(np.deg2rad(0.7))
-    """... and of its turn."""
+    """Standard deviation of the heading of a closure."""
     slip_m: Deviation = 0.1
-    """Standard deviation of a motion in which the robot slipped, across both axes ..."""
+    """Standard deviation of a motion with slip, along both axes."""
     slip_rad: Spread = float(np.deg2rad(10.0))
-    """... and of its turn."""
+    """Standard deviation of the turn of a motion with slip."""
     doubts: Annotated[tuple[Sigmas, ...], Meta(min_length=1)] = (1000.0, 30.0, 10.0, 3.0)
-    """Closures count less and less from so many standard deviations on, one round after the other: first all of them
-    count, at last only those that agree with each other."""
+    """Scale of the Cauchy loss on closures, in standard deviations, one value for each round."""
     taken_back: Sigmas = 6.0
-    """A closure that is off by more standard deviations than this in the end is taken back."""
+    """A closure whose final error is more standard deviations than this is removed."""
 
     @property
     def agree_m(self) -> float:
@@ -91,32 +89,34 @@ class ClosuresConfig:
 
 @dataclass(frozen=True)
 class SecondLooksConfig:
-    """How the segments of all scans are associated anew, and solved for together; the same for all logs."""
+    """Offline refinement of a real robot's log: all segments are associated again and solved for together.
+
+    On the paths of Intel the information of a motion is three to five times what scan matching states (`understated`),
+    which leaves room for the filter to use the same scan again.
+    """
 
     least_m: Distance = 0.4
-    """Shorter segments are left out ..."""
+    """Shortest segment that is used."""
     least_beams: Count = 6
-    """... and those of fewer beams ..."""
+    """Smallest number of beams of a segment that is used."""
     firm_rad: Angle = float(np.deg2rad(3.0))
-    """... or of a direction known less well."""
+    """Largest standard deviation of the direction of a segment that is used."""
     turn_rad: Angle = float(np.deg2rad(5.0))
-    """A segment is of a line whose direction differs by less ..."""
+    """Largest angle between a segment and its wall."""
     gates_m: Annotated[tuple[Distance, ...], Meta(min_length=1)] = (0.25, 0.15, 0.12, 0.12, 0.12)
-    """... from which neither of its ends is farther off than this, one for each round ..."""
+    """Largest distance of a segment's ends from its wall, one value for each round of association."""
     overlap_m: Distance = 0.1
-    """... and which it overlaps by so much."""
+    """Smallest overlap of a segment and its wall."""
     least_sightings: Number = 3
-    """Lines seen more rarely say nothing."""
+    """Smallest number of observations of a wall."""
     floor_rad: Spread = float(np.deg2rad(0.5))
-    """Real walls are not straighter than this ..."""
+    """Standard deviation added to each observed direction, since no real wall is straight."""
     floor_m: Deviation = 0.02
-    """... nor smoother."""
+    """Standard deviation added to each observed offset, since no real wall is straight."""
     understated: Factor = 4.0
-    """So many times as much as matching states is known of a motion: it says less, since a filter uses its scan again.
-    By the paths of Intel it is three to five times as much."""
+    """Divisor of the covariance that scan matching states, since that is larger than the error."""
     doubt: Sigmas = 2.0
-    """From so many standard deviations on an observation counts less and less (Cauchy's weight)."""
+    """Scale of the Cauchy loss on observations and motions, in standard deviations."""
     iterations: Count = 6
-    """Of Gauss and Newton's method in each round."""
+    """Largest number of Gauss-Newton iterations in each round."""
     closures: ClosuresConfig = field(default_factory=ClosuresConfig)
-    """Where the path comes back to a place."""

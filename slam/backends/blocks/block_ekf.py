@@ -21,9 +21,7 @@ class BlockEkf(Ekf[BlockMap]):
             return
         self._move_on()
         if len(moving):
-            self._map.relocate(
-                stack(moving, self._innovations(moving, first, self._map.pose_world, self._map.means[moving]))
-            )
+            self.map.relocate(stack(moving, self.compare(moving, first, self.map.pose_world, self.map.means[moving])))
         left = np.arange(len(rest))
         while len(left):
             rows, once = np.unique(rest[left], return_index=True)
@@ -36,13 +34,13 @@ class BlockEkf(Ekf[BlockMap]):
 
         x_2 = x_1 + H_line^-1 e is the observation in the map's frame, and its covariance C_2 has the robot's in it.
         """
-        model = self._innovations(rows, seen, self._map.pose_world, self._map.means[rows])
+        model = self.compare(rows, seen, self.map.pose_world, self.map.means[rows])
         to_line = np.linalg.inv(model.H_line)
-        by_pose = model.H_pose @ self._map.pose_cov @ model.H_pose.swapaxes(1, 2)
+        by_pose = model.H_pose @ self.map.pose_cov @ model.H_pose.swapaxes(1, 2)
         difference = (to_line @ model.e[..., None])[..., 0]
-        C1, C2 = self._map.covs[rows], to_line @ (by_pose + model.R) @ to_line.swapaxes(1, 2)
+        C1, C2 = self.map.covs[rows], to_line @ (by_pose + model.R) @ to_line.swapaxes(1, 2)
         fused, moved = weighted_mean(C1, C2, difference)
-        self._map.put(rows, self._map.means[rows] + moved, fused)
+        self.map.put(rows, self.map.means[rows] + moved, fused)
 
 
 def weighted_mean(

@@ -105,7 +105,7 @@ class IntersectionEkf(Ekf[IntersectionMap]):
 
     new_map = IntersectionMap
 
-    def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
+    def linearise(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
         """Linearise a scan in the order of its lines, for weights depend on how their rounds were rounded."""
         order = np.argsort(rows, kind="stable")
-        return super()._linear(rows[order], Observations(seen.ids[order], seen.lines[order], seen.cov[order]))
+        return super().linearise(rows[order], Observations(seen.ids[order], seen.lines[order], seen.cov[order]))

@@ -27,7 +27,7 @@ class Frame:
     def moved(self, odometry: Odometry) -> "Frame":
         """Return where the frame lies after a motion: a map that has not begun moves with the robot."""
         step = move(self.pose_world, odometry.motion)
-        cov = step.F @ self.cov @ step.F.T + step.W @ odometry.cov @ step.W.T
+        cov = step.F @ self.cov @ step.F.T + step.noise(odometry.cov)
         return Frame(step.pose_world, 0.5 * (cov + cov.T))
 
     def anchors_world(self, anchors: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m 2"]:

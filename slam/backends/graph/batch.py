@@ -16,5 +16,5 @@ class GraphBatch(Graph):
         The beliefs that follow are those of the optimum; the mission may go on from here.
         """
         solver = self._all_entered()
-        self._start_from(*optimise(self._config, self._record, solver.poses(), solver.all_lines()))
+        self._start_from(*optimise(self.config, self._record, solver.poses(), solver.all_lines()))
         return self.trajectory()

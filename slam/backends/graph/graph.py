@@ -43,7 +43,7 @@ class Graph:
         config: GraphConfig = DEFAULTS,
     ) -> None:
         """Start at a pose with its covariance and an empty map."""
-        self._config = config
+        self.config = config
         self.recoveries = 0
         """How often a solution did not hold and everything was solved anew."""
         self._version = 0
@@ -181,7 +181,7 @@ class Graph:
     def _start_from(self, poses: Float[np.ndarray, "p 3"], lines: Float[np.ndarray, "n 2"], anew: bool = True) -> None:
         """Make the graph of the record anew, linearised at these poses and lines (inner frame)."""
         self._move_on()
-        self._solver = Solver(self._config, self._record, poses, lines, anew)
+        self._solver = Solver(self.config, self._record, poses, lines, anew)
         self._anchor_shown()
         self._settle()
 
@@ -202,10 +202,10 @@ class Graph:
     def _recover(self, error: Exception) -> None:
         self.recoveries += 1
         if not isinstance(error, DivergedError):
-            self._config = replace(self._config, careful=True)
+            self.config = replace(self.config, careful=True)
         start = self._solver.start()
         try:
-            self._solver = solve_anew(self._config, self._record, *start)
+            self._solver = solve_anew(self.config, self._record, *start)
         except FAULTS:
             self._take_back(*start)
             words = " ".join(str(error).split()).partition(" Thrown when")[0]
@@ -219,9 +219,9 @@ class Graph:
         known = np.array([line < self._holds[1] for line in self._record.lines], dtype=bool)
         self._record.forget(*self._holds)
         try:
-            self._solver = solve_anew(self._config, self._record, poses, lines[known])
+            self._solver = solve_anew(self.config, self._record, poses, lines[known])
         except FAULTS as error:
-            self._solver, self._is_lost = Solver(self._config, self._record, poses, lines[known]), True
+            self._solver, self._is_lost = Solver(self.config, self._record, poses, lines[known]), True
             raise UnsolvableError(f"expected a solution without the last scan, found {error}") from error
         self._anchor_shown()
 

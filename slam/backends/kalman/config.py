@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class EkfConfig:
-    """How a filter states its lines and takes its Jacobians."""
+    """Parametrisation and Jacobians of the Kalman filters."""
 
     at_wall: bool = True
-    """Lines are anchored where they were seen; without, at the world's origin (the paper's form), where the error of a
-    line grows with its way there."""
+    """Anchor each wall where it was first seen, instead of at the world's origin (the paper's form), where its error
+    grows with the distance."""
     relinearise: bool = True
-    """A joint update takes its Jacobian at the pose that corrects the odometry; filters that relocate first have no use
-    for it."""
+    """Evaluate the measurement Jacobians at the pose corrected by the scan, instead of at the predicted pose."""

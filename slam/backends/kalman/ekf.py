@@ -1,4 +1,4 @@
-"""The verbs of an extended Kalman filter over (x, y, heading, alpha_1, d_1, ...), its pieces open to be replaced.
+"""An extended Kalman filter over (x, y, heading, alpha_1, d_1, ...), in methods that can be replaced one by one.
 
 A filter is this class with a map that keeps all covariances or only blocks, and with what it does differently:
 where it takes its Jacobians, which observations move what, what it does to P afterwards.
@@ -67,7 +67,23 @@ class Ekf(Generic[M]):
 
     A map whose first wall comes into sight after a drive begins in a frame of its own (`Frame`); the filter then
     works in that frame, and only `belief` is in the world's.
+
+    A filter of one's own inherits from one that is there and replaces these methods, each for itself:
+
+    - `motion`: the motion model, and the noise that it adds to the pose's error;
+    - `first_sight`: new lines, and the noise of the measurement in them;
+    - `compare`: innovations, their noise R and their Jacobians;
+    - `linearise`: where Jacobians of a scan are taken. `Linear.place` tells which line each observation is of;
+    - `observe`: what a scan does to the map;
+    - `unite`: what it does to the map that two lines were found to be one;
+    - `forget`: lines are dropped, merged or removed.
+
+    All of them work on `map`, by rows rather than ids, after the belief has become stale.
     """
+
+    map: M
+    """Mean and covariance of the pose and the lines, in the filter's own frame."""
+    config: EkfConfig
 
     new_map: Callable[[np.ndarray, np.ndarray], M]
     """Makes the map that this filter works on, from a pose and its covariance."""
@@ -78,8 +94,8 @@ class Ekf(Generic[M]):
         self, pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], config: EkfConfig = DEFAULTS
     ) -> None:
         """Start at a pose with its covariance and an empty map."""
-        self._map = self.new_map(pose_world, pose_cov)
-        self._config = config
+        self.map = self.new_map(pose_world, pose_cov)
+        self.config = config
         self._frame: Frame | None = None
         self._has_driven = False
         self._version = 0
@@ -97,8 +113,8 @@ class Ekf(Generic[M]):
         """Move the pose by the odometry."""
         self._move_on()
         self._has_driven = True
-        motion, noise = self._moved(odometry)
-        self._map.move(motion, noise)
+        motion, noise = self.motion(odometry)
+        self.map.move(motion, noise)
         self._odometry_cov = motion.F @ self._odometry_cov @ motion.F.T + noise
 
     def update(self, first: Observations, second: Observations) -> None:
@@ -106,18 +122,17 @@ class Ekf(Generic[M]):
         if len(second.ids):
             rows = self.belief.rows(second.ids)
             self._move_on()
-            self._condition(self._linear(rows, second))
+            self.observe(rows, second)
             self._odometry_cov = np.zeros((POSE, POSE))
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
     ) -> Int[np.ndarray, " m"]:
         """Add lines seen in the robot frame and return their ids."""
-        if self._config.at_wall and self._has_driven and not len(self._map.ids):
+        if self.config.at_wall and self._has_driven and not len(self.map.ids):
             self._begin_frame()
         self._move_on()
-        new, noise = self._grown(lines, cov, centres)
-        return self._map.append(new, noise)
+        return self.map.append(*self.first_sight(lines, cov, centres))
 
     def merge(self, keep: int, drop: int) -> None:
         """Condition the map on `keep` and `drop` being one line, then forget `drop`."""
@@ -125,16 +140,64 @@ class Ekf(Generic[M]):
         if keep == drop:
             raise ValueError(f"expected two lines to merge, found line {keep} twice")
         self._move_on()
-        alpha = self._align(rows)
-        H, e = equality(self._map.means[rows], self._map.anchors[rows], alpha)
-        self._condition(Linear(rows, H, e, ONE_WALL))
-        self._map.drop(rows[1:])
+        self.unite(rows)
+        self.forget(rows[1:])
 
     def remove(self, ids: Sequence[int]) -> None:
         """Forget lines; raises KeyError where an id is not in the map."""
         rows = self.belief.rows(ids)
         self._move_on()
-        self._map.drop(rows)
+        self.forget(rows)
+
+    def motion(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
+        """Return the motion, and the covariance of the noise that it adds to the pose's error."""
+        motion = move(self.map.pose_world, odometry.motion)
+        return motion, motion.noise(odometry.cov)
+
+    def first_sight(
+        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
+    ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
+        """Return new lines, and the covariance that each has beside what it has of the pose."""
+        new = initialise(self.map.pose_world, lines, centres, self.config.at_wall)
+        return new, new.noise(cov)
+
+    def compare(
+        self,
+        rows: Int[np.ndarray, " m"],
+        seen: Observations,
+        pose_world: Float[np.ndarray, "3"],
+        means: Float[np.ndarray, "m 2"],
+    ) -> Innovations:
+        """Compare observations with what a pose and the means of their rows predict; R is their noise."""
+        return innovations(pose_world, self.map.anchors[rows], means, seen.lines, seen.cov)
+
+    def linearise(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
+        """Linearise a scan, by default at the pose that corrects the odometry, not where it left the estimate.
+
+        An error of 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The
+        correction is what the scan says of the odometry if all else were known: were pose and lines to go where the
+        whole update takes them, their common shift and turn, which no scan can tell, would move the Jacobian too, and
+        be taken for measured.
+        """
+        pose, means = self.map.pose_world, self.map.means[rows]
+        here = stack(rows, self.compare(rows, seen, pose, means))
+        if not self.config.relinearise:
+            return here
+        H = here.H[:, :POSE]
+        step = self._odometry_cov @ H.T @ np.linalg.solve(H @ self._odometry_cov @ H.T + here.R, here.e)
+        return stack(rows, self.compare(rows, seen, pose + step, means)).before(step)
+
+    def observe(self, rows: Int[np.ndarray, " m"], seen: Observations) -> None:
+        """Take in the observations of one scan, each of the line of its row."""
+        self.map.condition(self.linearise(rows, seen))
+
+    def unite(self, rows: Int[np.ndarray, "2"]) -> None:
+        """Take in that the lines of two rows are one, before the second is forgotten."""
+        self._equate(rows)
+
+    def forget(self, rows: Int[np.ndarray, " m"]) -> None:
+        """Forget the lines of these rows, merged or removed."""
+        self.map.drop(rows)
 
     def _begin(self) -> None:
         """Begin what the filter remembers beside its map, which has no lines."""
@@ -144,67 +207,20 @@ class Ekf(Generic[M]):
         """Let the map begin here: what was lost before the first wall came into sight is the frame's error."""
         self._frame = Frame(self.belief.pose_world, self.belief.pose_cov)
         nothing = np.zeros((POSE, POSE))
-        self._map.move(Motion(np.zeros(POSE), nothing, nothing), nothing)
+        self.map.move(Motion(np.zeros(POSE), nothing, nothing), nothing)
         self._begin()
 
-    def _moved(self, odometry: Odometry) -> tuple[Motion, Float[np.ndarray, "3 3"]]:
-        """Return the motion and the covariance that it adds to the pose's."""
-        motion = self._motion(odometry)
-        return motion, motion.W @ odometry.cov @ motion.W.T
-
-    def _grown(
-        self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
-    ) -> tuple[Initialisation, Float[np.ndarray, "m 2 2"]]:
-        """Return new lines and the covariance that each has beside what it has of the pose."""
-        new = self._initialisation(lines, centres)
-        return new, new.G_line @ cov @ new.G_line.swapaxes(1, 2)
-
-    def _motion(self, odometry: Odometry) -> Motion:
-        return move(self._map.pose_world, odometry.motion)
-
-    def _innovations(
-        self,
-        rows: Int[np.ndarray, " m"],
-        seen: Observations,
-        pose_world: Float[np.ndarray, "3"],
-        means: Float[np.ndarray, "m 2"],
-    ) -> Innovations:
-        """Compare observations with what a pose and the means of those rows predict."""
-        return innovations(pose_world, self._map.anchors[rows], means, seen.lines, seen.cov)
-
-    def _initialisation(self, lines: Float[np.ndarray, "m 2"], centres: Float[np.ndarray, "m 2"]) -> Initialisation:
-        return initialise(self._map.pose_world, lines, centres, self._config.at_wall)
-
-    def _condition(self, model: Linear) -> None:
-        self._map.condition(model)
-
-    def _align(self, rows: Int[np.ndarray, "2"]) -> float | None:
-        """Prepare a merge of two rows (keep, drop); return where its Jacobian is taken if not at the estimate."""
-        return None
-
-    def _linear(self, rows: Int[np.ndarray, " m"], seen: Observations) -> Linear:
-        """Linearise a scan at the pose that corrects the odometry, not where it left the estimate.
-
-        An error of 1.5 degrees bends a line's prediction 2.6 m away by 0.9 mm, as much as the line is known to. The
-        correction is what the scan says of the odometry if all else were known: were pose and lines to go where the
-        whole update takes them, their common shift and turn, which no scan can tell, would move the Jacobian too, and
-        be taken for measured.
-        """
-        pose, means = self._map.pose_world, self._map.means[rows]
-        here = stack(rows, self._innovations(rows, seen, pose, means))
-        if not self._config.relinearise:
-            return here
-        H = here.H[:, :POSE]
-        step = self._odometry_cov @ H.T @ np.linalg.solve(H @ self._odometry_cov @ H.T + here.R, here.e)
-        there = stack(rows, self._innovations(rows, seen, pose + step, means))
-        return Linear(there.rows, there.H, there.e + there.H[:, :POSE] @ step, there.R)
+    def _equate(self, rows: Int[np.ndarray, "2"], alpha: float | None = None) -> None:
+        """Condition the map on two lines being one, with the Jacobian at the direction `alpha` if given."""
+        H, e = equality(self.map.means[rows], self.map.anchors[rows], alpha)
+        self.map.condition(Linear(rows, H, e, ONE_WALL))
 
     def _move_on(self) -> None:
         self._version += 1
         self._belief = None
 
     def _new_belief(self) -> Belief:
-        m, query = self._map, partial(self._query, self._version)
+        m, query = self.map, partial(self._query, self._version)
         if self._frame is None:
             return Belief(m.pose_world, m.pose_cov, m.ids, m.anchors, m.means, query)
         pose = self._frame.joint_world(Joint(m.pose_world, m.pose_cov, m.anchors[:0]))
@@ -214,5 +230,5 @@ class Ekf(Generic[M]):
     def _query(self, version: int, wanted: Int[np.ndarray, " m"]) -> Joint:
         if version != self._version:
             raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
-        joint = self._map.joint(self.belief.rows(wanted))
+        joint = self.map.joint(self.belief.rows(wanted))
         return joint if self._frame is None else self._frame.joint_world(joint)

@@ -24,12 +24,12 @@ REJECTED = 4.0
 
 @dataclass(frozen=True)
 class Failure:
-    """An axiom that does not hold."""
+    """A requirement that a back end does not meet."""
 
     axiom: str
     """Its name, in words."""
     found: str
-    """What was expected and what was found, or the error that was raised."""
+    """What was expected and found, or the error that was raised."""
 
 
 def errors_are_as_large_as_the_covariance_says(make: Make) -> None:
@@ -88,10 +88,10 @@ def check_backend(
     covariance: Literal["exact", "blocks", "bound"] = "exact",
     is_about_origin: bool = False,
 ) -> tuple[Failure, ...]:
-    """Return which axioms a back end breaks, none where all hold; some seconds, and no test runner is needed.
+    """Test a back end against the contract of `Backend`, and return the requirements that it does not meet.
 
-    `make` is its class, or what makes one from a pose (3,) and its covariance (3, 3). `covariance` is what it claims
-    of its errors, and `is_about_origin` whether it may feel where the world lies, both as in `BackendEntry`.
+    It takes some seconds and needs no test runner. `make` is the class, or a function from a pose (3,) and its
+    covariance (3, 3) to a back end. `covariance` and `is_about_origin` are claims as in `BackendEntry`.
     """
     failures = []
     for name, holds in axioms_of(covariance, is_about_origin).items():

@@ -28,20 +28,19 @@ Sums = Float[np.ndarray, "2 p"]
 
 @dataclass(frozen=True)
 class ChangePointsConfig:
-    """When a wall is known to bend.
+    """When a wall is split at a breakpoint that only many scans together show.
 
-    Beams farther off the line than noise is belong to something else; so may the last one on either end.
+    Beams that deviate from the line by more than noise belong to something else, and so may the last one at either end.
+    The significance is high because hundreds of walls are tested at dozens of places, thousands of times.
     """
 
     shared: SharedConfig = of_shared()
     pitch_m: Size = 0.25
-    """Bends are looked for at places so far apart along a wall: half of it from the bend, a turn of a degree is off by
-    2 mm."""
+    """Distance between the places along a wall at which a breakpoint is tested."""
     sigmas: Sigmas = 6.0
-    """The turn differs from zero by so many of its own: hundreds of walls, each at dozens of places, are asked
-    thousands of times."""
+    """Significance of the angle, in standard deviations, from which a breakpoint is accepted."""
     least_beams: Count = 4
-    """A scan counts at a place where it has so many beams on either side."""
+    """Number of beams that a scan must have on either side of a place to count there."""
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,11 @@ COVERED = 0.05
 
 
 def timed_scan(message: Any, upside_down: bool = False, sigma_m: float = 0.01, sigma_share: float = 0.0) -> TimedScan:
-    """Return a scan in the order in which its beams were taken, in the frame of a scanner that stands upright.
+    """Return the scan of a LaserScan message, with beams in the order of time and in the frame of an upright scanner.
 
-    Returns at the maximum range and beyond are +inf; those below the minimum, NaN and -inf, tell nothing. Zeros tell
-    nothing either: drivers write them for what came back too near, too weakly or not at all. Beams that a turn tells
-    twice are left out. Raises RobotError for a message that holds no scan.
+    Ranges at or beyond the maximum become +inf; those below the minimum, NaN, -inf and 0 become invalid, since drivers
+    write 0 for returns that are too near, too weak or missing. Beams that a revolution reports twice are left out.
+    Raises RobotError for a message that is no scan.
     """
     step, low = float(message.angle_increment), float(message.angle_min)
     ranges = np.asarray(message.ranges, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A robot whose messages come from elsewhere: what arrives is kept, what a `SteppedRobot` asks for is told."""
+"""A streaming robot made of messages that arrive by callbacks."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,13 +21,13 @@ PLAIN = RobotSpec()
 
 
 class CancelledError(KeyboardInterrupt):
-    """A run was cancelled: it ends as Ctrl-C ends it, with what was mapped until then."""
+    """A run was cancelled: it ends as by Ctrl-C, with what was mapped until then."""
 
 
 class MessageRobot:
-    """Makes a streaming robot of messages (`StreamingRobot`); callbacks may come from any thread.
+    """A `StreamingRobot` made of ROS messages; callbacks may come from any thread.
 
-    Give each message to `on_scan`, `on_odometry` or `on_wheels`, and `on_tf`; tf may tell the odometry, too.
+    Pass each message to `on_scan`, `on_odometry` or `on_wheels`, and `on_tf`, which may give the odometry, too.
     `publish` sends a twist to the motors. Messages are read by the names of their fields.
     """
 
@@ -50,7 +50,7 @@ class MessageRobot:
         self._ways_m: tuple[float, float] | None = None
         self._pose: Float[np.ndarray, 3] = np.zeros(3)
         self.covered = 0
-        """Scans that were left out since the scanner was inside something."""
+        """Number of scans left out because the scanner was inside something."""
 
     def on_scan(self, message: Any) -> None:
         """Take in a LaserScan."""
@@ -63,7 +63,7 @@ class MessageRobot:
             self._arrived.notify_all()
 
     def on_odometry(self, message: Any) -> None:
-        """Take in an Odometry message, of which the pose and its time count; its covariance is left aside."""
+        """Take in an Odometry message; its pose and time are used, its covariance is not."""
         with self._arrived:
             self._has_odometry = True
             self._frames.body = message.child_frame_id
@@ -71,7 +71,7 @@ class MessageRobot:
             self._arrived.notify_all()
 
     def on_wheels(self, time_s: float, left_m: float, right_m: float) -> None:
-        """Take in how far both wheels have gone since the beginning, m: counts times what one of them is worth."""
+        """Take in the distances that both wheels have travelled since the beginning, m."""
         with self._arrived:
             before, self._ways_m = self._ways_m or (left_m, right_m), (left_m, right_m)
             motion = self._spec.wheels.odometry(left_m - before[0], right_m - before[1]).motion
@@ -81,7 +81,7 @@ class MessageRobot:
             self._arrived.notify_all()
 
     def on_tf(self, message: Any) -> None:
-        """Take in a TFMessage, of /tf or /tf_static; it tells the odometry where no other message has."""
+        """Take in a TFMessage of /tf or /tf_static; it gives the odometry if no other message does."""
         with self._arrived:
             for time_s, pose in self._frames.take(message):
                 if not self._has_odometry:
@@ -89,16 +89,16 @@ class MessageRobot:
             self._arrived.notify_all()
 
     def cancel(self) -> None:
-        """Stop the robot and end the run: what was mapped until then is kept."""
+        """Stop the robot and end the run; what was mapped until then is kept."""
         with self._arrived:
             self._is_cancelled = True
             self._arrived.notify_all()
         self.stop()
 
     def spec(self, body: str = "", wait_s: float = 5.0) -> RobotSpec:
-        """Return what the robot states with the scanner's place from tf; `body` names its frame where no message does.
+        """Return the robot's description with the scanner's pose from tf; `body` is its frame if no message names it.
 
-        Raises RobotError where no transform tells it in time.
+        Raises RobotError if no transform arrives in time.
         """
         with self._arrived:
             self._frames.body = self._frames.body or body
@@ -111,7 +111,7 @@ class MessageRobot:
         return replace(self._spec, scanner=ScannerSpec(x, y, heading))
 
     def scan(self) -> TimedScan | None:
-        """Wait for the next scan and return it; None where none has come in `wait_s`. Older ones are left out."""
+        """Wait for the next scan and return it; None if none arrives in `wait_s`. Older ones are left out."""
         with self._arrived:
             if not self._wait(lambda: self._scan is not None, self._wait_s):
                 return None
@@ -120,9 +120,9 @@ class MessageRobot:
         return timed_scan(message, is_turned, self._sigma_m, self._sigma_share)
 
     def odometry(self, from_s: float, to_s: float) -> Odometry:
-        """Return the motion between two times, with the covariance of the wheels that the robot states.
+        """Return the motion between two times, with the covariance of the wheels' stated slip.
 
-        Waits until the second time is known; raises TimeoutError where it is not in `wait_s`.
+        It waits for odometry up to the second time; raises TimeoutError after `wait_s`.
         """
         with self._arrived:
             if not self._wait(lambda: self._odometry.newest_s >= to_s, self._wait_s):
@@ -136,7 +136,7 @@ class MessageRobot:
             return self._odometry.pose(time_s)
 
     def send(self, twist: Twist) -> None:
-        """Drive like this from now on."""
+        """Drive at this velocity from now on."""
         if not self._is_cancelled:
             self._publish(twist)
 
@@ -153,5 +153,5 @@ class MessageRobot:
 
 
 def map_to_odom(pose_map: Float[np.ndarray, "3"], pose_odom: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Return the pose of the odometry's frame in the map, from the body's poses in both at one time (REP 105)."""
+    """Return the transform from map to odom (REP 105), from the body's poses in both frames at the same time."""
     return compose(pose_map, inverse(pose_odom))

@@ -1,4 +1,4 @@
-"""Messages that go out: each is given empty, as ROS makes it, and its fields are filled."""
+"""Outgoing messages: each is passed empty, as ROS makes it, and its fields are filled."""
 
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ Message = TypeVar("Message")
 
 
 def written_twist(message: Message, twist: Twist) -> Message:
-    """Return a `geometry_msgs/Twist` that drives like this."""
+    """Fill and return an empty `geometry_msgs/Twist`."""
     filled: Any = message
     filled.linear.x, filled.angular.z = float(twist.speed_m_s), float(twist.turn_rad_s)
     return message
@@ -20,7 +20,7 @@ def written_twist(message: Message, twist: Twist) -> Message:
 def written_transform(
     message: Message, parent: str, child: str, pose: Float[np.ndarray, "3"], time_s: float
 ) -> Message:
-    """Return a `geometry_msgs/TransformStamped` that says where a frame lies in another, x m, y m, heading rad."""
+    """Fill and return an empty `geometry_msgs/TransformStamped` with a child's pose (x m, y m, heading rad)."""
     filled: Any = message
     filled.header.frame_id, filled.child_frame_id = parent, child
     write_stamp(filled.header.stamp, time_s)

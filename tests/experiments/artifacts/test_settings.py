@@ -182,5 +182,5 @@ def test_the_settings_of_a_campaign_are_those_that_differ_from_the_defaults(tmp_
     words = ("mission.mapper.matching.gate=0.95", f"mission.explorer.attempts={LEAVES['mission.explorer.attempts']}")
     campaign = Compare(tmp_path, "smoke", config=path, set=words).campaign
     assert campaign.settings == (("mission.mapper.matching.gate", 0.95), ("robot.radius_m", 0.25))
-    with pytest.raises(UsageError, match="--set .*'seed'"):
+    with pytest.raises(UsageError, match=r"--set .*'seed'"):
         _ = Compare(tmp_path, "smoke", set=("seed=4",)).campaign

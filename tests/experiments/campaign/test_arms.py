@@ -51,11 +51,13 @@ def test_a_campaign_without_noise_says_that_it_ends_and_claims_nothing_of_consis
     words += ["--trials", "1", "--max-steps", "5", "--modes", "closed", "--errorless", "--jobs", "1"]
     assert main(["compare", *words, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
-    assert "full-ekf: 0 of 1 runs complete." in said
+    assert "full-ekf completes 0 of 1 runs" in said
     assert "not positive definite" not in said
     comparison = json.loads((tmp_path / "comparison.json").read_text())
     assert comparison["findings"] == []
     (summary,) = {row["pose_anees"] for row in csv.DictReader((tmp_path / "trials.csv").read_text().splitlines())}
     assert summary == ""
     assert main(["report", str(tmp_path)]) == 0
-    assert "Without noise" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert "Without noise, block-ekf completes 0 of 1 runs" in page
+    assert "What does inconsistency cost?" not in page

@@ -1,6 +1,9 @@
+import json
+
 import pytest
 
 from chainslam.experiments.commands.cli import main
+from chainslam.experiments.views.numbers import number
 
 
 @pytest.mark.parametrize("listing", ["worlds", "backends", "strategies"])
@@ -51,10 +54,16 @@ def test_a_folder_that_cannot_be_made_is_told_before_anything_is_computed(capsys
     assert "--out" in capsys.readouterr().err
 
 
-def test_explore_leaves_its_folder_and_one_table(capsys, tmp_path):
+def test_explore_leaves_its_folder_and_ends_in_three_lines(capsys, tmp_path):
     assert main(["explore", "paper-fig8", "--max-steps", "5", "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr()
-    assert said.out.count("coverage") == 1
+    expected, happened, consistent, where = said.out.splitlines()[-4:]
+    assert expected.startswith("expected, roughly")
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["reason"] in happened
+    for name in ("pose_anees_from_start", "map_anees"):
+        assert number(summary[name]) in consistent
+    assert str(tmp_path / "run") in where
     assert said.err == ""
     assert {"summary.json", "map.png", "log.npz"} <= {path.name for path in (tmp_path / "run").iterdir()}
 
@@ -62,7 +71,7 @@ def test_explore_leaves_its_folder_and_one_table(capsys, tmp_path):
 def test_a_world_is_called_by_its_name_though_that_is_an_emoji(capsys, tmp_path):
     assert main(["explore", "random:1234", "--max-steps", "2", "--out", str(tmp_path / "[/run]")]) == 0
     said = capsys.readouterr().out
-    assert "random:1234: graph" in said
+    assert "world random:1234:" in said
     assert "[/run]" in said
 
 

@@ -10,12 +10,11 @@ import pytest
 from chainslam.experiments.artifacts.presets import METHODS
 from chainslam.experiments.artifacts.settings import defaults, differing, leaves, record_of
 from chainslam.experiments.campaign.comparison.tables import read_rows
-from chainslam.experiments.campaign.comparison.words import command_of
-from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of
+from chainslam.experiments.campaign.plan import CLOSED, Trial, command_of, config_of
 from chainslam.experiments.commands.cli import _parse, main
 from chainslam.experiments.scenario import TrialConfig
 
-DOCS = Path(__file__).parents[3] / "docs" / "exploration.md"
+DOCS = Path(__file__).parents[3] / "docs" / "concepts" / "exploration.md"
 METHOD = "mission.mapper.matching.method"
 DEFAULTS = dict(leaves(defaults()))
 MERGING = "mission.mapper.merging"

@@ -11,8 +11,7 @@ from chainslam.experiments.artifacts.results import config_record
 from chainslam.experiments.artifacts.saved import read_trial
 from chainslam.experiments.artifacts.settings import asked, parse_settings
 from chainslam.experiments.campaign.comparison.tables import doubles
-from chainslam.experiments.campaign.comparison.words import command_of
-from chainslam.experiments.campaign.plan import CLOSED, Trial, config_of, gate_of
+from chainslam.experiments.campaign.plan import CLOSED, Trial, command_of, config_of, gate_of
 from chainslam.experiments.commands.cli import _parse, main
 from chainslam.experiments.views.run_page import run_page
 

@@ -8,6 +8,8 @@ import pytest
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.scoring.without_truth.references import References, read_path, read_relations, scored_by
 from chainslam.experiments.usage import UsageError
+from chainslam.experiments.views.numbers import number
+from chainslam.experiments.views.run_page import run_page
 
 
 def lines(path, rows):
@@ -101,18 +103,36 @@ def test_path_and_map_of_second_looks_are_the_same_whichever_back_end_ran(scored
     np.testing.assert_allclose(np.array(walls)[0, :, 1], 2.0, atol=0.02)
 
 
-def test_scores_are_printed(scored, capsys):
+def test_scores_are_told_in_a_line_and_stand_in_the_report(scored, capsys):
     words = ["replay", str(scored / "a.log"), "--relations", str(scored / "a.relations"), "--out"]
     assert main([*words, str(scored / "again"), "--reference", str(scored / "a.txt")]) == 0
+    summary = json.loads((scored / "again" / "summary.json").read_text())
+    at_scans = summary["relations"]["at_scans"]["all"]
     said = capsys.readouterr().out
-    for words in (
-        "errors of relations",
-        "at scans, 60 s apart",
-        "interpolated",
-        "distance from the reference path",
-        "1 is honest",
-    ):
-        assert words in said
+    assert f"{at_scans['count']} relations {number(at_scans['translation_m']['median'])} m" in said
+    tables = run_page(scored / "again").tables
+    relations = [dict(zip(tables["relations"].header, row, strict=True)) for row in tables["relations"].rows]
+    assert [row["relations"] for row in relations] == [
+        "at scans", "at scans, 60 s apart", "interpolated", "interpolated, 60 s apart",
+    ]  # fmt: skip
+    assert relations[0]["m, max"] == number(at_scans["translation_m"]["max"])
+    assert relations[0]["degrees, mean"] == number(np.degrees(at_scans["rotation_rad"]["mean"]))
+    (reference,) = tables["reference"].rows
+    assert reference[2:] == (
+        number(summary["reference"]["poses"]), number(summary["reference"]["ate_m"]),
+        number(summary["reference"]["ate_aligned_m"]),
+    )  # fmt: skip
+    (stated,) = tables["stated"].rows
+    assert stated[3] == number(summary["reference_normalised"]["all"]["anees"])
+
+
+def test_the_report_of_a_refined_map_tells_both_maps(scored, tmp_path):
+    words = ["replay", str(scored / "a.log"), "--second-looks", "--backend", "full-ekf", "--out", str(tmp_path)]
+    assert main(words) == 0
+    assert main(["report", str(tmp_path)]) == 0
+    numbers = dict(run_page(tmp_path).tables["numbers"].rows)
+    assert numbers["walls after offline refinement"] == "1"
+    assert "walls" in numbers
 
 
 def test_no_relation_at_a_scan_leaves_null(tmp_path):

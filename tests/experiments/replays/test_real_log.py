@@ -185,7 +185,7 @@ def test_the_ros_map_of_it_is_the_floor_that_its_scans_show(replayed):
 def test_a_report_is_made_of_it(replayed, capsys):
     assert main(["report", str(replayed / "out")]) == 0
     page = (replayed / "out" / "report.html").read_text()
-    assert "The drive of a real robot (room.log)" in page
+    assert "The log of a real robot" in page
     assert "chainslam replay room.log --backend block-ekf full-ekf --every 1 --odometry scans --out DIR" in page
 
 

@@ -141,7 +141,7 @@ def test_a_replay_goes_by_its_runs_options_of_the_back_end_and_settings_of_the_e
     options = BackendOptions(EkfConfig(at_wall=False))
     trial = replace(run.trial, mission=replace(run.trial.mission, mapper=mapper), backend_options=options)
     again = replay(replace(run, trial=trial), "full-ekf", ReplayOptions("own", perfect_extraction))
-    assert again.scenario.backend._config is options.ekf
+    assert again.scenario.backend.config is options.ekf
     assert len(again.last.map) == 0
 
 

@@ -114,11 +114,11 @@ def test_a_wall_of_two_faces_is_one_and_its_longer_face_stands_for_it(truth):
     assert votes.walls_of(np.array([1, 2])).tolist() == [0, 1]
 
 
-@pytest.mark.parametrize(("beams", "false"), [([1, 0, 2, 0, 0, 0], 0), ([1, 0, 3, 0, 0, 0], 0), ([1, 0, 4, 0, 0, 0], 1)])
-def test_a_false_merger_joins_two_lines_that_are_each_of_one_wall(truth, beams, false):
+@pytest.mark.parametrize(("others", "false"), [(2, 0), (3, 0), (4, 1)])
+def test_a_false_merger_joins_two_lines_that_are_each_of_one_wall(truth, others, false):
     """A line across both walls, two of its three beams on the other, says little about which of them it is."""
     for keep, drop in ((1, 2), (2, 1)):
-        votes = Votes(truth, {1: np.array([400, 0, 3, 0, 0, 0]), 2: np.array(beams)})
+        votes = Votes(truth, {1: np.array([400, 0, 3, 0, 0, 0]), 2: np.array([1, 0, others, 0, 0, 0])})
         votes.merge(keep, drop)
         assert (votes.merges, votes.false_merges) == (1, false)
 

@@ -26,7 +26,7 @@ def joint_of(truth, rng, lines=LINES):
 
 
 def errors_of(mean, anchors, pose_true, lines_true):
-    """The errors as docs/estimation.md states them, line by line: undo the motion of the pose, then compare."""
+    """The errors as docs/concepts/scores.md states them, line by line: undo the motion of the pose, then compare."""
     motion = np.linalg.inv(matrix(mean[:3]) @ np.linalg.inv(matrix(pose_true)))
     errors = list(xi_of(mean[:3], pose_true))
     for k, (alpha, d) in enumerate(mean[3:].reshape(-1, 2)):

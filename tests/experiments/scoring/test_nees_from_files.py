@@ -1,4 +1,4 @@
-"""The NEES of every step, worked out again from the files alone, by the formulas of docs/estimation.md."""
+"""The NEES of every step, worked out again from the files alone, by the formulas of docs/concepts/scores.md."""
 
 import csv
 

@@ -1,45 +1,8 @@
-"""The table at the end of a run."""
-
-import json
+"""The bar of a run, and times in words."""
 
 import pytest
 
-from chainslam.experiments.commands.cli import main
-from chainslam.experiments.terminal.progress import bar_of, duration, print_summary, total_of
-
-
-@pytest.fixture(scope="module")
-def told(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("told") / "run"
-    assert main(["explore", "paper-fig8", "--max-steps", "3", "--out", str(folder)]) == 0
-    return (folder / "summary.json").read_text()
-
-
-@pytest.fixture
-def summary(told, capsys):
-    capsys.readouterr()
-    return json.loads(told)
-
-
-def test_names_in_a_drawing_that_are_no_corners_get_no_row(summary, capsys):
-    assert all(each["mapped_m"] is None for each in summary["distances"].values())
-    print_summary(summary)
-    assert "distance" not in capsys.readouterr().out
-
-
-def test_distances_that_were_measured_have_a_row_and_the_others_are_counted(summary, capsys):
-    summary["distances"] |= {"A-B": {"true_m": 6.5, "mapped_m": 6.4964, "sigma_m": 0.01}}
-    print_summary(summary)
-    said = " ".join(capsys.readouterr().out.split())
-    assert "distance A-B │ 6.496 m (true 6.50 m)" in said
-    assert f"distances not in the map │ {len(summary['distances']) - 1}" in said
-
-
-def test_both_clocks_are_told_apart_by_name(summary, capsys):
-    print_summary(summary)
-    said = capsys.readouterr().out
-    assert "driving time" in said
-    assert "computing time of a step" in said
+from chainslam.experiments.terminal.progress import bar_of, duration, total_of
 
 
 @pytest.mark.parametrize(

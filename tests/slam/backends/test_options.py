@@ -18,7 +18,7 @@ def test_each_back_end_takes_the_options_of_its_type(name):
     assert types.count(BACKENDS[name].options) == (BACKENDS[name].options is not None)
     options = BackendOptions(**{name: replace(each) for name, each in known.items()})
     backend = BACKENDS[name].make(START, P0, options)
-    assert any(backend._config is own for own in vars(options).values()) == (BACKENDS[name].options is not None)
+    assert any(backend.config is own for own in vars(options).values()) == (BACKENDS[name].options is not None)
 
 
 @pytest.mark.parametrize("name", ["full-ekf", "graph"])
@@ -28,4 +28,4 @@ def test_a_trials_options_are_its_back_ends(name):
         options, ekf=replace(options.ekf, at_wall=False), graph=replace(options.graph, relinearise_place_m=0.05)
     )
     backend = build(TrialConfig("paper-fig5", name, backend_options=options)).backend
-    assert any(backend._config is own for own in vars(options).values())
+    assert any(backend.config is own for own in vars(options).values())

@@ -225,7 +225,7 @@ def test_the_constrained_filter_leads_what_is_unseen_over_by_the_least_change(se
     lines = np.stack([rng.uniform(-3, 3, 4), rng.uniform(1, 3, 4)], axis=-1)
     centres = lines[:, 1:] * np.stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])], axis=-1)
     backend.grow(lines, np.tile(np.diag([1e-4, 1e-5]), (4, 1, 1)), centres)
-    map_ = backend._map
+    map_ = backend.map
     position, alpha = map_.pose_world[:2], map_.means[:, 0]
     moved, turned = position + rng.uniform(-0.1, 0.1, 2), alpha + rng.uniform(-0.2, 0.2, 4)
     N, after = unseen(position, alpha, map_.anchors), unseen(moved, turned, map_.anchors)

@@ -82,7 +82,7 @@ class Shared(FullEkf):
 class Reusing(FullEkf):
     def remove(self, ids):
         super().remove(ids)
-        self._map._next_id = int(self._map.ids.max(initial=-1)) + 1
+        self.map._next_id = int(self.map.ids.max(initial=-1)) + 1
 
 
 class Lenient(FullEkf):
@@ -95,7 +95,7 @@ class Forgetful(FullEkf):
 
     def remove(self, ids):
         super().remove(ids)
-        self._map.move(Motion(self._map.pose_world, np.eye(3), np.eye(3)), 1e-6 * np.eye(3))
+        self.map.move(Motion(self.map.pose_world, np.eye(3), np.eye(3)), 1e-6 * np.eye(3))
 
 
 class Unsymmetric(Shown):
@@ -109,7 +109,7 @@ class Eroding(FullEkf):
 
     def predict(self, odometry):
         super().predict(odometry)
-        self._map._P -= 1e-3 * np.diag(np.diag(self._map._P))
+        self.map._P -= 1e-3 * np.diag(np.diag(self.map._P))
 
 
 class Sinking(FullEkf):
@@ -117,7 +117,7 @@ class Sinking(FullEkf):
 
     def update(self, first, second):
         super().update(first, second)
-        self._map._P -= 2e-5 * np.diag(np.diag(self._map._P))
+        self.map._P -= 2e-5 * np.diag(np.diag(self.map._P))
 
 
 class Certain(FullEkf):
@@ -132,9 +132,9 @@ class Unwrapped(FullEkf):
     """Lets the heading run on past half a turn."""
 
     def update(self, first, second):
-        before = self._map.pose_world[2]
+        before = self.map.pose_world[2]
         super().update(first, second)
-        self._map._x[2] = before + wrap(self._map.pose_world[2] - before)
+        self.map._x[2] = before + wrap(self.map.pose_world[2] - before)
 
 
 class Restless(FullEkf):

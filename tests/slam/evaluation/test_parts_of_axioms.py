@@ -59,7 +59,7 @@ def in_parts(part):
     """A full EKF of which only parts are told otherwise, not the whole."""
 
     def change(self, joint):
-        if len(joint.anchors) < len(self._map.ids):
+        if len(joint.anchors) < len(self.map.ids):
             getattr(joint, part)[...] += 1e-9
 
     return showing(change)
@@ -96,7 +96,7 @@ def with_the_number(part):
     """A full EKF of which something hangs on the numbers of the lines that are asked for."""
 
     def change(self, joint):
-        getattr(joint, part)[...] *= 1.0 + 1e-4 * self._map.anchors[0, 0]
+        getattr(joint, part)[...] *= 1.0 + 1e-4 * self.map.anchors[0, 0]
 
     return showing(change)
 
@@ -127,7 +127,7 @@ class Living(FullEkf):
     """Its belief's pose moves on with it."""
 
     def _new_belief(self):
-        return replace(super()._new_belief(), pose_world=self._map._x[:3])
+        return replace(super()._new_belief(), pose_world=self.map._x[:3])
 
 
 class Guessing(FullEkf):
@@ -166,12 +166,12 @@ def beyond_one(_, joint):
 
 
 def known(self, ids):
-    return [line for line in ids if line in self._map.ids]
+    return [line for line in ids if line in self.map.ids]
 
 
 def forget_all_then_refuse(self, remove, ids):
     if known(self, ids) != list(ids):
-        remove(self, self._map.ids.tolist())
+        remove(self, self.map.ids.tolist())
     remove(self, ids)
 
 
@@ -186,23 +186,23 @@ def merge_if(test):
 
 def wrap_from_above(self, update, first, second):
     """The heading comes back from beyond half a turn, but not from below minus half a turn."""
-    before = self._map.pose_world[2]
+    before = self.map.pose_world[2]
     update(self, first, second)
-    if self._map.pose_world[2] - before > np.pi:
-        self._map._x[2] -= 2.0 * np.pi
+    if self.map.pose_world[2] - before > np.pi:
+        self.map._x[2] -= 2.0 * np.pi
 
 
 def scale(by):
-    return lambda self, *_: self._map._P.__imul__(by)
+    return lambda self, *_: self.map._P.__imul__(by)
 
 
 def move(row, by):
-    return lambda self, *_: self._map._x.__setitem__(row, self._map._x[row] + by)
+    return lambda self, *_: self.map._x.__setitem__(row, self.map._x[row] + by)
 
 
 def on_repeats(self, _, second):
     if len(set(second.ids.tolist())) < len(second.ids):
-        self._map._P *= 2.0
+        self.map._P *= 2.0
 
 
 PARTS = [
@@ -253,7 +253,7 @@ PARTS = [
     ("a wall seen twice in one scan is taken in twice", after("update", on_repeats), "no larger volume"),
     ("merging makes two lines one", merge_if(lambda s, keep, drop: keep != drop), "of a line with itself"),
     ("merging makes two lines one",
-     after("merge", lambda s, *_: s._map.anchors.__iadd__(1e-9)), "anchors before and after"),
+     after("merge", lambda s, *_: s.map.anchors.__iadd__(1e-9)), "anchors before and after"),
     ("merging makes two lines one", after("merge", move(3, 0.5)), "a direction between"),
     ("merging makes two lines one", after("merge", scale(9.0)), "variances that add up to"),
     ("errors are as large as the covariance says",

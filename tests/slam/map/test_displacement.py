@@ -180,7 +180,7 @@ class Corrected(FullEkf):
         super().update(first, second)
         self.updates += 1
         if self.updates == len(ROUND):
-            state, slots = self._map._x, self._map._slots
+            state, slots = self.map._x, self.map._slots
             state[:2] += self.shift_m
             state[4 + 2 * slots] += normals(state[3 + 2 * slots]) @ self.shift_m
             self._move_on()

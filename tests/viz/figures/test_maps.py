@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from chainslam.slam.estimation.backend import Belief, Joint
 from chainslam.slam.map.chains import Chain, OpenEnd
@@ -83,6 +84,31 @@ def test_all_that_is_written_lies_on_the_page(width, height):
         assert all(figure.bbox.fully_contains(*corner) for corner in artist.get_window_extent(renderer).corners()), (
             artist
         )
+
+
+@pytest.mark.parametrize(("size", "length_m"), [(2.0, 1.0), (20.0, 5.0), (80.0, 20.0), (6000.0, 1000.0)])
+def test_the_scale_bar_is_as_long_as_it_says(size, length_m):
+    figure = draw_map(picture(closed=True, size=size))
+    (axes,) = figure.axes
+    figure.canvas.draw()
+    boxes = [patch.get_window_extent() for patch in axes.patches if isinstance(patch, Rectangle)]
+    inverse = axes.transData.inverted()
+    (left, _), (right, _) = (
+        inverse.transform((edge, 0.0)) for edge in (min(box.x0 for box in boxes), max(box.x1 for box in boxes))
+    )
+    assert right - left == pytest.approx(length_m)
+    assert f"{length_m:g} m" in [text.get_text() for text in axes.texts]
+
+
+def test_the_ellipses_of_corners_lie_on_the_sheet_but_for_those_of_which_nearly_nothing_is_known():
+    plain = picture(closed=True)
+    corners = plain.map.ends_world[:, 0][:4]
+    covs = np.stack([0.3**2 * np.eye(2)] * 3 + [100.0**2 * np.eye(2)])
+    (axes,) = draw_map(replace(plain, corners_world=corners, corner_covs=covs)).axes
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    assert np.all(corners[:3] - 0.89 >= low)
+    assert np.all(corners[:3] + 0.89 <= high)
+    assert np.all(high - low < 15.0)
 
 
 @pytest.mark.parametrize(("size", "grid"), [(2.0, "grid 1 m"), (80.0, "grid 5 m"), (6000.0, "grid 500 m")])

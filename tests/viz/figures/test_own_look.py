@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from chainslam.viz.figures.maps import saved
-from chainslam.viz.figures.plots import draw_nees
+from chainslam.viz.figures.plots import NeesCurve, draw_nees
 
-CURVES = {"full-ekf": np.linspace(0.0, 2.0, 20)}
+CURVE = NeesCurve("full-ekf", np.linspace(0.0, 2.0, 20), np.linspace(0.1, 2.0, 20), np.ones((2, 20)))
 
 
 def drawn():
-    return saved(draw_nees(CURVES, "NEES"), "svg")
+    return saved(draw_nees([CURVE]), "svg")
 
 
 @pytest.mark.parametrize("seed", range(4))

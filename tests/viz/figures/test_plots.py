@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chainslam.slam.backends import BACKENDS
 from chainslam.viz.figures.maps import saved
 from chainslam.viz.figures.plots import (
+    NeesCurve,
     _dense,
     draw_model_space,
     draw_nees,
@@ -13,6 +16,10 @@ from chainslam.viz.figures.plots import (
 )
 
 SQUARE = (np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]),)
+
+
+def curve(name):
+    return NeesCurve(name, np.linspace(0.0, 9.0, 30), np.linspace(0.1, 30.0, 30), np.tile([[0.2], [9.3]], 30))
 
 
 def line(*corners):
@@ -44,12 +51,13 @@ def test_turning_on_the_spot_is_no_second_drive():
 def test_the_same_picture_is_the_same_bytes(kind):
     path = np.column_stack([np.linspace(1, 3, 30), np.full(30, 1.0), np.zeros(30)])
     draws = (
-        lambda: draw_nees({name: np.linspace(0.1, 30, 30) for name in BACKENDS}, "title"),
+        lambda: draw_nees([curve(name) for name in BACKENDS]),
+        lambda: draw_nees([replace(curve(name), quartiles=np.ones((2, 30))) for name in list(BACKENDS)[:2]]),
         lambda: draw_trajectories(path, {"graph": path}, SQUARE, "title", path),
         lambda: draw_model_space(np.array([[0.0, 1.0]]), 1e-4 * np.eye(2)[None], ["#000000"], "title"),
         lambda: draw_traversal(path, SQUARE, "title"),
     )
-    for draw in draws[:: 1 if kind == "svg" else 3]:
+    for draw in draws[:: 1 if kind == "svg" else 4]:
         one, two = (saved(draw(), kind) for _ in range(2))
         assert one == two
         assert one.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])

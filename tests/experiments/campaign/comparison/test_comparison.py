@@ -199,12 +199,15 @@ def test_an_arm_is_named_by_its_mode_and_for_a_replay_by_its_association():
 def test_the_runs_of_a_measure_are_those_that_ended_as_wanted_and_have_it():
     rows = [
         row(seed=1, x=2.0), row(seed=1, strategy="nearest-start", x=8.0), row(seed=2, x=None), row(seed=3, x=math.nan),
-        row(seed=4, x=3.0, status="stopped"), row(seed=5, x=0.0), row(seed=6, x=math.inf), row("b", seed=1, x=5.0),
+        row(seed=4, x=3.0, status="stopped"), row(seed=7, x=3.0, status="failed"),
+        row(seed=5, x=0.0), row(seed=6, x=math.inf), row("b", seed=1, x=5.0),
     ]  # fmt: skip
-    assert runs_of(rows, Measure("x", False)) == {("a", 1): 5.0, ("a", 5): 0.0, ("b", 1): 5.0}
-    assert runs_of(rows, Measure("x", False), ("stopped",)) == {("a", 4): 3.0}
+    assert runs_of(rows, Measure("x", False)) == {("a", 1): 5.0, ("a", 4): 3.0, ("a", 5): 0.0, ("b", 1): 5.0}
     logs = runs_of(rows, Measure("x", True))
-    assert logs == pytest.approx({("a", 1): math.log(4.0), ("b", 1): math.log(5.0)})
+    assert logs == pytest.approx({("a", 1): math.log(4.0), ("a", 4): math.log(3.0), ("b", 1): math.log(5.0)})
+    # A path that a limit cut off is no length of an exploration.
+    paths = [row(seed=1, path_length_m=2.0), row(seed=2, path_length_m=3.0, status="stopped")]
+    assert runs_of(paths, Measure("path_length_m", False)) == {("a", 1): 2.0}
     lifted = runs_of(rows, Measure("x", True, 0.5))
     assert lifted["a", 5] == pytest.approx(math.log(0.5))
     assert lifted["a", 1] == pytest.approx((math.log(2.5) + math.log(8.5)) / 2)
@@ -260,7 +263,7 @@ def test_at_a_mark_runs_that_failed_before_are_counted_and_in_no_mean():
     } | {name: pytest.approx(2.0 * x) for name, x in scores.items()}  # fmt: skip
 
 
-def test_a_cell_adds_up_what_all_sound_runs_did_and_averages_the_complete_ones():
+def test_a_cell_adds_up_and_averages_the_runs_that_did_not_fail():
     numbers = {
         "duplicate_lines": 1, "false_matches": 2, "matches_true": 3, "matches_missed": 4, "matches_false": 5,
         "merges": 6, "false_merges": 7, "sightings": 8, "double_entries": 9,
@@ -276,20 +279,22 @@ def test_a_cell_adds_up_what_all_sound_runs_did_and_averages_the_complete_ones()
                  bound_first_m=0.1)  # fmt: skip
     told = cell_scores([complete, stopped, other, failed])
     assert {key: told[key] for key in numbers} == {key: 11 * x for key, x in numbers.items()}
-    assert (told["trials"], told["complete"], told["sound"], told["distances"]) == (4, 2, 3, 50)
-    assert told["distances_in_95"]["mean"] == 0.9
-    assert told["trace_below"]["mean"] == 0.2
+    assert (told["trials"], told["complete"], told["sound"], told["distances"]) == (4, 2, 3, 550)
+    assert told["distances_in_95"]["mean"] == pytest.approx(1.35)
+    assert told["trace_below"]["mean"] == pytest.approx(0.3)
     assert told["missed_share"]["mean"] == pytest.approx(0.15)
     assert told["doubles_beyond_gate"]["mean"] == pytest.approx(4.5)
-    assert told["pose_nees_in_band"] == pytest.approx(0.7)
+    assert told["pose_nees_in_band"] == pytest.approx(1.6 / 3)
     assert (told["trace_least"], told["bound_margin"]) == (0.4, -0.3)
     assert told["bound_runs_below"] == 2
     assert (told["bound_margin_median"], told["bound_first_m_median"]) == (pytest.approx(-0.2), 3.0)
     assert told["bound_worst_m_median"] == 6.0
     assert (told["without"]["map_anees"], told["without"]["wall_rmse_m"]) == (1, 0)
     assert told["ate_m"]["mean"] == pytest.approx(
-        np.mean([value("a", "nearest-robot", "full-ekf", "closed", s) for s in (1, 4)])
+        np.mean([value("a", "nearest-robot", "full-ekf", "closed", s) for s in (1, 2, 4)])
     )
+    assert told["path_length_m"]["runs"] == 2
+    assert (told["verdict"], told["factor"], told["what"]) == ("too few runs", None, None)
     empty = cell_scores([failed])
     assert (empty["complete"], empty["sound"], empty["double_entries"], empty["distances"]) == (0, 0, 0, 0)
     nothing = ("ate_m", "missed_share", "trace_least", "bound_margin", "bound_margin_median", "pose_nees_in_band")

@@ -2,13 +2,15 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from shutil import copytree
 
 import pytest
 
 from chainslam.experiments.campaign.contrast import contrast
-from chainslam.experiments.campaign.pages.contrast_page import verdict
+from chainslam.experiments.campaign.pages.contrast_page import lines_of_contrast
+from chainslam.experiments.campaign.pages.tables import differences
 from chainslam.experiments.campaign.plan import Campaign, trials
 from chainslam.experiments.campaign.store import opened
 from chainslam.experiments.campaign.work import Done, pack
@@ -39,11 +41,11 @@ def test_a_campaign_is_the_same_as_itself_even_if_a_later_version_keeps_more(fir
     second = other(first, tmp_path / "second", lambda trial, summary: {"something_new": 1.0})
     out = tmp_path / "out"
     assert main(["compare", "--against", str(first), str(second), "--out", str(out)]) == 0
-    assert "No: all 3 trials that both have came out the same" in capsys.readouterr().out
+    assert capsys.readouterr().out.startswith("0 of 3 shared trials differ")
     said = json.loads((out / "contrast.json").read_text())
     assert said["trials"] == {"shared": 3, "the_same": 3, "different": 0, "only_first": 0, "only_second": 0}
     assert main(["report", str(out)]) == 0
-    assert "came out the same" in (out / "report.html").read_text()
+    assert "0 of 3 shared trials differ" in (out / "report.html").read_text()
 
 
 def test_what_was_made_worse_is_found_with_its_size(first, tmp_path):
@@ -69,10 +71,11 @@ def test_what_was_made_worse_is_found_with_its_size(first, tmp_path):
     assert float(rows[0]["pose_anees_second"]) == pytest.approx(2.0 * float(rows[0]["pose_anees_first"]))
     assert main(["report", str(tmp_path / "out")]) == 0
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Yes: 3 of 3 trials" in page
-    assert "means of fewer than 10 runs cannot be told from chance" in page
-    assert "changed by more than chance" not in page
-    assert "1 went complete -&gt; failed" in page
+    assert "3 of 3 shared trials differ" in page
+    assert "0 of 0 means differ" in page, "two runs decide nothing"
+    told = [re.sub("<.*?>", "", cell) for cell in re.findall("<td.*?</td>", page)]
+    at = told.index("failed")
+    assert told[at - 1 : at + 2] == ["complete", "failed", "1"]
 
 
 def test_only_shared_trials_are_compared_and_settings_that_differ_are_told(first, tmp_path):
@@ -92,17 +95,19 @@ def test_campaigns_that_share_nothing_get_one_line(first, tmp_path, capsys):
     assert "found both" in capsys.readouterr().err
 
 
-def said_of(*rows):
-    trials = {"shared": 12, "different": 12, "the_same": 0}
-    same = {"backend": "graph", "mode": "closed", "association": None, "measure": "ate_m", "kind": "ratio"}
-    return {"trials": trials, "differences": [same | row for row in rows]}
+def test_only_means_of_ten_runs_are_tested():
+    clear = {"value": 1.00031, "runs": 12, "p_holm": 0.01}
+    chance, few = clear | {"p_holm": 0.2}, {"value": 9.0, "runs": 2, "p_holm": None}
+    trials = {"shared": 12, "different": 5, "only_first": 1, "only_second": 2}
+    lines = lines_of_contrast({"trials": trials, "differences": [clear, chance, few, few | {"value": None}]})
+    assert [re.findall(r"\d+", line)[:4] for line in lines] == [["5", "12", "1", "2"], ["1", "2", "0", "05"]]
+    assert lines[1].endswith("too few runs for 1.")
 
 
-def test_a_small_change_of_many_runs_is_told_with_digits_enough_and_one_of_few_is_none():
-    small = {"value": 1.00031, "low": 1.00012, "high": 1.00052, "runs": 12, "effect_size": 1.0, "p_holm": 0.01}
-    few = {"value": 9.0, "low": 8.0, "high": 10.0, "runs": 2, "effect_size": 5.0, "p_holm": None}
-    words = verdict(said_of(small, few))
-    assert "Of 1 means, 1 changed by more than chance" in words[0]
-    assert "1 means of fewer than 10 runs" in words[0]
-    assert words[1:] == ("graph, closed loop, error of the path: 1.0003 (1.0001 to 1.0005), ratio.",)
-    assert len(verdict(said_of(few))) == 1
+def test_a_small_change_is_told_with_digits_enough():
+    row = {"backend": "graph", "arm": "closed", "measure": "ate_m", "kind": "ratio", "value": 1.00031, "low": 1.00012,
+           "high": 1.00052, "runs": 12, "effect_size": 1.0, "p_holm": 0.01, "pairs_without_value": 0}  # fmt: skip
+    table = differences("Means", [row, row | {"value": None}], {"estimator": "backend"})
+    (cells,) = table.rows
+    assert dict(zip(table.header, cells, strict=True))["value"] == "1.0003"
+    assert dict(zip(table.header, cells, strict=True))["95 % interval"] == "1.0001 to 1.0005"

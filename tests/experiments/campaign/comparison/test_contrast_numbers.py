@@ -62,12 +62,14 @@ def test_each_measure_is_compared_for_each_back_end_in_each_arm_second_over_firs
     for (backend, arm), times in TIMES.items():
         mode, association = ("closed", "own") if arm == "closed" else ("replay", "true")
         row = rows[backend, mode, association, "wall_rmse_m"]
-        # The third run of the second campaign was stopped.
-        assert (row["runs"], row["pairs_without_value"]) == (2, 1)
+        # The third run of the second campaign was stopped: it has an error, but its path is no whole one.
+        assert (row["runs"], row["pairs_without_value"]) == (3, 0)
+        path = rows[backend, mode, association, "path_length_m"]
+        assert (path["runs"], path["pairs_without_value"], path["first_better"]) == (2, 1, pytest.approx(1 / 3))
         assert row["value"] == pytest.approx(times)
-        # Two runs make no interval, and nothing is tested.
-        assert row["low"] is row["high"] is row["p"] is row["p_holm"] is None
-        assert row["first_better"] == pytest.approx(((times < 1.0) * 2 + 0.5 * (times == 1.0) * 2) / 3)
+        # Three runs make no interval, and nothing is tested.
+        assert row["low"] is row["high"] is row["p_holm"] is None
+        assert row["first_better"] == (times < 1.0) + 0.5 * (times == 1.0)
         assert rows[backend, mode, association, "duplicate_lines"]["value"] == 0.0
         assert rows[backend, mode, association, "ate_m"]["value"] is None
 

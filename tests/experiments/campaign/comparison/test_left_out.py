@@ -2,27 +2,22 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from chainslam.experiments.campaign import store as of_store
 from chainslam.experiments.campaign.comparison.tables import write_tables
-from chainslam.experiments.campaign.pages.page import page_of
+from chainslam.experiments.campaign.pages.campaign_page import campaign_page
 from chainslam.experiments.campaign.plan import Campaign, trials
 from chainslam.experiments.campaign.store import opened
 from chainslam.experiments.campaign.work import Done, pack
-from chainslam.experiments.commands.cli import main
 from chainslam.viz.reports.report import html, latex
 from studies.exploration.suite import table
 from tests.experiments.campaign.running import run
 
 CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot",), 3, arms=("closed",), max_steps=4)
-WORDS = (
-    *("--worlds", "paper-fig4", "--backends", "block-ekf", "full-ekf", "--strategies", "nearest-robot"),
-    *("--trials", "3", "--modes", "closed", "--max-steps", "4", "--jobs", "1"),
-)
 
 
 def lacking(record, trial):
@@ -64,28 +59,21 @@ def test_the_comparison_counts_it_beside_the_means(folder):
     assert [row for row in missing if row[2] != "0"] == [("full-ekf", "1", "1")]
 
 
-def test_the_report_says_so_as_a_page_and_as_latex(folder):
-    page = page_of(folder)
-    tables = [table for section in page.sections for table in section.tables]
-    without = "without: from the start, pose, map"
-    (honesty,) = [table for table in tables if without in table.header]
-    at = honesty.header.index(without)
-    assert {row[0]: row[at] for row in honesty.rows} == {"block-ekf": "0, 0, 0", "full-ekf": "1, 1, 1"}
-    (against,) = [table for table in tables if table.title == "Back ends against full-ekf"]
-    at = against.header.index("left out")
-    assert {row[2]: row[at] for row in against.rows}["pose ANEES from the start"] == "1"
-    assert {row[2]: row[at] for row in against.rows}["error of the walls"] == "0"
-    assert b"they are in no mean of it" in html(page)
-    assert without.encode() in latex(tables)
-
-
-def test_the_command_says_so_when_it_ends(folder, capsys, monkeypatch):
-    monkeypatch.setattr(of_store, "config_record", lambda config: {"versions": {}, "commit": None})
-    assert main(["compare", *WORDS, "--out", str(folder)]) == 0
-    said = capsys.readouterr().out.splitlines()
-    expected = "1 of 6 complete runs have no {} (a covariance that is not positive definite): they are in no mean of it"
-    names = ("pose ANEES", "pose ANEES from the start", "map ANEES")
-    assert [line for line in said if "in no mean" in line] == [expected.format(name) for name in names]
+def test_the_report_counts_it_as_a_page_and_as_latex(folder):
+    page = campaign_page(folder)
+    errors = page.tables["errors closed"]
+    counts = {row[0]: dict(zip(errors.header, row, strict=True)) for row in errors.rows}
+    for name in ("no pose ANEES", "no map ANEES"):
+        assert {backend: cells[name] for backend, cells in counts.items()} == {"block-ekf": "0", "full-ekf": "1"}
+    assert {cells["no wall error"] for cells in counts.values()} == {"0"}
+    compared = page.tables["differences"]
+    left = {row[2]: dict(zip(compared.header, row, strict=True))["left out"] for row in compared.rows}
+    assert (left["pose ANEES"], left["wall error"]) == ("1", "0")
+    assert page.told["without"] == {"pose ANEES": 1, "map ANEES": 1, "wall error": 0}
+    shown = re.sub(r"\s+", " ", html(page).decode())
+    assert "1 of 6 scored runs have no pose ANEES" in shown
+    assert "have no wall error" not in shown
+    assert b"no pose ANEES" in latex(page.all_tables)
 
 
 def test_the_suite_says_so_in_its_table():

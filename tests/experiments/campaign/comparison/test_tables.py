@@ -158,7 +158,7 @@ def test_the_error_of_a_distance_is_mapped_less_true():
     ("status", "states", "lengths"),
     [
         ("complete", ["driving", "finished", "finished", "finished"], [10.1, 15.0, 15.0, 15.0]),
-        ("stopped", ["driving", "failed", "failed", "failed"], [10.1, None, None, 15.0]),
+        ("stopped", ["driving", "failed", "failed", "driving"], [10.1, None, None, 15.0]),
     ],
 )
 def test_a_run_that_ended_before_a_mark_has_finished_or_failed_there(status, states, lengths):

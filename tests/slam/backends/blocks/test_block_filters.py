@@ -139,7 +139,7 @@ def test_the_papers_filter_relocates_by_all_first_matches_and_fuses_each_line_as
     lines, cov, _ = walls.look(START + np.array([-0.1, 0.02, 0.04]), rows, rng)
     seen = [Observations(ids[rows], lines, cov), Observations(ids[rows[1:]], lines[1:], cov[1:])]
     told = [each if wanted else NONE for each, wanted in zip(seen, (first, second), strict=True)]
-    pose, P, means, covs = paper(backend._map, *told)
+    pose, P, means, covs = paper(backend.map, *told)
     belief = backend.belief
     backend.update(*told)
     after = backend.belief.joint(ids)

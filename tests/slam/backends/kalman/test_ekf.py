@@ -185,12 +185,42 @@ def test_a_map_that_begins_in_the_blind_is_at_its_first_sight_what_whole_matrice
     np.testing.assert_allclose(belief.means.ravel(), plain.x[3:], atol=1e-12)
 
 
-def test_a_merge_takes_its_jacobian_where_the_filter_has_it_taken(make_walls):
+def test_a_merge_is_conditioned_on_apart_from_scans_and_its_jacobian_is_taken_where_the_filter_says(make_walls):
     backend, asked, given = FullEkf(START, P0), [], []
     ids = backend.grow(*make_walls().look(START, np.arange(3)))
-    backend._align = lambda rows: asked.append(rows.tolist()) or 0.7
-    backend._condition = given.append
+    backend.observe = lambda *of: pytest.fail("a merge is no scan")
+    backend.unite = lambda rows: asked.append(rows.tolist()) or backend._equate(rows, 0.7)
+    backend.map.condition = given.append
     means, anchors = backend.belief.means, backend.belief.anchors
     backend.merge(ids[2], ids[0])
     assert asked == [[2, 0]]
     np.testing.assert_array_equal(given[0].H, equality(means[[2, 0]], anchors[[2, 0]], 0.7)[0])
+    assert not len(given[0].place)
+
+
+@pytest.mark.parametrize("seen_twice", [False, True])
+def test_a_filter_of_ones_own_may_weigh_each_observation_and_doubt_the_wheels(seen_twice, make_walls):
+    """Two hooks of one class: the noise of the motion, and which observation each row of a scan is."""
+    walls, rng, once = make_walls(), np.random.default_rng(13), EkfConfig(relinearise=False)
+
+    class Own(FullEkf):
+        def motion(self, odometry):
+            motion, noise = super().motion(odometry)
+            return motion, 4.0 * noise
+
+        def linearise(self, rows, seen):
+            model = super().linearise(rows, seen)
+            assert model.rows[model.place].tolist() == rows.tolist()
+            return replace(model, R=model.R * np.repeat(weights, 2)[:, None])
+
+    ids = (own := Own(START, P0, once)).grow(*(new := walls.look(START, np.arange(4), rng)))
+    (plain := FullEkf(START, P0, once)).grow(*new)
+    rows = np.array([3, 1, 1] if seen_twice else [3, 1])
+    weights = np.array([2.0, 3.0, 5.0])[: len(rows)]
+    lines, cov, _ = walls.look(compose(START, ODOMETRY.motion), rows, rng)
+    own.predict(ODOMETRY)
+    own.update(NONE, Observations(ids[rows], lines, cov))
+    plain.predict(replace(ODOMETRY, cov=4.0 * ODOMETRY.cov))
+    plain.update(NONE, Observations(ids[rows], lines, weights[:, None, None] * cov))
+    np.testing.assert_allclose(own.belief.joint(ids).mean, plain.belief.joint(ids).mean, atol=1e-9)
+    np.testing.assert_allclose(own.belief.joint(ids).cov, plain.belief.joint(ids).cov, atol=1e-12)

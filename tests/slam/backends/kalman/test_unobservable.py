@@ -158,7 +158,7 @@ def test_the_observability_matrix_keeps_three_directions_unseen_only_where_jacob
     make = BACKENDS[name].make
     backend = make(START, P0, BackendOptions(EkfConfig(at_wall=at_wall)))
     recorder = Recorder(START, P0)
-    backend._map = recorder
+    backend.map = recorder
     true = START + np.sqrt(np.diag(P0)) * rng.standard_normal(3)
     ids = backend.grow(*walls.look(true, np.arange(16), rng))
     recorder.start()

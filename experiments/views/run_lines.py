@@ -1,0 +1,119 @@
+"""A run in a few lines: what happened, and how consistent the estimate is; and what the robot noticed of itself."""
+
+from collections.abc import Sequence
+from itertools import groupby
+from math import degrees
+from typing import Any
+
+from chainslam.slam.association.ranges.errors import RangeErrors
+from chainslam.slam.extraction.curved_share import MOSTLY
+
+from .numbers import listed, number, percent
+
+Row = dict[str, Any]
+SCATTER = (0.2, 3.0)
+"""Where the ANEES of single runs of a consistent estimator lie, roughly."""
+
+MOST_LOCKED = 0.9
+"""Share of its own path up to which a robot has locked itself in, or its map contradicts the path."""
+
+
+def lines_of(summaries: Sequence[Row]) -> tuple[str, ...]:
+    """Return what happened, and how consistent each back end is, from the summaries of runs of one drive."""
+    happened = f"{'; '.join(_happened(summaries))}."
+    moved = [summary for summary in summaries if summary.get("steps")]
+    return (happened, f"{_consistent(moved)}.") if moved else (happened,)
+
+
+def _happened(summaries: Sequence[Row]) -> list[str]:
+    """Return how the runs ended, those that ended alike together."""
+    found = []
+    for words, group in groupby(summaries, _ended):
+        names = [summary["backend"] for summary in group if summary.get("backend")]
+        found.append(f"{listed(names)}: {words}" if names else words)
+    return found
+
+
+def _ended(summary: Row) -> str:
+    if not summary.get("steps"):
+        return f"{summary['status']} before the first step: {summary['reason']}"
+    words = f"{summary['status']} after {number(summary['path_length_m'])} m and {number(summary['steps'])} steps"
+    if summary.get("coverage") is not None and summary.get("contours_reachable") is not None:
+        words += f" with {percent(summary['coverage'])} % of the reachable contour mapped"
+    return f"{words} ({summary['reason']})"
+
+
+def _consistent(summaries: Sequence[Row]) -> str:
+    anees = [(summary["backend"], summary.get("pose_anees_from_start")) for summary in summaries]
+    if any(value is None for _, value in anees):
+        return "; ".join(map(_errs, summaries))
+    errors = _errs(summaries[0]) if len(anees) == 1 else f"Pose ANEES: {listed([f'{n} {number(v)}' for n, v in anees])}"
+    return errors + " (1 is ideal; single runs of a consistent estimator lie between {:g} and {:g})".format(*SCATTER)
+
+
+def _errs(summary: Row) -> str:
+    """Return how far off an estimate is and its ANEES; without ground truth what the map and the scans tell."""
+    if summary.get("pose_rmse_m") is None:
+        return f"{summary['backend']}: {_untrue(summary)}"
+    words = f"{summary['backend']}: pose error {number(100.0 * summary['pose_rmse_m'])} cm rms"
+    if summary.get("pose_anees_from_start") is None:
+        return words
+    return f"{words}, pose ANEES {number(summary['pose_anees_from_start'])}, map ANEES {number(summary['map_anees'])}"
+
+
+def _untrue(summary: Row) -> str:
+    """Return the walls, and the errors of measured relations where there are any; of the smoothed path if there is one.
+
+    Without them the NIS is all that tells of consistency.
+    """
+    looked = summary.get("second_looks") or summary
+    words = f"{number(looked['lines'])} walls, {number(looked['duplicate_lines'])} of them duplicates"
+    tail = "_smoothed" if summary.get("relations_smoothed") else ""
+    relations = (summary.get(f"relations{tail}") or {}).get("at_scans", {}).get("all", {})
+    if relations.get("translation_m"):
+        metres, turn = (relations[kind]["median"] for kind in ("translation_m", "rotation_rad"))
+        words += f"; median error of {number(relations['count'])} relations {number(metres)} m and"
+        words += f" {number(degrees(turn))} degrees"
+    stated = (summary.get(f"relations{tail}_normalised") or {}).get("all", {}).get("anees")
+    ideal = ("ANEES", stated) if stated is not None else ("NIS", summary.get("nis"))
+    return f"{words}, {ideal[0]} {number(ideal[1])} (1 is ideal)"
+
+
+def notes_of(summary: Row) -> list[str]:
+    """Return what the robot noticed of itself and its sensors; nothing where nothing is wrong."""
+    counts = {
+        "unstated_motions": "motions that the odometry did not report",
+        "lost_steps": "steps without a place in the map",
+        "own_beams": "returns from the robot's own body, left out",
+    }
+    notes = [f"{number(summary[key])} {words}" for key, words in counts.items() if summary.get(key)]
+    notes += [f"the scanner's ranges have {words}" for words in words_on_ranges(range_errors_of(summary))]
+    if (summary.get("curved_share") or 0.0) > MOSTLY:
+        notes.append(
+            f"few straight walls: {percent(summary['curved_share'])} % of the first returns are on curved ones"
+        )
+    if (factor := summary.get("wheel_noise_factor", 1.0)) != 1.0:
+        notes.append(f"the noise of the wheels is {number(factor)} times as large as stated")
+    way_back = (summary.get("certificate") or {}).get("reachable_way")
+    if way_back is not None and way_back <= MOST_LOCKED:
+        notes.append(f"the robot can drive only {percent(way_back)} % of its path again")
+    return notes
+
+
+def words_on_ranges(errors: RangeErrors) -> list[str]:
+    """Return what is to be said of a scanner's ranges; nothing where nothing is sure."""
+    found = []
+    if errors.is_biased():
+        found.append(f"a bias of {1e3 * errors.bias_m:+.1f} mm (sigma {1e3 * errors.bias_sigma_m:.1f} mm)")
+    if errors.is_scaled():
+        grown, sigma = 100.0 * (errors.scale - 1.0), 100.0 * errors.scale_sigma
+        found.append(f"a scale of {grown:+.2f} % against the wheels (sigma {sigma:.2f} %)")
+    return found
+
+
+def range_errors_of(summary: Row) -> RangeErrors:
+    """Return what a summary says of the scanner's ranges; of one that says nothing, nothing is known."""
+    keys = {"bias_m": "range_bias_m", "bias_sigma_m": "range_bias_sigma_m"}
+    keys |= {"scale": "range_scale", "scale_sigma": "range_scale_sigma"}
+    said = {name: value for name, key in keys.items() if (value := summary.get(key)) is not None}
+    return RangeErrors(**said)
