@@ -19,11 +19,11 @@ from ..usage import UsageError, choose, missing
 
 FAILED, BAD_USAGE = 1, 2
 UTF8 = "PYTHONUTF8"
-"""Set to 1, names of files are UTF-8, whatever the locale says."""
+"""If this is 1, file names are UTF-8, whatever the locale."""
 ABOUT = "Explore a building by wall following and map it as chains of line segments."
 NEW_OBJECTS = 20_000
-"""Garbage is looked for when so many objects are new: loading modules and kernels makes hundreds of thousands, all of
-which stay. A start takes a twentieth less than with Python's 700."""
+"""Number of new objects that triggers garbage collection: loading modules and kernels creates hundreds of thousands,
+all of which stay. A start takes 5 % less time than with Python's default of 700."""
 
 
 @runtime_checkable
@@ -37,7 +37,7 @@ class Command(Protocol):
 
 @dataclass(frozen=True)
 class Entry:
-    """Where a subcommand stands, and what it is in one sentence: the help needs no more, and imports no more."""
+    """The module and description of a subcommand, so that the help does not need to import it."""
 
     module: str
     name: str
@@ -48,7 +48,7 @@ class Entry:
         return getattr(import_module(f".{self.module}", __package__), self.name)
 
     def named(self) -> Any:
-        """Return a class without arguments that only says what the subcommand is."""
+        """Return a class without arguments that only carries the description."""
         return make_dataclass(self.name, [], namespace={"__doc__": self.words}, frozen=True)
 
 
@@ -107,7 +107,7 @@ COMMANDS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 done, 1 failed, 2 bad usage or input, 130 Ctrl-C.
 
-    A reader of its output that has left changes nothing; output that found no room is a failure.
+    A closed pipe is ignored; output that cannot be written for another reason is a failure.
     """
     gc.set_threshold(NEW_OBJECTS)
     with lasting_streams() as out:
@@ -125,25 +125,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def process() -> int:
-    """Run one command as a process of its own and return its exit status: no signal makes another end of it."""
+    """Run one command as the main function of a process and return its exit status, which no late signal changes."""
     status = INTERRUPTED
     if sys.getfilesystemencoding() == "ascii" and os.environ.get(UTF8) != "1":
-        # No name of a file with other letters could be opened.
+        # Otherwise no file name with other characters could be opened.
         os.environ[UTF8] = "1"
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
     if os.environ.get("COLUMNS", "1").strip("0 ") == "":
-        del os.environ["COLUMNS"]  # 0 says that nobody knows; tables would have no room
+        del os.environ["COLUMNS"]  # 0 means unknown; tables would have no room
     try:
         status = main()
         too_late()
     except KeyboardInterrupt:
-        # It came while the command was ending: what it has to say is said.
+        # It arrived while the command was ending, which has already printed its message.
         too_late()
     return status
 
 
 def _is_lost(out: Lasting | None) -> bool:
-    """Whether output found no place, though somebody waits for it."""
+    """Return whether output was lost although somebody reads it."""
     sys.stdout.flush()
     return out is not None and out.problem is not None and not isinstance(out.problem, BrokenPipeError)
 
@@ -166,7 +166,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         return _interrupted()
     except ImportError as error:
-        # What interrupts a compiled module while it loads comes out of it as this.
+        # An interrupt while a compiled module is loading is raised as this.
         if isinstance(error.__cause__, KeyboardInterrupt):
             return _interrupted()
         told = missing(error)
@@ -186,7 +186,7 @@ def _tell(message: object) -> None:
 
 
 def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
-    """Return the command that the arguments name, and what it is to print; raises UsageError, in one line."""
+    """Return the parsed command, and what to print; raises UsageError."""
     words = [_at_home(word) for word in (sys.argv[1:] if arguments is None else arguments)]
     if words in (["--version"], ["-V"], ["version"]):
         from importlib.metadata import version  # takes as long as the rest of the help
@@ -194,7 +194,7 @@ def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
         print(f"chainslam {version('chainslam')}")
         raise SystemExit(0)
     if words and not words[0].startswith("-"):
-        # Told here, since `chainslam fly --help` would otherwise show the help of all commands and end in 0.
+        # Checked here, since `chainslam fly --help` would otherwise print the general help and end in 0.
         choose("command", words[0], COMMANDS)
     _refuse_empty(words)
     if words[:1] and words[0] in COMMANDS:
@@ -210,7 +210,7 @@ def _parse(arguments: Sequence[str] | None) -> tuple[Command, Output]:
 
 
 def _plugins(words: Sequence[str]) -> list[Path]:
-    """Return the files that --plugin names: what they register is known before anything else is read."""
+    """Return the files of --plugin, which are loaded before anything else is parsed."""
     pairs = [
         (word.partition("=")[0], word.partition("=")[2] or after)
         for word, after in zip(words, [*words[1:], ""], strict=True)
@@ -219,13 +219,13 @@ def _plugins(words: Sequence[str]) -> list[Path]:
 
 
 def _at_home(word: str) -> str:
-    """Return a word with the home folder in place of `~`, which no shell replaces within `--out=~/x`."""
+    """Return a word with the home folder in place of `~`, which shells do not replace within `--out=~/x`."""
     option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
     return f"{option}{equals}{os.path.expanduser(value)}" if value == "~" or value.startswith("~/") else word
 
 
 def _refuse_empty(words: Sequence[str]) -> None:
-    """Raise UsageError for a word that is empty: of a variable that is not set a path would become the folder here."""
+    """Raise UsageError for an empty word: with an unset variable a path would become the current folder."""
     for before, word in zip(("", *words), words, strict=False):
         if not word or (word.startswith("--") and word.endswith("=")):
             option = word.rstrip("=") or (before if before.startswith("--") else "")
@@ -234,7 +234,7 @@ def _refuse_empty(words: Sequence[str]) -> None:
 
 
 def given(words: Sequence[str]) -> frozenset[str]:
-    """Return the options that stand in a command, by the names of their fields: `--no-sweep` and `--sweep` are one."""
+    """Return the given options by the names of their fields; `--no-sweep` and `--sweep` are the same."""
     options = [word.partition("=")[0].removeprefix("--").replace("-", "_") for word in words if word[:2] == "--"]
     return frozenset(options) | {option.removeprefix("no_") for option in options}
 

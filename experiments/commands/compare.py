@@ -1,4 +1,4 @@
-"""`chainslam compare`: a campaign of many trials, and the comparison that comes of it."""
+"""`chainslam compare`: a campaign of many trials and its comparison."""
 
 import os
 import sys
@@ -40,7 +40,7 @@ from .echo import campaign_line, echo_world
 
 FAILED = 1
 JOBS_A_CORE = 8
-"""Processes beyond this for each core only take memory from one another."""
+"""More processes per core than this only compete for memory."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Compare:
 
     @property
     def campaign(self) -> Campaign:
-        """The campaign that the options describe; raises UsageError where they leave something open."""
+        """The campaign of the options; raises UsageError if something is missing."""
         cells = ("worlds", "backends", "strategies", "trials")
         said = ("navigation", "following", "errorless", "p0", "max_steps")
         return asked_campaign(
@@ -179,7 +179,7 @@ class Compare:
         return 1 if problems else 0
 
     def _of_others(self) -> int:
-        """Merge campaigns or hold two against each other; raises UsageError."""
+        """Merge campaigns or compare two of them; raises UsageError."""
         if self.rrd is not None:
             word = "--merge" if self.merge else "--against"
             raise UsageError(f"expected --rrd with a campaign that runs, found {word}: leave one of them out")

@@ -1,7 +1,7 @@
-"""Compile the loops that steps run ahead of the first run: `make setup` does so.
+"""Compile all loops before the first run; `make setup` does so.
 
-`python -m chainslam.experiments.commands.compile_kernels` drives two runs and replays one with scan
-matching, and keeps none.
+`python -m chainslam.experiments.commands.compile_kernels` drives three runs, replays one with scan matching, and
+discards them.
 """
 
 import sys
@@ -23,9 +23,9 @@ RUNS = ("paper-fig9", "rooms --seed 2 --backend invariant-ekf", "hall")
 
 def compile_kernels() -> int:
     """Call the kernels of a step, of the graph and of scan matching once and return the exit status."""
-    # No grid is drawn anew in so short a run.
+    # So short a run never redraws its grid.
     carried(np.zeros((1, 3)), np.ones(1), np.zeros(1), np.zeros((1, 2, 2)), np.zeros((1, 2)), 0.01)
-    # Nor is a robot lost.
+    # Nor does it lose the robot.
     place_on(np.zeros((1, 2)), np.zeros((1, 2)), Window(np.zeros(3), 0.1, 0.1))
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()):
         driven, replayed = (Path(folder) / name for name in ("driven", "replayed"))

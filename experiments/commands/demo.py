@@ -1,4 +1,4 @@
-"""`chainslam demo`: a bundled world is explored, its scans go through three estimators, and the report is opened."""
+"""`chainslam demo`: explores a bundled world, replays its scans through three estimators, and opens the report."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import progress
 
 WORLD, SEED, STEPS = "paper-fig9", 1, 350.0
-"""What is explored, and about how many steps that takes."""
+"""World and seed, and the approximate number of steps."""
 ESTIMATORS = tuple(dict.fromkeys(("block-ekf", "full-ekf", DRIVER)))
 OVERCONFIDENT = 3.0
 """An estimator with a larger ANEES is called overconfident; in a single run a consistent one may reach 2 or 3."""
@@ -75,7 +75,7 @@ class Demo:
 def seen(
     run: Mapping[str, Any], replays: Mapping[str, Mapping[str, Any]], picture: Path, report: Path
 ) -> tuple[str, str, str]:
-    """Return in three lines what was explored, how consistent each estimator was, and what to read in the report."""
+    """Return three lines: what was explored, how consistent each estimator is, and the verdict with the report."""
     scores = {name: said["pose_anees_from_start"] for name, said in replays.items()}
     scored = {name: score for name, score in scores.items() if score is not None}
     told = ", ".join(f"{name} {'-' if score is None else f'{score:.3g}'}" for name, score in scores.items())
@@ -93,7 +93,7 @@ def seen(
 
 
 def open_page(page: Path) -> None:
-    """Open a page in a web browser where there is somebody to see it; that it cannot be opened is no error."""
+    """Open a page in a web browser if somebody can see it; a browser that cannot be opened is not an error."""
     has_display = sys.platform == "darwin" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")))
     if has_display and sys.stdout.isatty():
         with suppress(OSError, webbrowser.Error):
@@ -101,7 +101,7 @@ def open_page(page: Path) -> None:
 
 
 def _watched(title: str, steps: float, go: Callable[[Watch], Run]) -> Run:
-    """Return a run that shows its progress, and that ends after the step in hand where it is interrupted."""
+    """Return a run after showing its progress; an interrupt ends it after the current step."""
     with progress(title, steps) as show, first_interrupt_waits() as stop_if_asked:
 
         def watch(step: Step) -> None:
@@ -112,5 +112,5 @@ def _watched(title: str, steps: float, go: Callable[[Watch], Run]) -> Run:
 
 
 def _status(run: Run) -> int:
-    """Return what the command ends in because of a run; 0 if that came to its end or to a limit."""
+    """Return the exit status for a run; 0 if it ended by itself or at a limit."""
     return EXIT_STATUS.get(run.summary["outcome"], 0)

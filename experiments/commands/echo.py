@@ -12,25 +12,25 @@ from ..terminal.console import say
 STEPS = 3.6, 1.27
 """Steps of a run, c n^p for n walls: over 86 stored runs (studies/results/rows; 6 bundled worlds, 70 apartments)."""
 STEPS_A_METRE, STEPS_A_M2 = 3.4, 2.2
-"""But no fewer for each metre of wall and each m2 of floor: corridors and halls have few walls, and a long way."""
+"""But at least this many per metre of wall and per m2 of floor: corridors and halls have few walls and long paths."""
 STEPS_SPREAD = 0.6, 2.5
-"""Of these runs the shortest and the longest, less 2 %, over what STEPS says."""
+"""The shortest and the longest of these runs, without the extreme 2 %, relative to STEPS."""
 DRIVING_S = 0.25, 0.42
-"""Driving time of one step in them."""
+"""Driving time per step in them."""
 COMPUTING_S = 0.005, 0.03
-"""Computing time of one step: in runs in schools on an idle machine, and on one that does other things, too."""
+"""Computing time per step: in runs in schools on an idle machine, and on a busy one."""
 SLOW = {"graph": 1.6, "graph-batch": 1.6}
-"""Back ends whose steps take longer than those of filters, by how much."""
+"""Factor on the computing time of back ends that are slower than filters."""
 
 
 def echo_world(world: World) -> None:
-    """Print on standard output how large a world is, what was read from its file, and what was assumed."""
+    """Print the size of a world, how its file was read, and what was assumed."""
     for line in world_lines(world):
         say(line)
 
 
 def world_lines(world: World) -> tuple[str, ...]:
-    """Return a world in lines: size and understanding; start and scale with who said so; what was not read."""
+    """Return a description of a world: size and interpretation; start and scale with their sources; notes."""
     x0, y0, x1, y1 = world.free.bounds
     size = f"{x1 - x0:.1f} x {y1 - y0:.1f} m, {world.free.area:.1f} m2 of floor, {len(world.faces)} walls"
     x, y, heading = world.start
@@ -48,7 +48,7 @@ def world_lines(world: World) -> tuple[str, ...]:
 
 
 def expected_steps(world: World, most: int) -> tuple[float, float]:
-    """Return the least and the most steps that a run in a world will probably take, up to its limit."""
+    """Return the range of the number of steps that a run will probably take, up to its limit."""
     by_walls = STEPS[0] * max(len(world.faces), 1) ** STEPS[1]
     length_m = float(np.linalg.norm(world.faces[:, 1] - world.faces[:, 0], axis=1).sum())
     middle = max(by_walls, STEPS_A_METRE * length_m, STEPS_A_M2 * world.free.area)
@@ -57,14 +57,14 @@ def expected_steps(world: World, most: int) -> tuple[float, float]:
 
 
 def expected_computing_s(world: World, backend: str, most: int) -> tuple[float, float]:
-    """Return the least and the most computing time, s, that a run will probably take."""
+    """Return the range of the computing time, s, that a run will probably take."""
     low, high = expected_steps(world, most)
     slow = SLOW.get(backend, 1.0)
     return COMPUTING_S[0] * slow * low, COMPUTING_S[1] * slow * high
 
 
 def run_line(world: World, trial: TrialConfig) -> str:
-    """Return in one line how many steps a run will probably take, and how long by both clocks."""
+    """Return an estimate of the steps, driving time and computing time of a run, in one line."""
     low, high = expected_steps(world, trial.max_steps)
     driving = DRIVING_S[0] * low, DRIVING_S[1] * high
     computing = expected_computing_s(world, trial.backend, trial.max_steps)
@@ -75,7 +75,7 @@ def run_line(world: World, trial: TrialConfig) -> str:
 
 
 def campaign_line(runs: Iterable[tuple[World, str]], most: int, processes: int | None) -> str:
-    """Return in one line how long many runs will probably compute, each given by its world and back end."""
+    """Return an estimate of the computing time of many runs, each given by its world and back end, in one line."""
     each = [expected_computing_s(world, backend, most) for world, backend in runs]
     low, high = (sum(column) / (processes or 1) for column in zip(*each, strict=True))
     where = "summed over all workers" if processes is None else f"on {processes} process{'es' if processes > 1 else ''}"
@@ -87,7 +87,7 @@ def _range(low: str, high: str) -> str:
 
 
 def _rounded(value: float) -> int:
-    """Return a number with two digits that count."""
+    """Return a number rounded to two significant digits."""
     return int(float(f"{value:.2g}"))
 
 

@@ -110,7 +110,7 @@ class Explore:
 
     @property
     def trial(self) -> TrialConfig:
-        """What decides the run, without where its results go; raises UsageError where no world is named."""
+        """The settings of the run, without its folder; raises UsageError if no world is given."""
         return asked_trial(
             {name: getattr(self, name) for name in KEYS if self._is_given(name)},
             drawing_settings(self.drawing, self.given),
@@ -158,7 +158,7 @@ class Explore:
 
     @contextmanager
     def _watched(self, recordings: list[TimelineOutput], scenario: Scenario) -> Iterator[Watch]:
-        """Tell of a run that begins, and show and record its steps; the recording is added to a list."""
+        """Announce a run, show its progress and record it; the recording is appended to a list."""
         trial, world = scenario.config, scenario.world
         echo_world(world)
         say(run_line(world, trial))
@@ -183,7 +183,7 @@ class Explore:
 
 
 def _told(result: TrialResult, folder: Path, problems: list[str]) -> int:
-    """Print what came of a run, and return the exit status."""
+    """Print the result of a run, and return the exit status."""
     found(summary=result.summary, folder=str(folder))
     for words in notes_of(result.summary):
         say(f"note: {words}")

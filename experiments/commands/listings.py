@@ -86,7 +86,7 @@ class Completion:
 
 APOSTROPHE, ESCAPED = "'", r"\'"
 SPEC = "COMPLETION_SPEC = "
-"""What the line of tyro's scripts begins with that holds all commands and options."""
+"""Beginning of the line in tyro's scripts that contains all commands and options."""
 
 
 def _tyros(classes: dict[str, Callable[..., Any]], shell: str) -> str:
@@ -103,7 +103,7 @@ def _spec(script: str) -> dict[str, Any]:
 
 
 def _completed(script: str) -> str:
-    """Return tyro's script with the names that our options take, and without what is no option for a user."""
+    """Return tyro's script with the values that our options take, and without internal options."""
     from chainslam.explore.strategies import STRATEGIES
     from chainslam.slam.backends import BACKENDS
 

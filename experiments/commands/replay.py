@@ -131,7 +131,7 @@ class Replay:
         return status or (1 if problems else 0)
 
     def source(self) -> OwnLog | RealLog:
-        """Return the log, read; raises UsageError where it is none."""
+        """Read and return the log; raises UsageError for an invalid one."""
         own = ReplayOptions(self.association, self.perfect_extraction, self.perfect_odometry, self.odometry)
         topics = self.scan_topic, self.odom_topic
         real = RealOptions(self.every, self.odometry, self.second_looks, self.range_noise, *topics)
@@ -146,7 +146,7 @@ class Replay:
         return TimelineOutput(source.title, self.backend, source.world, source.run.trial.errorless, self.rrd)
 
     def _one(self, source: OwnLog | RealLog, name: str, recording: TimelineOutput) -> TrialResult:
-        """Replay through one back end, and stop between two steps where that is asked for."""
+        """Replay through one back end; an interrupt ends it between two steps."""
         with (
             progress(f"replaying with {name}", float(source.scans)) as show,
             first_interrupt_waits() as stop_if_asked,
@@ -159,5 +159,5 @@ class Replay:
             if isinstance(source, OwnLog):
                 return source.go(name, recording.watch(name, source.true_pose, watch))
             mapped = source.mapped(name, recording.watch(name, None, watch, source.wheels_pose))
-        # Second looks take as long as the map: here an interrupt ends them at once, and the map is kept.
+        # Offline refinement takes as long as mapping. An interrupt ends it at once, and the map is kept.
         return source.looked_over(mapped)

@@ -1,4 +1,4 @@
-"""`chainslam report`: a campaign, two held against each other, or a run, as one page that a person reads."""
+"""`chainslam report`: the report of a run, a campaign, or a comparison of two campaigns."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`chainslam reproduce`: the paper's figures, with its numbers beside ours."""
+"""`chainslam reproduce`: the paper's figures, with its numbers next to ours."""
 
 import time
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Reproduce:
 
 
 def _far(done: int, count: int, seconds: float) -> str:
-    """Return how many figures are done, and how long the others take if they take as long as those."""
+    """Return the progress, and the remaining time if the other figures take as long as those so far."""
     left = f", about {duration(seconds / done * (count - done))} left" if done else ""
     return f"{done + 1} of {count}{left}: " if count > 1 else ""
 

@@ -24,7 +24,7 @@ from ..usage import UsageError
 from ..views.timelines import TimelineOutput
 
 TRIALS = "trials.csv"
-"""A folder that holds it is that of a campaign."""
+"""A folder with this file is that of a campaign."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class View:
 
 
 def _serve(files: list[Path]) -> int:
-    """Serve recordings to a browser until the process is asked to stop; raises ViewerError."""
+    """Serve recordings to a browser until the process is stopped; raises ViewerError."""
     viewer = WebViewer(files)
     page, data = viewer.page_port, viewer.port
     found(url=viewer.url)
@@ -73,7 +73,7 @@ def _serve(files: list[Path]) -> int:
 
 
 def recordings_at(path: Path) -> Callable[[], list[Path]]:
-    """Return what gives the recordings at a place, made now if there are none; raises UsageError for other places."""
+    """Return a function that gives the recordings at a path, made if there are none; raises UsageError."""
     if path.suffix == ".rrd" and path.is_file():
         return lambda: [path]
     found = sorted(path.glob("*.rrd")) if path.is_dir() else []
@@ -97,13 +97,13 @@ def recordings_at(path: Path) -> Callable[[], list[Path]]:
 
 
 def _is_same(one: RecordedRun, other: RecordedRun) -> bool:
-    """Whether two logs hold the same scans and odometry."""
+    """Return whether two logs have the same scans and odometry."""
     a, b = one.recording, other.recording
     return np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) and np.array_equal(a.odometry, b.odometry)
 
 
 def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
-    """Return the recording that was made in a folder; raises UsageError where it could not be written."""
+    """Return a new recording in a folder; raises UsageError if it could not be written."""
     prepare(folder)
     target = folder / RECORDING
     problems = record(target)
@@ -115,7 +115,7 @@ def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:
 
 
 def _record(runs: list[RecordedRun], options: ReplayOptions, target: Path) -> list[str]:
-    """Replay each run's log as it was made, all in one recording; return what went wrong."""
+    """Replay each run's log in the same way, all in one recording; return the problems."""
     run = runs[0]
     trial, backends = run.trial, list(dict.fromkeys(run.trial.backend for run in runs))
     world = load_world(trial.world, trial.start, trial.drawing)

@@ -1,1 +1,1 @@
-"""What `import chainslam` offers: the commands as functions, and what they leave as objects."""
+"""The public functions and objects of `import chainslam`: the commands as functions, and their results."""

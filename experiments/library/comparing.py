@@ -56,7 +56,7 @@ class Comparison:
 
     @property
     def verdict(self) -> list[str]:
-        """Return in words what the campaign found."""
+        """The findings, in words."""
         return list(lines_of(union(read_campaigns(self.folder)), read_comparison(self.folder)))
 
     def report(self) -> Path:
@@ -69,7 +69,7 @@ class Comparison:
         return f"Comparison({cells}, {campaign.trials} trials each, in {self.folder})"
 
     def _repr_html_(self) -> str:
-        """Return what the campaign found, which a notebook shows."""
+        """Return the findings as HTML for a notebook."""
         return "".join(f"<p>{escape(line)}</p>" for line in (repr(self), *self.verdict))
 
 

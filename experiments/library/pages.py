@@ -1,4 +1,4 @@
-"""What a folder holds as one page: a run, a campaign, or two campaigns held against each other."""
+"""The report of a folder: of a run, a campaign, or a comparison of two campaigns."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ REPORT = "report.html"
 
 
 def report_at(folder: Path) -> tuple[Page, Path]:
-    """Write the page of a folder into it, and return what stands on it and its place; raises UsageError."""
+    """Write the report of a folder into it, and return its content and its path; raises UsageError."""
     page, place = _page(folder), folder / REPORT
     write(place, html(page))
     return page, place

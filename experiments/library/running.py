@@ -128,7 +128,7 @@ def explore(
 
 
 DEFAULTS = {name: each.default for name, each in signature(explore).parameters.items()}
-"""What is not said, where it is the same: a preset or a file of settings may say it."""
+"""Options with their default value count as not given, so that a preset or a file of settings may decide them."""
 
 
 @overload
@@ -219,7 +219,7 @@ def _replayed(source: OwnLog | RealLog, name: str, watch: Watch, references: Ref
 
 
 def _folder(out: str | Path | None) -> tuple[Path, Home | None]:
-    """Return the folder for the results, and what keeps one that nobody named."""
+    """Return the folder for the results, and the owner of a temporary one."""
     if out == "":
         raise UsageError("expected a folder for out, found an empty name: leave it out, or name one")
     if out is not None:
@@ -229,7 +229,7 @@ def _folder(out: str | Path | None) -> tuple[Path, Home | None]:
 
 
 def _run(driven: Driven, home: Home | None) -> Run:
-    """Return the run that was driven; raises UsageError where it fell short of the saved one, or was not written."""
+    """Return the driven run; raises UsageError if it ended before the saved one, or was not written."""
     if driven.fell_short:
         raise UsageError(
             f"expected to pass the end of the saved run, found {driven.result.ending.reason}: its files are left as"
@@ -239,7 +239,7 @@ def _run(driven: Driven, home: Home | None) -> Run:
 
 
 def _kept(folder: Path, home: Home | None, config: dict[str, Any], force: bool, go: Callable[[], TrialResult]) -> Run:
-    """Run in a folder, write all that came of it, and return it; raises UsageError where something was not written."""
+    """Run in a folder, write all results, and return the run; raises UsageError if something was not written."""
     prepare(folder)
     with held(folder):
         refuse_others(folder, config, force)

@@ -1,4 +1,4 @@
-"""A run as an object over the files in its folder, wherever they came from: one way to read what a run left."""
+"""A run as an object over the files in its folder, whatever created them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Picture = Literal["map", "visibility", "paths", "nees", "model", "traversals"]
 
 
 class Home:
-    """A folder for results that nobody named a place for; it goes when nothing refers to it any more."""
+    """A temporary folder for results, deleted when nothing refers to it any more."""
 
     def __init__(self) -> None:
         self.folder = Path(mkdtemp(prefix="chainslam-"))
@@ -133,7 +133,7 @@ class Run:
 
 
 def table_at(path: Path) -> Any:
-    """Return a CSV table as a pandas DataFrame, as arrays by name where pandas is missing; raises UsageError."""
+    """Return a CSV table as a pandas DataFrame, or as arrays by name without pandas; raises UsageError."""
     with told(path, REMEDY):
         file = regular(path)
         try:
@@ -149,7 +149,7 @@ def table_at(path: Path) -> Any:
 
 
 def _array(cells: list[str]) -> np.ndarray:
-    """Return a column as numbers, NaN for an empty cell; as text where it holds any."""
+    """Return a column as numbers, with NaN for an empty cell; as text if it contains any."""
     try:
         return np.array([float(cell or "nan") for cell in cells])
     except ValueError:
@@ -157,7 +157,7 @@ def _array(cells: list[str]) -> np.ndarray:
 
 
 def run_at(folder: Path) -> Run:
-    """Return the run in a folder; raises UsageError where there is none."""
+    """Return the run in a folder; raises UsageError if there is none."""
     if not (folder / SUMMARY).is_file():
         raise UsageError(f"expected a run's {SUMMARY}, found none in {folder}: {REMEDY}")
     run = Run(folder)

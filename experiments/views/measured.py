@@ -1,4 +1,4 @@
-"""A replay compared with what others measured of its drive: loop errors, and the covariance stated of them."""
+"""Comparison of a replay with measurements of its drive: loop errors, and their stated covariance."""
 
 from collections.abc import Iterator, Sequence
 from itertools import product
@@ -20,7 +20,7 @@ STATED = {
 
 
 def measured_tables(summaries: Sequence[Row]) -> dict[str, PageTable]:
-    """Return the tables, without rows where nothing was measured."""
+    """Return the tables, without rows that were not measured."""
     names = {name: (lambda row, name=name: row[name]) for name in ("estimator", "path", "relations")}
     spread = {
         f"{words} {name}": (lambda row, kind=kind, name=name, turn=turn: _spread(row[kind], name, turn))

@@ -1,4 +1,4 @@
-"""Numbers as a reader wants them: three significant digits, never in powers of ten, intervals in brackets."""
+"""Readable numbers: three significant digits, no powers of ten, intervals in brackets."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from chainslam.viz.text import NONE as NONE
 
 ROUNDING = 1e-9
-"""What is nearer to 0 than this is 0 but for rounding."""
+"""Values nearer to 0 than this are 0 up to rounding."""
 WITHIN, BUILDINGS = ("low", "high"), ("low_buildings", "high_buildings")
 """Keys of the ends of an interval: for other runs, and for other buildings."""
 
@@ -28,7 +28,7 @@ def number(value: float | int | None, digits: int = 3) -> str:
 
 
 def digits_apart(values: Sequence[float]) -> int:
-    """Return how many significant digits (3 to 6) tell numbers that differ from one another."""
+    """Return the number of significant digits (3 to 6) that distinguishes different numbers."""
     for digits in range(3, 6):
         if len({number(value, digits) for value in values}) == len(set(values)):
             return digits
@@ -41,7 +41,7 @@ def percent(value: float | None) -> str:
 
 
 def interval(found: Mapping[str, Any], scale: float = 1.0, digits: int = 3, ends: tuple[str, str] = WITHIN) -> str:
-    """Return the 95 % interval of an estimate or a difference; empty where there is none, or all values are one."""
+    """Return the 95 % interval of an estimate or a difference; empty if there is none, or all values are equal."""
     if any(found.get(end) is None for end in ends) or found[ends[0]] == found[ends[1]]:
         return ""
     return " to ".join(number(scale * found[end], digits) for end in ends)

@@ -1,7 +1,7 @@
-"""Pictures for papers from the folders that runs left.
+"""Pictures for papers from the folders of runs.
 
 `python -m chainslam.experiments.views.pictures DIR ... --out PICTURES`: paths and NEES of several folders (replays of
-one log) come together; the map, the visibility graph, the model space and the traversals are of the first.
+one log) are drawn together; the map, the visibility graph, the model space and the traversals are those of the first.
 """
 
 import csv
@@ -56,10 +56,10 @@ class Pictures:
     out: Path
     """Folder for the pictures."""
     kinds: tuple[Literal["png", "svg", "pdf"], ...] = ("svg", "png")
-    """Kinds of files."""
+    """File formats."""
 
     def run(self) -> None:
-        """Write the pictures; raises UsageError where a folder holds no run."""
+        """Write the pictures; raises UsageError for a folder without a run."""
         runs = [read_pictured(folder) for folder in self.runs]
         first = runs[0]
         shown = saved_map(self.runs[0], first.trial, first.log, first.walls, first.estimated_world)
@@ -75,7 +75,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class PicturedRun:
-    """What pictures of a run are drawn from."""
+    """The data for pictures of a run."""
 
     trial: TrialConfig
     log: dict[str, Any]
@@ -86,7 +86,7 @@ class PicturedRun:
 
 
 def read_pictured(folder: Path) -> PicturedRun:
-    """Read a run's folder; raises UsageError where it holds none."""
+    """Read a run's folder; raises UsageError if it contains none."""
     run = read_run(folder / LOG)
     walls, steps = read_map(folder), read_steps(folder)
     if len(steps) != len(run.recording):
@@ -169,7 +169,7 @@ def figure_of(folder: Path, name: str) -> Figure:
 
 
 def _as_written(folder: Path, name: str) -> Figure:
-    """Return a picture of a drive without truth as it was written; raises UsageError for one that needs the truth."""
+    """Return a stored picture of a drive without ground truth; raises UsageError for one that needs the truth."""
     path = folder / f"{choose('picture of a drive whose truth nobody knows', name, ('map', 'visibility'))}.png"
     with told(path, REMEDY), Image.open(regular(path)) as image:
         figure = Figure(figsize=(image.width / 150, image.height / 150), dpi=150)

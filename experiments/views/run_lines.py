@@ -12,7 +12,7 @@ from .numbers import listed, number, percent
 
 Row = dict[str, Any]
 SCATTER = (0.2, 3.0)
-"""Where the ANEES of single runs of a consistent estimator lie, roughly."""
+"""Approximate range of the ANEES of single runs of a consistent estimator."""
 
 MOST_LOCKED = 0.9
 """Share of its own path up to which a robot has locked itself in, or its map contradicts the path."""
@@ -26,7 +26,7 @@ def lines_of(summaries: Sequence[Row]) -> tuple[str, ...]:
 
 
 def _happened(summaries: Sequence[Row]) -> list[str]:
-    """Return how the runs ended, those that ended alike together."""
+    """Return how the runs ended, grouped by equal endings."""
     found = []
     for words, group in groupby(summaries, _ended):
         names = [summary["backend"] for summary in group if summary.get("backend")]
@@ -52,7 +52,7 @@ def _consistent(summaries: Sequence[Row]) -> str:
 
 
 def _errs(summary: Row) -> str:
-    """Return how far off an estimate is and its ANEES; without ground truth what the map and the scans tell."""
+    """Return the error of an estimate and its ANEES; without ground truth, what map and scans indicate."""
     if summary.get("pose_rmse_m") is None:
         return f"{summary['backend']}: {_untrue(summary)}"
     words = f"{summary['backend']}: pose error {number(100.0 * summary['pose_rmse_m'])} cm rms"
@@ -80,7 +80,7 @@ def _untrue(summary: Row) -> str:
 
 
 def notes_of(summary: Row) -> list[str]:
-    """Return what the robot noticed of itself and its sensors; nothing where nothing is wrong."""
+    """Return the faults of the robot and its sensors that it noticed; empty if there are none."""
     counts = {
         "unstated_motions": "motions that the odometry did not report",
         "lost_steps": "steps without a place in the map",
@@ -101,7 +101,7 @@ def notes_of(summary: Row) -> list[str]:
 
 
 def words_on_ranges(errors: RangeErrors) -> list[str]:
-    """Return what is to be said of a scanner's ranges; nothing where nothing is sure."""
+    """Return the significant errors of a scanner's ranges; empty if there are none."""
     found = []
     if errors.is_biased():
         found.append(f"a bias of {1e3 * errors.bias_m:+.1f} mm (sigma {1e3 * errors.bias_sigma_m:.1f} mm)")
@@ -112,7 +112,7 @@ def words_on_ranges(errors: RangeErrors) -> list[str]:
 
 
 def range_errors_of(summary: Row) -> RangeErrors:
-    """Return what a summary says of the scanner's ranges; of one that says nothing, nothing is known."""
+    """Return the estimated errors of the scanner's ranges in a summary, or unknown ones if it has none."""
     keys = {"bias_m": "range_bias_m", "bias_sigma_m": "range_bias_sigma_m"}
     keys |= {"scale": "range_scale", "scale_sigma": "range_scale_sigma"}
     said = {name: value for name, key in keys.items() if (value := summary.get(key)) is not None}

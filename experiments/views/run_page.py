@@ -54,7 +54,7 @@ FIGURES: dict[str, tuple[str, float]] = {
     "drive_time_s": ("driving time, s", 1.0),
     "step_ms": ("computing time per step, ms", 1.0),
 }  # fmt: skip
-"""What the table tells: the key of summary.json, words, and what it is multiplied by."""
+"""Rows of the table: the key of summary.json, name and factor."""
 APART = (
     *("pose_rmse_m", "heading_rmse_rad", "pose_anees_from_start", "map_anees", "pose_nees_in_band", "nis"),
     *("false_matches", "duplicate_lines", "lines", "refined_lines", "chains_closed", "step_ms"),
@@ -65,9 +65,9 @@ CAPTIONS = {
     "traversals": "How often each stretch was driven",
 }  # fmt: skip
 VECTORS = ("nees", "paths")
-"""Pictures of few enough lines to be drawn as vectors."""
+"""Pictures with few enough lines to be drawn as vectors."""
 LARGEST_PLAN = 20_000_000
-"""Bytes; a floor plan of more would make the page too slow to read."""
+"""Bytes; a larger floor plan would make the page too slow."""
 
 
 def is_run(folder: Path) -> bool:
@@ -76,7 +76,7 @@ def is_run(folder: Path) -> bool:
 
 
 def run_page(folder: Path) -> Page:
-    """Return the report of a run's folder; raises UsageError where its files do not belong to one run."""
+    """Return the report of a run's folder; raises UsageError if its files do not belong to one run."""
     homes = _homes(folder)
     summaries = [read_summary(home) for home in homes]
     configs = [read_config(home / "config.json") for home in homes]
@@ -126,7 +126,7 @@ def _homes(folder: Path) -> list[Path]:
 
 
 def _numbers(runs: Sequence[Row]) -> PageTable:
-    """Return a row for each quantity that any run has, with a column for each run."""
+    """Return a row for each quantity that some run has, with a column for each run."""
     columns = {"quantity": lambda key: FIGURES[key][0]} | {
         run["backend"]: (lambda key, run=run: _told(run.get(key), FIGURES[key][1])) for run in runs
     }
@@ -135,7 +135,7 @@ def _numbers(runs: Sequence[Row]) -> PageTable:
 
 
 def _estimators(runs: Sequence[Row]) -> PageTable:
-    """Return a row for each run, with those of the figures that tell estimators apart."""
+    """Return a row for each run, with the figures that distinguish estimators."""
     known = [key for key in APART if any(run.get(key) is not None for run in runs)]
     columns = {FIGURES[key][0]: (lambda run, key=key: _told(run.get(key), FIGURES[key][1])) for key in known}
     return table("Estimators", {"estimator": lambda run: run["backend"], **columns}, runs)
@@ -150,7 +150,7 @@ def _told(value: Any, scale: float) -> str:
 
 
 def _more(run: Row) -> Row:
-    """Return more figures of a run: what the NIS says of the stated sensor noise, and those of offline refinement."""
+    """Return further figures of a run: the verdict of the NIS on the stated noise, and those of offline refinement."""
     nis, share = run.get("nis"), run.get("nis_in_band")
     noise = None if nis is None or share is None else verdict_on_noise(nis, share)
     return {"noise": noise} | {f"refined_{key}": value for key, value in (run.get("second_looks") or {}).items()}
@@ -255,7 +255,7 @@ def _graph_words(home: Path) -> str:
 
 
 def _by_truth(options: ReplayOptions) -> tuple[str, ...]:
-    """Return what the truth took the place of."""
+    """Return which parts were replaced by the truth."""
     parts = {"matches": options.association == "true", "extracted lines": options.perfect_extraction}
     return tuple(name for name, by_truth in (parts | {"odometry": options.perfect_odometry}).items() if by_truth)
 

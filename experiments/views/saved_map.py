@@ -1,4 +1,4 @@
-"""The picture of a map from the files that a run left, so that it can be drawn again as vectors."""
+"""The picture of a map from the files of a run, so that it can be drawn again as vectors."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ from ..scenario import TrialConfig, load_world
 
 
 class Told(Struct):
-    """What the picture tells of a run's summary."""
+    """The keys of a run's summary that the picture shows."""
 
     path_length_m: float
     coverage_own_frame: float
@@ -42,7 +42,7 @@ def saved_map(
     walls: Mapping[str, np.ndarray],
     estimated_world: Float[np.ndarray, "s 3"],
 ) -> Picture:
-    """Return the picture of a run's map from its folder and its arrays; raises UsageError where a file is missing."""
+    """Return the picture of a run's map from its folder and its arrays; raises UsageError if a file is missing."""
     features = read_features(folder, walls["ids"])
     summary = read_summary(folder)
     with told(folder / "summary.json", REMEDY):
@@ -64,7 +64,7 @@ def saved_map(
 
 
 def picture_alone(folder: Path, path_world: Float[np.ndarray, "s 3"]) -> Picture:
-    """Return the picture of a map with nothing under it, from a run's folder; raises UsageError."""
+    """Return the picture of a map without the truth, from a run's folder; raises UsageError."""
     walls = read_map(folder)
     return Picture(_map(walls), _chains(read_features(folder, walls["ids"])["chain"]), path_world, "")
 
@@ -77,7 +77,7 @@ def _map(walls: Mapping[str, np.ndarray]) -> StochasticMap:
 
 
 def small_map(shown: Picture) -> SmallMap:
-    """Return the map of a picture as one that stands beside others."""
+    """Return the map of a picture for a comparison side by side."""
     closed = [wall for chain in shown.chains if chain.is_closed for wall in chain.walls]
     walls = shown.map
     is_closed = np.isin(walls.ids, closed)
@@ -89,7 +89,7 @@ def _not_to_be_asked(ids: np.ndarray) -> Joint:
 
 
 def _chains(features: Sequence[Mapping[str, Any]]) -> tuple[Chain, ...]:
-    """Return the chains in the order that they had; a file holds the closed ones first."""
+    """Return the chains in their original order; a file lists the closed ones first."""
     found: dict[int, Chain] = {}
     for feature in features:
         says, way = feature["properties"], feature["geometry"]["coordinates"]

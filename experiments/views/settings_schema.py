@@ -1,4 +1,4 @@
-"""The settings of a trial as a JSON Schema: their ranges and units, and the words that stand below them."""
+"""The settings of a trial as a JSON Schema: their ranges, units and docstrings."""
 
 import inspect
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from ..scenario import TrialConfig
 
 @dataclass(frozen=True)
 class Group:
-    """A group of settings at its place."""
+    """A group of settings and its key."""
 
     key: str
     """Dotted, as `--set` takes it; empty for the settings of the trial itself."""
@@ -25,7 +25,7 @@ class Group:
 
 
 def groups() -> Iterator[Group]:
-    """Yield all groups of settings of a trial, each before those that it holds."""
+    """Yield all groups of settings of a trial, each before its subgroups."""
     waiting = [Group("", TrialConfig)]
     while waiting:
         group = waiting.pop()
@@ -37,7 +37,7 @@ def groups() -> Iterator[Group]:
 def config_schema(some: bool = False) -> dict[str, Any]:
     """Return the JSON Schema of a run's `config.json`; with `some`, that of a file with some of its settings.
 
-    It says what msgspec holds values against, and the words below each setting.
+    It contains the constraints that msgspec checks, and the docstring of each setting.
     """
     whole: dict[str, Any] = schema(TrialConfig if some else SavedConfig)
     for group in groups():
@@ -60,7 +60,7 @@ def config_schema(some: bool = False) -> dict[str, Any]:
 
 
 def words_of(kind: Any) -> dict[str, str]:
-    """Return what the source says below each field of a group of settings, also below those that it inherits."""
+    """Return the docstring of each field of a group of settings, including inherited ones."""
     found: dict[str, str] = {}
     for each in reversed(kind.__mro__[:-1]):
         found |= {told.arg_name: " ".join((told.description or "").split()) for told in parse_from_object(each).params}

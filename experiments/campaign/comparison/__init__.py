@@ -1,1 +1,1 @@
-"""What many trials say together."""
+"""Tables and comparison of a campaign's trials."""

@@ -1,4 +1,4 @@
-"""comparison.json: what the tables of a campaign say, each difference paired by run and with its interval."""
+"""comparison.json: the comparison of a campaign's tables, with each difference paired by run and with its interval."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -23,13 +23,13 @@ class Measure:
 
     name: str
     is_ratio: bool
-    """Compared by its logarithm, so that a difference is a ratio."""
+    """Whether logarithms are compared, so that a difference is a ratio."""
     floor: float = 0.0
     """Added before the logarithm is taken."""
 
     @property
     def ended(self) -> tuple[str, ...]:
-        """How a run must have ended to have a value: a path that a limit cut off is no length of an exploration."""
+        """Required end of a run: the path of a run that a limit ended is not the length of an exploration."""
         return ("complete",) if self.name == "path_length_m" else SOUND
 
 
@@ -63,12 +63,12 @@ AT_MARKS = (
     "duplicate_lines",
 )
 SOUND = ("complete", "stopped")
-"""Ends of runs that have scores: complete, or at a limit."""
+"""Ends of runs with scores: complete, or at a limit."""
 SUMS = (
     *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false"),
     *("merges", "false_merges", "sightings", "double_entries", "distances"),
 )
-"""Columns that are added up over runs."""
+"""Columns that are summed over runs."""
 BASELINE_BACKEND, BASELINE_STRATEGY = "full-ekf", "nearest-robot"
 
 
@@ -95,7 +95,7 @@ def arm_of(row: Row) -> str:
 
 
 def runs_of(rows: Iterable[Row], measure: Measure) -> Runs:
-    """Return the measure of each run, averaged over what else differs; without runs that failed or have no value."""
+    """Return the measure of each run, averaged over everything else; without runs that failed or have no value."""
     found: dict[tuple[str, int], list[float]] = {}
     for row in rows:
         value = row.get(measure.name)
@@ -153,7 +153,7 @@ def _counts(rows: Sequence[Row]) -> dict[str, int]:
 
 
 def _pooled(campaign: Campaign, rows: Sequence[Row], cells: Sequence[Row]) -> list[Row]:
-    """Return a row for each back end in each arm, over all worlds and strategies; still a run is the unit."""
+    """Return a row for each back end in each arm, over all worlds and strategies; the unit is the run."""
     found = []
     for arm, backend in product(campaign.arms, campaign.backends):
         outside = [c["steps_outside_band"] for c in cells if (c["arm"], c["backend"]) == (arm, backend)]
@@ -203,7 +203,7 @@ def cell_scores(rows: Sequence[Row]) -> Row:
 
 
 def without(rows: Sequence[Row], names: Sequence[str]) -> dict[str, int]:
-    """Return, by column, how many rows have no value in it; only those of `names` that a run may lack."""
+    """Return the number of rows without a value, by column; only those of `names` that a run may lack."""
     return {name: sum(not _is_told(row.get(name)) for row in rows) for name in names if name in MAY_LACK}
 
 
@@ -260,7 +260,7 @@ def _interaction(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
 
 
 def _marks(rows: Sequence[Row]) -> list[Row]:
-    """Return, for each cell at each mark, how many runs drive on, have finished or have failed, and their means."""
+    """Return the runs that are driving, finished or failed at each mark, and their means, for each combination."""
     cells: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
         cells.setdefault((row["world"], row["strategy"], row["backend"], arm_of(row), row["metres"]), []).append(row)

@@ -1,4 +1,4 @@
-"""Is an estimator consistent? Its ANEES with an interval, against 1: pose and map together."""
+"""Consistency of an estimator: its ANEES of pose and map, with an interval, compared with 1."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ from ...views.numbers import number
 
 Row = dict[str, Any]
 SCORES = {"pose_anees_from_start": "pose", "map_anees": "map"}
-"""What must be consistent: the pose relative to the start, whose own error nothing can observe, and the map."""
+"""What must be consistent: the map, and the pose relative to the start, whose own error is unobservable."""
 WITHIN = 1.5
-"""A mean ANEES counts as consistent up to this, and down to its inverse."""
+"""Largest mean ANEES of a consistent estimator; the smallest is its inverse."""
 CONSISTENT, OVERCONFIDENT, CAUTIOUS, TOO_FEW = "consistent", "overconfident", "too cautious", "too few runs"
 
 
@@ -30,7 +30,7 @@ def consistency(row: Row) -> Row:
 
 
 def judge(estimate: Row) -> str:
-    """Return the verdict on a mean ANEES by its 95 % interval: by run, or where there is none by building."""
+    """Return the verdict on a mean ANEES by its 95 % interval: by run, or by building if there is none by run."""
     suffix = "" if estimate["low"] is not None else "_buildings"
     low, high = estimate[f"low{suffix}"], estimate[f"high{suffix}"]
     if low is None or estimate["runs"] < FEW_RUNS:
@@ -43,7 +43,7 @@ def judge(estimate: Row) -> str:
 
 
 def in_words(row: Row) -> str:
-    """Return a verdict as a reader wants it, the factor with three digits."""
+    """Return a readable verdict, with three digits of the factor."""
     if row["verdict"] == OVERCONFIDENT:
         return f"overconfident by a factor of {number(row['factor'])}"
     return "too few runs to tell" if row["verdict"] == TOO_FEW else str(row["verdict"])

@@ -1,4 +1,4 @@
-"""NEES along the path over many runs: medians, and where that of a consistent estimator lies."""
+"""NEES along the path over many runs: medians, and the band of a consistent estimator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ class AlongPath:
 
     path_m: Float[np.ndarray, " p"]
     median: Float[np.ndarray, " p"]
-    """Over the runs that last so long; NaN where none of them has a NEES."""
+    """Median over the runs that last this long; NaN if none of them has a NEES."""
     quartiles: Float[np.ndarray, "2 p"]
     band: Float[np.ndarray, "2 p"]
-    """Where the median over as many runs of a consistent estimator lies in 95 % of all cases."""
+    """95 % band of the median over as many runs of a consistent estimator."""
 
 
 def along_path(runs: Sequence[tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]) -> AlongPath | None:

@@ -1,4 +1,4 @@
-"""Many comparisons made at once: each is corrected for the size of its family, so that chance alone finds none."""
+"""Correction of p-values for the number of comparisons that are made at once."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -21,10 +21,10 @@ def in_family(rows: Iterable[Row]) -> list[Row]:
 
 
 def is_clear(row: Row) -> bool:
-    """Return whether a difference is more than chance, counting all that were looked at beside it."""
+    """Return whether a difference is significant, after correction for all comparisons of its family."""
     return row.get("p_holm") is not None and row["p_holm"] < CLEAR
 
 
 def family_of(rows: Sequence[Row]) -> tuple[int, int]:
-    """Return how many comparisons of a family are tested, and how many of them are clear."""
+    """Return how many comparisons of a family are tested, and how many of them are significant."""
     return (rows[0].get("family") or 0 if rows else 0), sum(map(is_clear, rows))

@@ -1,4 +1,4 @@
-"""What a campaign must show, claim by claim: what was found in each arm, and whether the claim holds there."""
+"""The claims of a campaign: what was found in each arm, and whether each claim holds there."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,9 +9,9 @@ Row = dict[str, Any]
 Judge = Callable[[Row], tuple[Row, bool | None]]
 PAPER, BASELINE = "block-ekf", "full-ekf"
 CONSISTENT = ("fej-ekf", "invariant-ekf", "graph")
-"""Back ends whose Jacobians agree on what no scan can observe."""
+"""Back ends whose Jacobians preserve the unobservable directions."""
 MATCHING = ("wrong", "doubles")
-"""Claims that mean nothing where matches are told by the truth."""
+"""Claims that do not apply if the association is the true one."""
 MOST = 0.5
 ANEES_AIM = (0.9, 1.1)
 HELD_AIM = (0.93, 0.97)
@@ -59,7 +59,7 @@ def _outside(row: Row) -> tuple[Row, bool | None]:
 
 
 def _wrong(row: Row, pooled: Sequence[Row]) -> tuple[Row, bool | None]:
-    """Count per observation: one back end may drive further than another."""
+    """Per observation, since one back end may drive farther than another."""
     rates = {r["backend"]: _rate(r) for r in pooled if r["arm"] == row["arm"] and r["sightings"]}
     others = {name: rate for name, rate in rates.items() if name != row["backend"]}
     if row["backend"] not in rates or not others:
@@ -111,7 +111,7 @@ def _doubles(row: Row) -> tuple[Row, bool | None]:
 
 
 def _inside(estimate: Row | None, aim: tuple[float, float]) -> bool | None:
-    """Return whether an interval lies within the aim; None where partly, or of few runs: more would tell."""
+    """Return whether an interval lies within the aim; None if only partly, or for few runs, where more would decide."""
     if estimate is None or estimate["runs"] < FEW_RUNS or estimate["low"] is None:
         return None
     if aim[0] <= estimate["low"] and estimate["high"] <= aim[1]:

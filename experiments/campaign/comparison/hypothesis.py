@@ -1,4 +1,4 @@
-"""The paper's hope put to the test: that a careful exploration strategy makes up for a weaker estimator."""
+"""Test of the paper's hypothesis that a careful exploration strategy compensates for a weaker estimator."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from .comparison import BASELINE_BACKEND, BASELINE_STRATEGY, Measure, Row, diffe
 
 CONTENDER = ("nearest-start", "block-ekf")
 MATCHES_WITHIN = 1.1
-"""Two errors match if the 95 % interval of their ratio stays below this; they do not if it stays above."""
+"""Two errors match if the 95 % interval of their ratio is below this, and differ if it is above."""
 DECIDING = ("wall_rmse_m", "wall_shape_m")
 """Where the walls of the map lie, and its shape alone: the full EKF moves its map as a whole, which says nothing of
 how well the walls lie to each other (docs/contributing/studies.md, "Bias and the precision of the scanner")."""
@@ -27,7 +27,7 @@ MEASURES = (
 
 
 def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
-    """Return whether the contender matches the baseline at equal metres driven; None where either was not run."""
+    """Return whether the contender matches the baseline at equal path lengths; None if either was not run."""
     closed = [row | {"uncovered": _uncovered(row)} for row in select(marks, mode=CLOSED)]
     contender = select(closed, strategy=CONTENDER[0], backend=CONTENDER[1])
     baseline = select(closed, strategy=BASELINE_STRATEGY, backend=BASELINE_BACKEND)
@@ -56,7 +56,7 @@ def hypothesis(marks: Sequence[Row]) -> dict[str, Any] | None:
 def verdict(intervals: Sequence[tuple[float | None, float | None]]) -> str:
     """Return `matches`, `does not match` or `undecided` for the intervals of some ratios of errors.
 
-    All must match for a match; one that does not decides against it.
+    All must match for a match; a single one that does not decides against it.
     """
     known = [(low, high) for low, high in intervals if low is not None and high is not None]
     if any(low > MATCHES_WITHIN for low, _ in known):
@@ -65,12 +65,12 @@ def verdict(intervals: Sequence[tuple[float | None, float | None]]) -> str:
 
 
 def _last_reached(rows: Sequence[Row]) -> str:
-    """Return the last mark at which a run still drives; the end of the runs where none comes to the first."""
+    """Return the last mark at which a run still drives; the end of the runs if none reaches the first."""
     return next((mark for mark in reversed(MARKS) if _states(rows, mark)["driving"]), END)
 
 
 def _alive(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows with every run that has scores at its mark counted as one that completed."""
+    """Return the rows, counting every run with scores at its mark as complete."""
     return [row | {"status": "failed" if row["state"] == "failed" else "complete"} for row in rows]
 
 

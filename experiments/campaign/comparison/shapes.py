@@ -1,4 +1,4 @@
-"""What `comparison.json` and `contrast.json` must hold for a page to be made of them; more may be there."""
+"""Required content of `comparison.json` and `contrast.json` for their pages; they may contain more."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar, Literal, TypedDict
@@ -14,13 +14,14 @@ NUMBER = float | None
 
 
 class Together(Struct, kw_only=True):
-    """An object of which some keys have values together, or none of them."""
+    """An object with groups of keys of which all or none have values."""
 
     together: ClassVar[tuple[tuple[str, str], ...]] = (("low", "high"), ("low_buildings", "high_buildings"))
-    """Ends of intervals; fewer than five runs have none by run, fewer than five buildings none for other buildings."""
+    """Ends of intervals; with fewer than five runs there are none by run, with fewer than five buildings none by
+    building."""
 
     def __post_init__(self) -> None:
-        """Raise UnfitError where one of them stands alone."""
+        """Raise UnfitError if only a part of a group has values."""
         for first, second in self.together:
             values = getattr(self, first, None), getattr(self, second, None)
             if (values[0] is None) != (values[1] is None):
@@ -37,7 +38,7 @@ def _of(kinds: Any, *names: str) -> list[tuple[str, Any]]:
 
 
 def _object(name: str, *keys: Any, base: type = Together) -> Any:
-    """Return the kind of an object with some keys: name, kind and perhaps default."""
+    """Return the kind of an object with some keys: name, kind and optional default."""
     return defstruct(name, [key for some in keys for key in some], bases=(base,), kw_only=True)
 
 
@@ -70,7 +71,7 @@ _AT_A_MARK = _object(
 
 
 class Arm(Struct):
-    """A claim of one arm."""
+    """A claim in one arm."""
 
     found: dict[str, Any]
     holds: bool | None
@@ -88,7 +89,7 @@ class Finding(Struct):
 _MARKS = ("10", "20", "33", END)
 _typed_dict: Any = TypedDict
 _MARKED = _typed_dict("Marks", dict.fromkeys(_MARKS, _AT_A_MARK))
-"""Their names are no names of Python."""
+"""Keys that are not valid Python names."""
 _HYPOTHESIS = _object(
     "Hypothesis", [("contender", str), ("baseline", str), ("matches_within", float)],
     [("decisive_mark", _one_of(_MARKS)), ("marks", _MARKED)],

@@ -1,4 +1,4 @@
-"""The tables of a campaign, made from the files of its trials in one fixed order."""
+"""The tables of a campaign, made from the files of its trials in a fixed order."""
 
 from collections.abc import Callable, Sequence
 from io import BytesIO
@@ -31,11 +31,11 @@ FIRST = (
     *("collisions", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band", "map_anees"),
     *("duplicate_lines", "false_matches", "pose_anees_from_start", "nis", "nis_in_band"),
 )
-"""Columns that scripts rely on; the others follow in the order in which they were first met."""
+"""Columns that scripts rely on; the others follow in order of first occurrence."""
 TIMINGS = "step_ms_"
-"""What the names of all columns begin with that differ from run to run."""
+"""Prefixes of the columns that differ between identical runs."""
 GATE = MatchingConfig().gate
-"""Level of the gate that the trials of a campaign match with where nothing else is said."""
+"""Default level of the gate of a campaign's trials."""
 KEYS = ("world", "strategy", "backend", "mode", "association")
 PLAIN = (str, int, float, bool)
 
@@ -43,7 +43,7 @@ Row = dict[str, Any]
 
 
 def trial_row(record: TrialScores, gate: float = GATE) -> Row:
-    """Return the plain values of a trial's summary, and how its intervals of distances fared."""
+    """Return the plain values of a trial's summary, and the coverage of its intervals of distances."""
     summary = record.summary
     row = {key: value for key, value in summary.items() if value is None or isinstance(value, PLAIN)}
     row.pop("traceback", None)
@@ -106,7 +106,7 @@ def mark_rows(record: TrialScores) -> list[Row]:
 
 
 def step_rows(records: Sequence[TrialScores]) -> list[Row]:
-    """Return the statistics of one cell over its trials, step by step, as long as a trial goes on."""
+    """Return the statistics of one combination over its trials at each step, as long as a trial lasts."""
     longest = max((len(r.arrays.get("pose_nees", ())) for r in records), default=0)
     names = (
         *("path_length_m", "pose_nees", "pose_nees_from_start", "pose_trace"),
@@ -158,7 +158,7 @@ def parquet_bytes(rows: Sequence[Row], header: Sequence[str]) -> bytes:
 
 
 def header_of(rows: Sequence[Row], first: Sequence[str] = ()) -> list[str]:
-    """Return the names of all columns, in the order in which they are first met."""
+    """Return the names of all columns, in order of first occurrence."""
     return list(dict.fromkeys((*first, *(key for row in rows for key in row))))
 
 
@@ -170,7 +170,7 @@ def write_table(path: Path, rows: Sequence[Row], first: Sequence[str] = ()) -> N
 
 
 def read_rows(path: Path, columns: Sequence[str] = ()) -> list[Row]:
-    """Return the rows of a table that stands as Parquet; raises UsageError where it is none or lacks `columns`."""
+    """Return the rows of a Parquet table; raises UsageError for another file or missing `columns`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -193,7 +193,7 @@ def read_comparison(folder: Path) -> Row:
 
 
 def band_scores(records: Sequence[TrialScores], steps: Sequence[Row]) -> Row:
-    """Return what the steps of one cell say: how many lie outside their band, and the band of all steps together."""
+    """Return the number of steps outside their band in a combination, and the band of all steps together."""
     outside = [row["pose_anees"] < row["band_low"] or row["pose_anees"] > row["band_high"]
                for row in steps if row["pose_anees"] is not None]  # fmt: skip
     runs = [r.arrays["pose_nees"] for r in records if np.all(np.isfinite(r.arrays.get("pose_nees", [np.nan])))]

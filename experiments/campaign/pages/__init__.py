@@ -1,1 +1,1 @@
-"""A campaign as pages, pictures and a recording."""
+"""A campaign as report, pictures and recording."""

@@ -24,7 +24,7 @@ MOST_CURVES = 4
 
 
 def campaign_page(folder: Path) -> Page:
-    """Return the report of a campaign's folder; raises UsageError where it is none, or not done."""
+    """Return the report of a campaign's folder; raises UsageError if it is not a finished campaign."""
     config = read_config(folder)
     campaigns = config.campaigns
     campaign = union(campaigns)
@@ -54,7 +54,7 @@ def _named(names: tuple[str, ...] | list[str], what: str) -> str:
 
 
 def _told(campaign: Campaign, said: Row, worlds: list[str], exact: bool) -> Row:
-    """Return what the captions of the template need."""
+    """Return the values for the captions of the template."""
     rows = [row for row in said["pooled"] if row["arm"] == deciding_arm(campaign)]
     sound = sum(row["sound"] for row in rows)
     return {
@@ -70,7 +70,7 @@ def _told(campaign: Campaign, said: Row, worlds: list[str], exact: bool) -> Row:
 
 
 def _tables(campaign: Campaign, said: Row, exact: bool) -> dict[str, PageTable]:
-    """Return the tables by name, those without noise without what needs a NEES."""
+    """Return the tables by name; in a campaign without noise, without those that need a NEES."""
     arm = deciding_arm(campaign)
     closed = [row for row in said["strategies"] if row["arm"] == CLOSED]
     both = [row for row in said["interaction"] if row["arm"] == CLOSED]

@@ -15,10 +15,10 @@ from ..contrast import TRIALS, read_contrast
 from .tables import differences, text
 
 MOST_ROWS = 60
-"""Trials that the page shows one by one, the most different ones; `contrast.csv` has them all."""
+"""Number of trials that the page lists, those that differ most; `contrast.csv` contains all."""
 SIDES = {"status": ("status", 1.0), "path length, m": ("path_length_m", 1.0), "pose ANEES": ("pose_anees", 1.0),
          "wall error, cm": ("wall_rmse_m", 100.0), "duplicate walls incl. merged": ("double_entries", 1.0)}  # fmt: skip
-"""Columns of what both sides have: the key without its side, and what it is multiplied by."""
+"""Columns that exist for both campaigns: key without the campaign, and factor."""
 NOTE = (
     "Second compared with first, paired by run (the same world, start and noise): a ratio above 1 or a difference above"
     f" 0 is worse than the first. p is corrected by Holm's method; fewer than {FEW_RUNS} runs are not tested. Left out:"
@@ -27,7 +27,7 @@ NOTE = (
 
 
 def contrast_page(folder: Path) -> Page:
-    """Return the report of a folder that `compare --against` left; raises UsageError where it is none."""
+    """Return the report of a folder of `compare --against`; raises UsageError for another folder."""
     said = read_contrast(folder)
     told = [row | {"arm": arm_of(row)} for row in said["differences"]]
     changes = {"from": lambda item: item[0].partition(" -> ")[0], "to": lambda item: item[0].partition(" -> ")[2]}
@@ -48,7 +48,7 @@ def contrast_page(folder: Path) -> Page:
 
 
 def lines_of_contrast(said: Row) -> tuple[str, ...]:
-    """Return what differs, and which means differ by more than chance."""
+    """Return the differences, and which means differ significantly."""
     count = said["trials"]
     told = [row for row in said["differences"] if row["value"] is not None]
     tested = [row for row in told if row["runs"] >= FEW_RUNS]
@@ -73,7 +73,7 @@ def _trials(rows: Sequence[Row]) -> list[Section]:
 
 
 def _apart(row: Row) -> float:
-    """Return how far apart a trial's two results are: a status that changed before any number."""
+    """Return how much a trial's two results differ; a changed status comes before any number."""
     pair = [row[f"pose_anees_{side}"] for side in ("first", "second")]
     if row["status_first"] != row["status_second"] or any(v is None or not isfinite(v) or v <= 0 for v in pair):
         return float("inf")

@@ -1,4 +1,4 @@
-"""What a campaign found, in lines: which estimator is consistent, what the others cost, which strategy is cheaper."""
+"""The findings of a campaign: which estimators are consistent, what the others cost, which strategy is cheaper."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,7 +22,7 @@ def lines_of(campaign: Campaign, said: Row) -> tuple[str, ...]:
 
 
 def deciding_arm(campaign: Campaign) -> str:
-    """Return the arm that the lines are about: the closed loop where there is one."""
+    """Return the arm that the lines are about: the closed loop if there is one."""
     return CLOSED if CLOSED in campaign.arms else campaign.arms[0]
 
 
@@ -44,7 +44,7 @@ def _names(rows: Sequence[Row]) -> str:
 
 
 def _costs(campaign: Campaign, said: Row, rows: Sequence[Row]) -> tuple[str, ...]:
-    """Return what the most overconfident estimator costs, or where none is the one with the largest wall error."""
+    """Return the cost of the most overconfident estimator, or else that of the one with the largest wall error."""
     factors = {row["backend"]: row["factor"] or 0.0 for row in rows if row["verdict"] == OVERCONFIDENT}
     found = {(row["first"], row["measure"]): row for row in said["backends"] if row["arm"] == deciding_arm(campaign)}
     walls = {name: row["value"] for (name, what), row in found.items() if what == "wall_rmse_m" and row["value"]}

@@ -29,7 +29,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def nees_pictures(folder: Path, campaigns: Sequence[Campaign], arms: Sequence[str]) -> tuple[PagePicture, ...]:
-    """Return the NEES along the path, a picture for each arm and world: the median over the runs of each estimator."""
+    """Return the NEES along the path for each arm and world, as median over the runs of each estimator."""
     pictures = []
     for arm in arms:
         runs: dict[str, dict[str, list[tuple[np.ndarray, np.ndarray]]]] = {}
@@ -91,7 +91,7 @@ def map_pictures(folder: Path, campaigns: Sequence[Campaign], arm: str) -> dict[
 
 
 def strategy_shown(campaign: Campaign) -> str:
-    """Return the strategy whose runs the pictures show."""
+    """Return the strategy whose runs are shown."""
     return BASELINE_STRATEGY if BASELINE_STRATEGY in campaign.strategies else campaign.strategies[0]
 
 
@@ -114,7 +114,7 @@ def _map(arrays: Arrays, floor: tuple[Float[np.ndarray, "_ 2"], ...]) -> SmallMa
 
 
 def _floor(world: str, drawing: DrawingOptions) -> tuple[Float[np.ndarray, "_ 2"], ...]:
-    """Return the rings of a world's floor; none where its file has gone."""
+    """Return the rings of a world's floor; none if its file no longer exists."""
     try:
         free = load_world(world, drawing=drawing).free
     except UsageError:

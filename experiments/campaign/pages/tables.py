@@ -129,13 +129,13 @@ def _probability(p: float | None) -> str:
 
 
 def _digits(row: Row) -> int:
-    """Return as many digits as tell a difference and its interval from none."""
+    """Return the number of digits that distinguish a difference and its interval from none."""
     known = [row[name] for name in ("value", "low", "high") if row.get(name) is not None]
     return digits_apart([*known, 1.0 if row["kind"].startswith("ratio") else 0.0])
 
 
 def compared(row: Row | None) -> str:
-    """Return a difference with its interval, starred where it is more than chance."""
+    """Return a difference with its interval, with a star if it is significant."""
     value, space, more = estimated(row).partition(" ")
     return value + ("*" if row is not None and is_clear(row) else "") + space + more
 
@@ -159,7 +159,7 @@ def crossed(title: str, rows: Sequence[Row], names: Mapping[str, str], measures:
 
 
 def differences(title: str, rows: Iterable[Row], names: Mapping[str, str]) -> PageTable:
-    """Return comparisons one by one; those without a value are left out."""
+    """Return comparisons one by one, without those that have no value."""
     lead = {name: text(key) for name, key in names.items()}
     better = {"better in, % of runs": lambda row: percent(row["first_better"])}
     told = [row for row in rows if row["value"] is not None]
@@ -173,7 +173,7 @@ def without_anees(columns: Columns) -> Columns:
 
 
 def marks_table(said: Row, columns: Columns = MARKS) -> PageTable:
-    """Return the means at equal path lengths, at those that some run reached."""
+    """Return the means at equal path lengths, for those that some run reached."""
     closed = [row for row in said["marks"] if row["arm"] == CLOSED]
     reached = {END, *(row["metres"] for row in closed if row["driving"])}
     return table("At equal path lengths, closed loop", columns, [row for row in closed if row["metres"] in reached])
