@@ -53,7 +53,7 @@ def test_a_file_after_an_option_of_many_values_is_the_commands(name, option, see
 
 def test_what_took_the_log_is_told(capsys):
     assert main(["replay", "--backend", "full-ekf", "none.log", "--force"]) == 2
-    expected = "chainslam: expected LOG for replay, found none (--backend takes 'none.log', too): put it first\n"
+    expected = "chainslam: expected LOG for replay, found none (--backend takes 'none.log' as well): put it first\n"
     assert capsys.readouterr().err == expected
     assert main(["replay"]) == 2
     assert capsys.readouterr().err == "chainslam: expected LOG for replay, found none: see `chainslam replay --help`\n"

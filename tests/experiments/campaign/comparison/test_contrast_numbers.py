@@ -191,5 +191,5 @@ def test_one_trial_alone_may_differ(tmp_path):
 
 def test_a_contrast_that_cannot_be_read_names_the_remedy(tmp_path):
     (tmp_path / "contrast.json").write_text("[]")
-    with pytest.raises(UsageError, match=r": run `compare --against` anew$"):
+    with pytest.raises(UsageError, match=r": run `compare --against` again$"):
         read_contrast(tmp_path)
