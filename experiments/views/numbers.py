@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from chainslam.viz.text import NONE
+from chainslam.viz.text import NONE as NONE
 
 ROUNDING = 1e-9
 """What is nearer to 0 than this is 0 but for rounding."""
