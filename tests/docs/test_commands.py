@@ -7,10 +7,14 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 from chainslam.experiments.commands.cli import _parse
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.worlds.registry import READERS
+from chainslam.slam.backends import BACKENDS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -68,8 +72,8 @@ def test_every_command_of_a_page_is_one(page):
 
 
 def _parse_or_help(words):
-    """Parse a command without running it; raises UsageError for one that there is not."""
-    with suppress(SystemExit):
+    """Parse a command without running it; raises UsageError for one that there is not. What --plugin adds goes again."""
+    with suppress(SystemExit), patch.dict(BACKENDS), patch.dict(STRATEGIES), patch.dict(READERS):
         _parse(words)
 
 

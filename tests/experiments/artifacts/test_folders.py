@@ -228,7 +228,7 @@ def test_a_trial_that_is_none_gets_one_line_and_status_2(refused, words):
         refused("campaign", "config.json", words, spoil)
 
 
-@pytest.mark.parametrize(("name", "words"), [("steps.parquet", "report"), ("trials.parquet", "view")])
+@pytest.mark.parametrize(("name", "words"), [("steps.parquet", "view"), ("trials.parquet", "view")])
 def test_a_table_that_was_cut_short_gets_one_line_and_status_2(refused, name, words, monkeypatch):
     monkeypatch.setattr("chainslam.experiments.commands.view.available", lambda: "viewer")
     for spoil in (cut, folder_for, lambda path: path.write_bytes(b"x,y\n1,2\n")):

@@ -44,7 +44,7 @@ def test_a_replay_of_a_drive_that_was_cut_short_says_so_and_is_not_complete(made
     once, twice = tmp_path / "once", tmp_path / "twice"
     for source, out in ((folder, once), (once, twice)):
         assert main(["replay", str(source / "log.npz"), "--out", str(out)]) == 0
-        assert reason in capsys.readouterr().out.splitlines()
+        assert f"({reason})" in capsys.readouterr().out
         summary = read_json(out / "summary.json", dict, "")
         assert summary["status"] == "stopped"
         assert summary["outcome"] == "recording-cut-short"

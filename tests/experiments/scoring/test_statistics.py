@@ -90,14 +90,14 @@ def test_a_match_is_one_of_place_and_of_shape():
     assert verdict([good, open_]) == verdict([good, (None, None)]) == "undecided"
 
 
-def test_what_a_lost_run_did_is_counted_though_it_is_in_no_mean():
+def test_a_run_that_ended_at_a_limit_keeps_its_scores_and_one_that_failed_has_none():
     same = {"world": "w", "seed": 1, "bound_margin": -0.1, "bound_first_m": 1.0, "bound_worst_m": 2.0}
     done = same | {"status": "complete", "pose_anees": 1.0, "double_entries": 1, "sightings": 100}
     lost = same | {"seed": 2, "status": "stopped", "pose_anees": 900.0, "double_entries": 19, "sightings": 400,
                    "bound_margin": -3.0, "missed_share": 0.2}  # fmt: skip
     scores = cell_scores([done, lost, same | {"seed": 3, "status": "failed", "double_entries": 50}])
     assert (scores["trials"], scores["complete"], scores["sound"]) == (3, 1, 2)
-    assert scores["pose_anees"]["mean"] == 1.0
+    assert scores["pose_anees"]["mean"] == 450.5
     assert (scores["double_entries"], scores["sightings"]) == (20, 500)
     assert (scores["bound_margin"], scores["bound_runs_below"]) == (-3.0, 2)
     assert scores["missed_share"]["mean"] == 0.2
