@@ -72,7 +72,7 @@ def test_every_command_of_a_page_is_one(page):
 
 
 def _parse_or_help(words):
-    """Parse a command without running it; raises UsageError for one that there is not. What --plugin adds goes again."""
+    """Parse a command without running it; raises UsageError for one that there is not. Registries stay as they were."""
     with suppress(SystemExit), patch.dict(BACKENDS), patch.dict(STRATEGIES), patch.dict(READERS):
         _parse(words)
 
