@@ -31,7 +31,7 @@ def told(steps, recording):
         try:
             saved.check(step)
         except UsageError as error:
-            return int(re.search(r"from step (\d+) on", str(error))[1])
+            return int(re.search(r"difference at step (\d+)", str(error))[1])
     return None
 
 
