@@ -21,12 +21,11 @@ from ..terminal.answers import found
 from ..terminal.console import say
 from ..terminal.interrupts import first_interrupt_waits
 from ..terminal.progress import progress
+from ..views.run_lines import SCATTER
 
 WORLD, SEED, STEPS = "paper-fig9", 1, 350.0
 """World and seed, and the approximate number of steps."""
 ESTIMATORS = tuple(dict.fromkeys(("block-ekf", "full-ekf", DRIVER)))
-OVERCONFIDENT = 3.0
-"""An estimator with a larger ANEES is called overconfident; in a single run a consistent one may reach 2 or 3."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def seen(
     told = ", ".join(f"{name} {'-' if score is None else f'{score:.3g}'}" for name, score in scores.items())
     worst = max(scored, key=lambda name: scored[name], default="")
     verdict = "no estimator was found overconfident"
-    if worst and scored[worst] > OVERCONFIDENT:
+    if worst and scored[worst] > SCATTER[1]:
         times = scored[worst] ** 0.5
         verdict = f"{worst} is overconfident: its pose errors are {times:.1f} times as large as its covariance states"
     return (

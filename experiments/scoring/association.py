@@ -67,11 +67,9 @@ class Votes:
 
     def face_of(self, line_id: int) -> int:
         """Return the face that represents a line: the face with most beams, of the wall with most beams; or -1."""
-        votes = self.beams.get(line_id)
-        if votes is None or not votes.any():
+        if (per_wall := self._beams_by_wall(line_id)) is None:
             return UNLABELLED
-        per_wall = np.bincount(self.truth.walls, weights=votes)
-        return int(np.argmax(np.where(self.truth.walls == per_wall.argmax(), votes, -1)))
+        return int(np.argmax(np.where(self.truth.walls == per_wall.argmax(), self.beams[line_id], -1)))
 
     def faces_of(self, ids: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the face of each line, -1 without any beam."""
@@ -84,11 +82,15 @@ class Votes:
 
     def _clear_wall_of(self, line_id: int) -> int:
         """Return the wall of a line by the rule for segments, or `UNLABELLED`."""
-        beams = self.beams.get(line_id)
-        if beams is None or not beams.any():
+        per_wall = self._beams_by_wall(line_id)
+        if per_wall is None or per_wall.max() < ONE_FACE_SHARE * per_wall.sum():
             return UNLABELLED
-        per_wall = np.bincount(self.truth.walls, weights=beams)
-        return int(per_wall.argmax()) if per_wall.max() >= ONE_FACE_SHARE * per_wall.sum() else UNLABELLED
+        return int(per_wall.argmax())
+
+    def _beams_by_wall(self, line_id: int) -> Float[np.ndarray, " w"] | None:
+        """Return how many beams of a line came from each true wall; None if no beam tells."""
+        beams = self.beams.get(line_id)
+        return None if beams is None or not beams.any() else np.bincount(self.truth.walls, weights=beams)
 
     def false_matches(self) -> int:
         """Return how many segments seen on one wall were fused into a line labelled with another."""

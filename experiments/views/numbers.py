@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from chainslam.viz.text import NONE as NONE
+from chainslam.viz.text import NONE
 
 ROUNDING = 1e-9
 """Values nearer to 0 than this are 0 up to rounding."""

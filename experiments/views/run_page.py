@@ -17,6 +17,7 @@ from chainslam.viz.figures.panels import map_figures
 from chainslam.viz.figures.plots import draw_coverage
 from chainslam.viz.reports.drawing import PageDrawing, drawing
 from chainslam.viz.reports.report import Page, PagePicture, PageTable, table
+from chainslam.viz.text import NONE
 
 from ..artifacts.maps.map_files import read_map
 from ..artifacts.maps.mapped import read_corners
@@ -30,7 +31,7 @@ from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 from .measured import measured_tables
-from .numbers import NONE, listed, number
+from .numbers import listed, number
 from .pictures import PicturedRun, draw_all, read_pictured, read_steps
 from .run_lines import SCATTER, lines_of, notes_of
 from .saved_map import picture_alone, saved_map, small_map

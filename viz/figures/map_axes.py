@@ -16,10 +16,10 @@ GRID_M = (1.0, 5.0, 10.0, 50.0, 100.0, 500.0, 1e3, 5e3, 1e4, 5e4, 1e5)
 """Distances of the lines of the grid ..."""
 GRID_LINES = 45
 """... of which the first is taken that needs at most so many."""
+BARS_M = tuple(digit * 10.0**power for power in range(-2, 6) for digit in (1.0, 2.0, 5.0))
+"""Lengths of scale bars."""
 BAR_SHARE = 0.25
-"""Of the sheet's width: the scale bar is no longer than this ..."""
-BARS_M = tuple(digit * 10.0**power for power in range(-1, 6) for digit in (1.0, 2.0, 5.0))
-"""... and has one of these lengths."""
+"""Largest share of a sheet's width that its scale bar takes."""
 
 
 def prepare(axes: Axes, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
@@ -46,12 +46,17 @@ def grid_m(span_m: float) -> float:
     return next((step for step in GRID_M if span_m <= GRID_LINES * step), GRID_M[-1])
 
 
+def bar_m(width_m: float, share: float) -> float:
+    """Return the length of a scale bar, m, that takes no more than this share of a width."""
+    return max((bar for bar in BARS_M if bar <= share * width_m), default=BARS_M[0])
+
+
 def scale_bar(axes: Axes, width_m: float, below: float) -> None:
     """Draw a scale bar in four parts at the right end of the sheet, its length beside it.
 
     `width_m` is what the sheet is wide, `below` how far below it the bar lies, as a share of the sheet's height.
     """
-    length = max((bar for bar in BARS_M if bar <= BAR_SHARE * width_m), default=BARS_M[0])
+    length = bar_m(width_m, BAR_SHARE)
     edges = 1.0 - length / width_m * np.linspace(1.0, 0.0, 5)
     for part, (start, end) in enumerate(pairwise(edges)):
         axes.add_patch(

@@ -15,10 +15,11 @@ from .. import palette
 from ..shapes import ellipses
 from ..text import literal
 from . import own_look
+from .map_axes import bar_m
 
 MARGIN_M = 0.5
-BARS_M = [step * 10.0**decade for decade in range(4, -3, -1) for step in (5.0, 2.0, 1.0)]
-"""Lengths of scale bars, the first that fits is taken."""
+BAR_SHARE = 0.4
+"""Largest share of a small map's width that its scale bar takes."""
 DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
 """Of curves in turn: those that lie on one before them leave it to be seen."""
 
@@ -56,7 +57,7 @@ def _map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.nda
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     paint_map(axes, small, low, high)
-    metres = next(length for length in BARS_M if length <= 0.4 * size[0])
+    metres = bar_m(float(size[0]), BAR_SHARE)
     at = low + 0.02 * size[0]
     axes.plot([at[0], at[0] + metres], [at[1], at[1]], color=palette.INK, linewidth=2.5, solid_capstyle="butt")
     axes.text(at[0] + metres + 0.015 * size[0], at[1], f"{metres:g} m", va="center", fontsize=8, color=palette.INK)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import betaincinv, gammaincinv
+from scipy.special import betaincinv, chdtri
 
 DOF = 3
 POINTS = 61
@@ -38,7 +38,7 @@ def along_path(runs: Sequence[tuple[Float[np.ndarray, " _"], Float[np.ndarray, "
     quarter, median, three_quarters = _quantiles(values, counts)
     half = 0.5 * (np.maximum(counts, 1) + 1.0)
     # The median of n draws is the (n + 1)/2-th smallest, whose rank is beta distributed.
-    band = [_chi2(betaincinv(half, half, level)) for level in (0.5 * (1 - LEVEL), 0.5 * (1 + LEVEL))]
+    band = [chdtri(DOF, 1.0 - betaincinv(half, half, level)) for level in (0.5 * (1 - LEVEL), 0.5 * (1 + LEVEL))]
     return AlongPath(path, median, np.array([quarter, three_quarters]), np.array(band))
 
 
@@ -54,8 +54,3 @@ def _quantiles(values: Float[np.ndarray, "n p"], counts: np.ndarray) -> Float[np
     found = np.full((3, values.shape[1]), np.nan)
     found[:, counts > 0] = np.nanquantile(values[:, counts > 0], (0.25, 0.5, 0.75), axis=0)
     return found
-
-
-def _chi2(share: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
-    """Return the quantile of chi-square with `DOF` degrees of freedom."""
-    return np.asarray(2.0 * gammaincinv(0.5 * DOF, share))

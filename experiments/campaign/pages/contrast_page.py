@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from chainslam.viz.reports.report import Page, PageTable, Section, table
+from chainslam.viz.text import NONE
 
 from ...scoring.statistics import FEW_RUNS
-from ...views.numbers import NONE, number
+from ...views.numbers import number
 from ..comparison.comparison import Row, arm_of
 from ..comparison.families import CLEAR, is_clear
 from ..contrast import TRIALS, read_contrast

@@ -6,8 +6,9 @@ from typing import Any
 
 from chainslam.slam.evaluation.consistency import verdict_on_noise
 from chainslam.viz.reports.report import PageTable, table
+from chainslam.viz.text import NONE
 
-from ...views.numbers import BUILDINGS, NONE, digits_apart, estimated, interval, number, percent
+from ...views.numbers import BUILDINGS, digits_apart, estimated, interval, number, percent
 from ..comparison.consistency import in_words
 from ..comparison.families import is_clear
 from ..plan import CLOSED

@@ -89,6 +89,11 @@ def test_the_lines_name_the_estimator_that_is_overconfident_and_by_how_much():
     assert "4.0 times" in verdict
 
 
+def test_an_estimator_is_called_overconfident_beyond_the_scatter_of_single_runs():
+    last = seen(RUN, {"graph": {"pose_anees_from_start": 3.1}}, Path("map.png"), Path("report.html"))[-1]
+    assert last.startswith("graph is overconfident")
+
+
 @pytest.mark.parametrize("score", [2.9, None])
 def test_no_estimator_is_called_overconfident_where_none_is(score):
     last = seen(RUN, {"graph": {"pose_anees_from_start": score}}, Path("map.png"), Path("report.html"))[-1]
