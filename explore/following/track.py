@@ -8,6 +8,13 @@ from jaxtyping import Float
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.map.stochastic_map import StochasticMap
 
+from ..planning.field import Field
+
+AROUND_M, CELL_M = 0.8, 0.05
+"""The part of the floor, to each side of the robot, on which the next steps are planned, and its cells."""
+ASTRAY = 2.0
+"""A metre nearer to the wall than the stand-off, or farther from it, is worth so many along it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Track:
@@ -26,16 +33,31 @@ class Track:
     length_m: float
     standoff_m: float
 
-    def locate(self, place_world: Float[np.ndarray, "2"]) -> tuple[float, float]:
-        """Return position and distance (m, m) of a place; behind the wall it belongs to the nearer end."""
-        offset = place_world - self.tail_world
-        along, front = float(offset @ self.along), -float(offset @ self.into)
-        past_head = along - self.length_m
-        if front >= 0.0 and along >= 0.0 and past_head <= 0.0:
-            return along, front
-        if along > 0.5 * self.length_m:
-            return self.length_m + self._round(past_head, front), float(np.hypot(past_head, front))
-        return -self._round(-along, front), float(np.hypot(along, front))
+    def locate(self, places_world: Float[np.ndarray, "*n 2"]) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+        """Return positions and distances, m, of some places; behind the wall they belong to the nearer end."""
+        offset = places_world - self.tail_world
+        along, front = offset @ self.along, -(offset @ self.into)
+        is_head = along > 0.5 * self.length_m
+        past = np.where(is_head, along - self.length_m, -along)
+        # Farther round than straight behind, the place lies along the wall again, on its other side.
+        turn = np.arctan2(past, front)
+        turned_m = self.standoff_m * np.where(turn >= -0.5 * np.pi, turn, turn + 2.0 * np.pi)
+        beside = (front >= 0.0) & (past <= 0.0)
+        position = np.where(beside, along, np.where(is_head, self.length_m + turned_m, -turned_m))
+        return position, np.where(beside, front, np.hypot(past, front))
+
+    def field(self, pose_world: Float[np.ndarray, "3"], onward: float) -> Field:
+        """Return how far it is along the track, towards its head (`onward` 1) or tail (-1), from around a pose."""
+        cells = int(np.ceil(AROUND_M / CELL_M))
+        corner = pose_world[:2] - CELL_M * cells
+        x, y = np.meshgrid(*(corner[:, None] + CELL_M * (np.arange(2 * cells) + 0.5)))
+        here, _ = self.locate(pose_world[:2])
+        position, distance = self.locate(np.stack([x, y], axis=-1))
+        ahead = onward * (position - here)
+        metres = AROUND_M + 1.0 - ahead + ASTRAY * np.abs(distance - self.standoff_m)
+        # Behind the wall the way round one end meets that round the other.
+        metres[(np.abs(ahead) > AROUND_M + 1.0) | (distance > 2.0 * self.standoff_m)] = np.inf
+        return Field(metres[..., None], corner, CELL_M, np.zeros(1))
 
     def place(self, position_m: float, distance_m: float) -> Float[np.ndarray, "2"]:
         """Return the place at a position and a distance, world frame, m: the inverse of `locate`."""
@@ -47,12 +69,6 @@ class Track:
     def is_past_end(self, position_m: float) -> bool:
         """Return whether a position lies on the circle round an end."""
         return not 0.0 <= position_m <= self.length_m
-
-    def _round(self, past_m: float, front_m: float) -> float:
-        """Return metres along the circle round an end of a place so far past it and so far in front of the wall."""
-        turn = np.arctan2(past_m, front_m)
-        # Farther round than straight behind, the place lies along the wall again, on its other side.
-        return self.standoff_m * float(turn if turn >= -0.5 * np.pi else turn + 2.0 * np.pi)
 
 
 def track_of(wall: int, walls: StochasticMap, standoff_m: float) -> Track:

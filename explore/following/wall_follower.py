@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
-from jaxtyping import Float
 
-from chainslam.slam.geometry.poses import to_robot, wrap
+from chainslam.slam.geometry.poses import wrap
 from chainslam.slam.map.chains import HEAD, TAIL
 from chainslam.slam.robot import MotionCommand
 
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
 from .behaviour import Behaviour
-from .driving import Ahead, ahead_of, careful
-from .safe_steps import step_away, step_towards
+from .driving import Controller, obstacles
 from .track import Track, track_of
 from .wall_following import FollowingConfig, PlaceErrand, Surroundings
 
-LOOKAHEADS_M = (0.3, 0.15)
-"""The robot aims at the place of the track so far ahead; at the nearer one where no step towards the other is safe."""
+AIM_M, FACING_RAD = 0.3, float(np.deg2rad(30.0))
+"""The robot has turned round once it faces the place of the track so far ahead to within this."""
 ON_TRACK = 0.3
 """An approach ends within this share of the stand-off of the track; following goes on up to twice the stand-off."""
 PROGRESS_M, PATIENCE_STEPS = 0.02, 30
@@ -43,6 +40,7 @@ class WallFollower:
         """Follow `wall`, towards `side` (`TAIL` or `HEAD`) first; without a side, towards the nearer end."""
         self.wall = wall
         self._side, self._config = side, config
+        self._controller = Controller(config.driving)
         self._approach: PlaceErrand | None = None
         self._is_on_track, self._is_turning = False, False
         self._farthest_m, self._since, self._failed = -np.inf, 0, False
@@ -72,7 +70,7 @@ class WallFollower:
             self.trouble = f"wall {self.wall} is no longer in the map"
             return None
         track = track_of(self.wall, around.walls, self._config.viewpoints.standoff_m)
-        position_m, distance_m = track.locate(around.pose_world[:2])
+        position_m, distance_m = (float(each) for each in track.locate(around.pose_world[:2]))
         if self._side is None:
             self._side = TAIL if position_m < 0.5 * track.length_m else HEAD
         if not self._on_track(track, position_m, distance_m):
@@ -131,52 +129,30 @@ class WallFollower:
         if not self._failed:  # in a tight place the noise of one scan may leave no safe step
             self._failed = True
             return MotionCommand(0.0, 0.0)
-        points = self._ahead(np.zeros(2), around).points_robot
-        away = step_away(points, self._config.driving)
-        if self._in_vain and self._since <= PATIENCE_STEPS and away is not None:
-            return away  # it turned back so near to a wall that neither way along the track is safe
         self._reverse()
-        return self._along(track, position_m, around) or away or MotionCommand(0.0, 0.0)
+        return self._along(track, position_m, around) or MotionCommand(0.0, 0.0)
 
     def _along(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand | None:
         """Return a safe step along the track, as near to the stand-off as there is one; None where there is none."""
-        onward = 1.0 if self._side == HEAD else -1.0
-        for distance_m, lookahead_m in product(self._distances(track.standoff_m), LOOKAHEADS_M):
-            aim_world = track.place(position_m + onward * lookahead_m, distance_m)
-            aim_robot = to_robot(aim_world[None], around.pose_world)[0]
-            seen = self._ahead(aim_robot, around)
-            command = step_towards(seen.aim_robot, seen.points_robot, self._config.driving, seen.fits)
-            if command is not None:
-                command = self._off_the_wall(command, seen.points_robot)
-                turn_rad = abs(float(wrap(np.arctan2(aim_robot[1], aim_robot[0]))))
-                self._is_turning = self._is_turning and turn_rad > self._config.driving.spin_rad
-                self.behaviour = self._word(track, position_m)
-                return careful(command, around.pose_world, around.free_space, self._config.driving)
-        return None
-
-    def _off_the_wall(self, command: MotionCommand, points_robot: Float[np.ndarray, "m 2"]) -> MotionCommand:
-        """Return a step away from a return within the margin in place of a turn on the spot, which slips aside."""
-        driving = self._config.driving
-        gap_m = np.hypot(points_robot[:, 0], points_robot[:, 1]).min(initial=np.inf)
-        if command.forward_m != 0.0 or gap_m > driving.radius_m + driving.margin_m:
-            return command
-        return step_away(points_robot, driving) or command
+        onward, pose = 1.0 if self._side == HEAD else -1.0, around.pose_world
+        points = obstacles(around.scan, around.recent_robot, around.touched_robot, self._config.driving)
+        command = self._controller.command(pose, points, track.field(pose, onward), around.free_space)
+        if command is not None:
+            aim = track.place(position_m + onward * AIM_M, track.standoff_m) - pose[:2]
+            turn_rad = abs(float(wrap(np.arctan2(aim[1], aim[0]) - pose[2])))
+            self._is_turning = self._is_turning and turn_rad > FACING_RAD
+            self.behaviour = self._word(track, position_m)
+        return command
 
     def _word(self, track: Track, position_m: float) -> Behaviour:
         if self._is_turning:
             return Behaviour.REVERSE
         return Behaviour.ROUND if track.is_past_end(position_m) else Behaviour.FOLLOW
 
-    def _distances(self, standoff_m: float) -> Float[np.ndarray, 3]:
-        """Return the distances from the wall that will do, the stand-off first, then nearer ones."""
-        return np.linspace(standoff_m, self._config.viewpoints.close_m, 3)
-
     def _reverse(self) -> None:
         self._side = TAIL + HEAD - (HEAD if self._side is None else self._side)
         self._turns, self._in_vain = self._turns + 1, self._in_vain + 1
         self._is_turning, self._failed = True, False
         self._farthest_m, self._since = -np.inf, 0
+        self._controller = Controller(self._config.driving)
         self.behaviour = Behaviour.REVERSE
-
-    def _ahead(self, aim_robot: Float[np.ndarray, 2], around: Surroundings) -> Ahead:
-        return ahead_of(aim_robot, around.scan, around.recent_robot, around.touched_robot, self._config.driving)

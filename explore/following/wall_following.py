@@ -27,7 +27,6 @@ from ..survey.viewpoints import ViewpointsConfig
 from .behaviour import Behaviour
 from .driving import Pilot
 from .driving_config import DrivingConfig
-from .pose_pilot import pilot_of
 
 Following = Literal["viewpoints", "paper"]
 
@@ -208,7 +207,7 @@ class Errand(ABC):
         if way is None:
             return False
         self.walls_to_follow, self._no_way = way.walls, ""
-        self._pilot = pilot_of(way.path, way.planner, self._config.driving)
+        self._pilot = Pilot(way.path, way.planner, self._config.driving)
         return True
 
 

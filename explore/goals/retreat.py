@@ -16,7 +16,7 @@ from ..floor.accumulated_returns import returns
 from ..floor.floor_memory import FloorMemory
 from ..floor.touches import Touches
 from ..following.behaviour import Behaviour
-from ..following.safe_steps import keeps_clear
+from ..following.driving import keeps_clear
 from ..following.wall_following import FollowingConfig, Surroundings
 from ..outcome import Outcome
 from ..planning.driving_field import DrivingField

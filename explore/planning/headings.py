@@ -53,20 +53,12 @@ def cheapest(
 
     Cells are (row, column) of `ground.metre`. None where no way leads to any. Without a heading any will do to begin.
     """
-    cells = np.argwhere(ground.metre > 0.0)
-    at = np.full(ground.metre.shape, -1)
-    at[tuple(cells.T)] = np.arange(len(cells))
+    driven = _Driven(ground, room, start, heading_rad)
+    cells, at, graph = driven.cells, driven.at, driven.graph
     if at[tuple(start)] < 0:
         return None
-    of = ground.occupied, cells + ground.corner, room.robot, ground.cell_m
-    fits, has_room = rooms_of(*of, room.squeeze_m), rooms_of(*of, room.margin_m)
-    begins = np.arange(COUNT) if heading_rad is None else np.array([heading_of(heading_rad)])
-    fits[np.ix_(at[tuple(np.argwhere(ground.escape).T)], begins)] = True
-    fits[at[tuple(start)], begins] = True
-    costs = ground.metre[tuple(cells.T)][:, None] + np.where(has_room, 0.0, room.squeeze_cost)
-    graph = _graph(cells, at, fits, costs, ground.cell_m, room.robot.can_reverse)
     lengths, before, _ = dijkstra(
-        graph, indices=COUNT * at[tuple(start)] + begins, return_predecessors=True, min_only=True
+        graph, indices=COUNT * at[tuple(start)] + driven.begins, return_predecessors=True, min_only=True
     )
     rows = at[tuple(goals.T)]
     at_goals = np.where(rows >= 0, lengths.reshape(-1, COUNT)[rows].min(axis=1), np.inf)
@@ -79,6 +71,41 @@ def cheapest(
         nodes.append(node)
     way = np.array(nodes[::-1])
     return cells[way // COUNT], HEADINGS_RAD[way % COUNT], float(at_goals[best]), best
+
+
+def costs_to(
+    ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None, goal: Int[np.ndarray, "2"]
+) -> tuple[Float[np.ndarray, "p q k"], Float[np.ndarray, " k"]]:
+    """Return what the cheapest way from each cell and heading to a cell costs, in cells, and the headings, ascending.
+
+    Cells as above; infinite where no way leads.
+    """
+    driven = _Driven(ground, room, start, heading_rad)
+    goals = COUNT * driven.at[tuple(goal)] + np.arange(COUNT)
+    lengths = dijkstra(driven.graph.T.tocsr(), indices=goals, min_only=True)
+    costs = np.full((*ground.metre.shape, COUNT), np.inf)
+    order = np.argsort(HEADINGS_RAD)
+    costs[tuple(driven.cells.T)] = lengths.reshape(-1, COUNT)[:, order]
+    return costs, HEADINGS_RAD[order]
+
+
+class _Driven:
+    """Cells and headings as a graph."""
+
+    def __init__(
+        self, ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None
+    ) -> None:
+        self.cells = cells = np.argwhere(ground.metre > 0.0)
+        self.at = np.full(ground.metre.shape, -1)
+        self.at[tuple(cells.T)] = np.arange(len(cells))
+        self.begins = np.arange(COUNT) if heading_rad is None else np.array([heading_of(heading_rad)])
+        of = ground.occupied, cells + ground.corner, room.robot, ground.cell_m
+        fits, has_room = rooms_of(*of, room.squeeze_m), rooms_of(*of, room.margin_m)
+        fits[np.ix_(self.at[tuple(np.argwhere(ground.escape).T)], self.begins)] = True
+        if self.at[tuple(start)] >= 0:
+            fits[self.at[tuple(start)], self.begins] = True
+        costs = ground.metre[tuple(cells.T)][:, None] + np.where(has_room, 0.0, room.squeeze_cost)
+        self.graph = _graph(cells, self.at, fits, costs, ground.cell_m, room.robot.can_reverse)
 
 
 def _graph(

@@ -11,7 +11,8 @@ from skimage.graph import MCP_Geometric
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any, cells_of
-from .headings import Ground, Room, cheapest
+from .field import Field, outwards
+from .headings import Ground, Room, cheapest, costs_to
 from .passable import PathConfig, blind_blocks, metre_costs, passable
 
 BESIDE_M = 1.0
@@ -105,11 +106,30 @@ class Planner:
         best = int(np.argmin(at_ends))
         if not np.isfinite(at_ends[best]):
             return None
-        corridor = np.zeros(costs.shape, dtype=bool)
+        return self._beside(np.array(search.traceback(tuple(ends[best]))))
+
+    def _beside(self, blocks: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, "p q"]:
+        """Return the blocks beside some."""
+        corridor = np.zeros(self._passable_blocks.shape, dtype=bool)
         beside = int(np.ceil(BESIDE_M / (self._block * self._free_space.config.cell_m) - 1e-9))
-        for r, c in search.traceback(tuple(ends[best])):
+        for r, c in blocks.tolist():
             corridor[max(r - beside, 0) : r + beside + 1, max(c - beside, 0) : c + beside + 1] = True
         return corridor
+
+    def field(self, points_world: Float[np.ndarray, "n 2"]) -> Field:
+        """Return how far it is to drive from everywhere beside a path to its end."""
+        cells = self._free_space.cells(points_world) - self._corner
+        corner, metre = self._ground(self._beside(np.unique(cells // self._block, axis=0)))
+        goal = np.clip(cells[-1] - corner, 0, np.array(metre.shape) - 1)
+        metre[tuple(goal)] = np.abs(metre[tuple(goal)])
+        cell_m, headings = self._free_space.config.cell_m, np.zeros(1)
+        if self._config.robot.outline_m is not None:
+            lengths, headings = costs_to(*self._room_on(corner, metre), cells[0] - corner, self._heading_rad, goal)
+        else:
+            lengths = MCP_Geometric(metre).find_costs([tuple(goal.tolist())])[0][..., None]
+        metres = outwards(cell_m * lengths, cell_m)
+        metres[tuple(slice(max(k - 1, 0), k + 2) for k in goal.tolist())] = 0.0
+        return Field(metres, self._free_space.origin_world + cell_m * (corner + self._corner)[::-1], cell_m, headings)
 
     def _cheapest(
         self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]
@@ -118,19 +138,14 @@ class Planner:
 
         It leads over the blocks of a corridor; the cost is in cells. A disc has no headings.
         """
-        blocks = np.argwhere(corridor)
-        first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
-        corner, past = self._block * first, self._block * end
-        box = (slice(corner[0], past[0]), slice(corner[1], past[1]))
-        metre = self._metre(box)
-        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape, self._block)] = -1.0
+        corner, metre = self._ground(corridor)
         goals, start = goals - corner, self._start - corner
         inside = np.flatnonzero(np.all((goals >= 0) & (goals < metre.shape), axis=1))
         inside = inside[metre[tuple(goals[inside].T)] > 0]
         if not len(inside):
             return None
         if self._config.robot.outline_m is not None:
-            found = self._by_headings(corner, metre, start, goals[inside])
+            found = cheapest(*self._room_on(corner, metre), start, self._heading_rad, goals[inside])
             return None if found is None else (found[0] + corner, *found[1:3], int(inside[found[3]]))
         ends = [tuple(cell) for cell in goals[inside].tolist()]
         search = MCP_Geometric(metre)
@@ -142,19 +157,21 @@ class Planner:
         way = np.array(search.traceback(ends[best]), dtype=np.int64) + corner
         return way, None, float(at_ends[best]), int(inside[best])
 
-    def _by_headings(
-        self,
-        corner: Int[np.ndarray, "2"],
-        metre: Float[np.ndarray, "h w"],
-        start: Int[np.ndarray, "2"],
-        goals: Int[np.ndarray, "g 2"],
-    ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], float, int] | None:
-        """Return the way of a body with an outline over a part of the window that begins at a corner."""
+    def _ground(self, corridor: Bool[np.ndarray, "p q"]) -> tuple[Int[np.ndarray, "2"], Float[np.ndarray, "h w"]]:
+        """Return the first cell of the part of the window that holds a corridor, and what a metre costs in it."""
+        blocks = np.argwhere(corridor)
+        first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
+        corner, past = self._block * first, self._block * end
+        metre = self._metre((slice(corner[0], past[0]), slice(corner[1], past[1])))
+        metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape, self._block)] = -1.0
+        return corner, metre
+
+    def _room_on(self, corner: Int[np.ndarray, "2"], metre: Float[np.ndarray, "h w"]) -> tuple[Ground, Room]:
+        """Return the ground and the room of a body with an outline on a part of the window that begins at a corner."""
         config, first = self._config, corner + self._corner
         part = tuple(slice(c, c + n) for c, n in zip(corner.tolist(), metre.shape, strict=True))
         ground = Ground(self._free_space.occupied, first, metre, self._escape[part], self._free_space.config.cell_m)
-        room = Room(config.robot, config.squeeze_beyond_m, config.margin_m, config.squeeze_cost)
-        return cheapest(ground, room, start, self._heading_rad, goals)
+        return ground, Room(config.robot, config.squeeze_beyond_m, config.margin_m, config.squeeze_cost)
 
     def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
         """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
