@@ -55,7 +55,7 @@ class Controller:
         if len(plan) < config.short or not np.isfinite(cost_m):
             apart = np.array([config.apart_m, 0.5 * config.robot.turn_rad])
             found, _ = search(
-                pose_world, points, motions, field, config.horizon_m, apart, config.poses, config.gain_m
+                pose_world, points, motions, field, config.horizon_m, apart, config.gain_m
             )
             new_m = cost_of_plan(pose_world, found, points, motions, field) if len(found) else np.inf
             if new_m < cost_m - config.better_m or not np.isfinite(cost_m):
@@ -154,9 +154,10 @@ def motions_of(config: DrivingConfig) -> tuple[tuple[MotionCommand, ...], Motion
         slip = [np.sqrt(robot.wheels.over_arc(f, t).cov[2, 2]) for f, t in zip(forward, turn, strict=True)]
         clear_m += SWING_SIGMAS * (robot.radius_m - robot.half_width_m) * np.array(slip)
     turn_m = 0.5 * (0.5 * robot.wheels.base_m + config.step_cost_m / robot.turn_rad)
+    metre = 1.0 + config.step_cost_m / robot.step_m
     motions = Motions(
-        np.ascontiguousarray(places), wheel_m + config.step_cost_m, clear_m, config.wide_m, turn_m,
-        float(config.back if robot.can_reverse else 1e9), 1.0 + config.step_cost_m / robot.step_m,
+        np.ascontiguousarray(places), wheel_m + config.step_cost_m, clear_m, config.wide_m, config.rest * turn_m,
+        float(config.back if robot.can_reverse else 1e9), config.rest * metre,
         np.array(robot.outline_m or _NOTHING, dtype=np.float64), float(robot.radius_m),
     )  # fmt: skip
     return commands, motions

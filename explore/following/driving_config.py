@@ -23,12 +23,12 @@ class DrivingConfig:
     """What a step costs besides the way of the faster wheel."""
     back: Factor = 1.5
     """What a metre backwards costs, of one ahead."""
+    rest: Factor = 2.0
+    """The way beyond the horizon weighs so many times as much as that up to it: fewer poses are looked at."""
     better_m: Distance = 0.1
     """A plan is kept until another is cheaper by this."""
     gain_m: Distance = 0.05
     """Where no way to the horizon is found, one that saves so much will do."""
-    poses: Count = 1500
-    """So many poses are looked on from, at most, until there is no plan."""
     careful_m: Size = 0.05
     """Longest step onto floor that no scan has seen."""
     obstructed_within_m: Distance = 0.03

@@ -13,6 +13,8 @@ from ..planning.field import Field
 
 WALK_CELLS = 6
 """Where the field leads on from a place is told over so many cells."""
+MOST, TABLE = 8192, 1 << 14
+"""A search looks at so many poses at most, and finds them again in a table of this size."""
 
 
 class Motions(NamedTuple):
@@ -205,20 +207,17 @@ def search(
     field: Field,
     horizon_m: float,
     apart: Float[np.ndarray, "2"],
-    most: int,
     gain_m: float,
 ) -> tuple[Int[np.ndarray, " n"], int]:
     """Return the steps of the cheapest way to the horizon or to the end of the field, and how many poses were expanded.
 
-    Poses no farther `apart` (m, rad) count as one. After `most` of them, the way to the best so far will do if it saves
+    Poses no farther `apart` (m, rad) count as one. After `MOST` of them, the way to the best so far will do if it saves
     `gain_m`; else there is none.
     """
     count_a = len(motions.costs_m)
-    room = most * count_a + 1
-    poses, spent, clear = np.empty((room, 3)), np.empty(room), np.empty(room)
-    parent, by = np.empty(room, np.int64), np.empty(room, np.int64)
-    size = 1 << 17
-    keys, least_g = np.zeros(size, np.int64), np.empty(size)
+    poses, spent, clear = np.empty((MOST, 3)), np.empty(MOST), np.empty(MOST)
+    parent, by = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    keys, least_g = np.zeros(TABLE, np.int64), np.empty(TABLE)
     longest = 0.0
     for a in range(count_a):
         longest = max(longest, math.hypot(motions.places[a, -1, 0], motions.places[a, -1, 1]))
@@ -232,7 +231,7 @@ def search(
     best, best_m = -1, first_m - gain_m
     queue = [(first_m, 0)]
     count, expanded, found = 1, 0, -1
-    while len(queue) > 0 and expanded < most:
+    while len(queue) > 0 and count + count_a <= MOST:
         _, node = heappop(queue)
         x, y, heading = poses[node]
         g = spent[node]
