@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from chainslam.slam.geometry.quantities import Count, Distance, Factor, Share, Size
+from chainslam.slam.geometry.quantities import Distance, Factor, Share, Size
 from chainslam.slam.robot import RobotSpec, of_robot
 
 
@@ -31,32 +31,8 @@ class DrivingConfig:
     """Where no way to the horizon is found, one that saves so much will do."""
     careful_m: Size = 0.05
     """Longest step onto floor that no scan has seen."""
-    obstructed_within_m: Distance = 0.03
-    """A return that reaches into the body's path by more than this is an obstacle, and another path is planned."""
-    short: Count = 2
-    """A plan of fewer steps is made anew."""
 
     @property
     def radius_m(self) -> float:
         """The robot's disc; of an outline, the one around it: distances are told as from its middle (`reaches_m`)."""
         return self.robot.radius_m
-
-    @property
-    def horizon_m(self) -> float:
-        """Distance to which whole steps are planned."""
-        return self.horizon * self.robot.step_m
-
-    @property
-    def apart_m(self) -> float:
-        """Poses this near to one another count as one where steps are planned."""
-        return self.robot.step_m / 12.0
-
-    @property
-    def obstructed_m(self) -> float:
-        """A return this near to the path ahead is in the way."""
-        return self.robot.beside(-self.obstructed_within_m)
-
-    @property
-    def slow_m(self) -> float:
-        """Longest careful step: no longer than any."""
-        return min(self.careful_m, self.robot.step_m)

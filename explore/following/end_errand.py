@@ -39,12 +39,13 @@ class EndErrand(Errand):
         """To a viewpoint, or along a wall of the route to it."""
         return Behaviour.FOLLOW if self._on_route else Behaviour.LOOK
 
-    def _arrived(self) -> None:
+    def _arrived(self) -> bool:
         if self._on_route:
             self._on_route = False
             self._shortest_m, self._stalled = np.inf, 0
-            return
+            return False
         super()._arrived()
+        return True
 
     def _plan(self, around: Surroundings) -> bool:
         planner = self._planner(around, self._config.window_m)

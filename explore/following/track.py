@@ -8,7 +8,7 @@ from jaxtyping import Float
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from ..planning.field import Field
+from ..planning.paths import Field
 
 AROUND_M, CELL_M = 0.8, 0.05
 """The part of the floor, to each side of the robot, on which the next steps are planned, and its cells."""
@@ -33,7 +33,9 @@ class Track:
     length_m: float
     standoff_m: float
 
-    def locate(self, places_world: Float[np.ndarray, "*n 2"]) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    def locate(
+        self, places_world: Float[np.ndarray, "*n 2"]
+    ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
         """Return positions and distances, m, of some places; behind the wall they belong to the nearer end."""
         offset = places_world - self.tail_world
         along, front = offset @ self.along, -(offset @ self.into)
@@ -57,7 +59,7 @@ class Track:
         metres = AROUND_M + 1.0 - ahead + ASTRAY * np.abs(distance - self.standoff_m)
         # Behind the wall the way round one end meets that round the other.
         metres[(np.abs(ahead) > AROUND_M + 1.0) | (distance > 2.0 * self.standoff_m)] = np.inf
-        return Field(metres[..., None], corner, CELL_M, np.zeros(1))
+        return Field(metres[..., None], corner, CELL_M)
 
     def place(self, position_m: float, distance_m: float) -> Float[np.ndarray, "2"]:
         """Return the place at a position and a distance, world frame, m: the inverse of `locate`."""

@@ -13,7 +13,7 @@ from chainslam.slam.robot import MotionCommand
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
 from .behaviour import Behaviour
-from .driving import Controller, obstacles
+from .driving import Controller
 from .track import Track, track_of
 from .wall_following import FollowingConfig, PlaceErrand, Surroundings
 
@@ -135,8 +135,7 @@ class WallFollower:
     def _along(self, track: Track, position_m: float, around: Surroundings) -> MotionCommand | None:
         """Return a safe step along the track, as near to the stand-off as there is one; None where there is none."""
         onward, pose = 1.0 if self._side == HEAD else -1.0, around.pose_world
-        points = obstacles(around.scan, around.recent_robot, around.touched_robot, self._config.driving)
-        command = self._controller.command(pose, points, track.field(pose, onward), around.free_space)
+        command = self._controller.command(around, track.field(pose, onward))
         if command is not None:
             aim = track.place(position_m + onward * AIM_M, track.standoff_m) - pose[:2]
             turn_rad = abs(float(wrap(np.arctan2(aim[1], aim[0]) - pose[2])))

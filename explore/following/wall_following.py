@@ -27,6 +27,7 @@ from ..survey.viewpoints import ViewpointsConfig
 from .behaviour import Behaviour
 from .driving import Pilot
 from .driving_config import DrivingConfig
+from .surroundings import Surroundings
 
 Following = Literal["viewpoints", "paper"]
 
@@ -71,38 +72,6 @@ class FollowingConfig:
         return self.robot.steps_of(self.stall_m)
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What one step of driving may know."""
-
-    walls: StochasticMap
-    free_space: FreeSpace
-    scan: Scan
-    recent_robot: Float[np.ndarray, "r 2"] = field(default_factory=lambda: np.zeros((0, 2)))
-    """What the scans before this one hit nearby, m, in the robot's frame of now."""
-    touched_robot: Float[np.ndarray, "t 2"] = field(default_factory=lambda: np.zeros((0, 2)))
-    """What the body touched, likewise."""
-    graph: nx.DiGraph[int] = field(default_factory=nx.DiGraph)
-    """The visibility graph of the walls."""
-    odometry: Odometry = field(default_factory=lambda: Odometry(np.zeros(3), np.zeros((3, 3))))
-    """The motion that led here."""
-    seen: tuple[int, ...] = ()
-    """Ids of the walls that the scan shows."""
-    nis: Nis = NO_NIS
-    """How far they lay from where the belief predicted them."""
-    is_lost: bool = False
-    """The scan fits nowhere in the map, so nobody knows where the robot is."""
-    is_leap_pending: bool = False
-    """It fits elsewhere in the map, and a scan from another place has to say the same."""
-    fault: str = ""
-    """What is wrong with the robot, in words, where the last scans say so."""
-
-    @property
-    def pose_world(self) -> Float[np.ndarray, 3]:
-        """The estimated pose."""
-        return self.walls.belief.pose_world
-
-
 class Errand(ABC):
     """Drives to a sequence of places, one after the other, each given as a set of points that will do."""
 
@@ -132,17 +101,16 @@ class Errand(ABC):
                 return None
             if self._pilot is not None and self._pilot.arrived(around.pose_world):
                 self._pilot = None
-                self._arrived()
+                if self._arrived():
+                    return MotionCommand(0.0, 0.5 * self._config.robot.turn_rad)
             if self._pilot is None and not self._plan(around):
                 return None
             assert self._pilot is not None
-            obstructed = self._pilot.is_obstructed(around.pose_world, around.scan)
-            seen = around.scan, around.free_space, around.recent_robot, around.touched_robot
-            command = None if obstructed else self._pilot.command(around.pose_world, *seen)
-            if command is not None and not self._is_stalled(self._pilot.remaining_m):
+            command = self._pilot.command(around)
+            if command is not None and not self._is_stalled(self._pilot.remaining_m(around.pose_world)):
                 return command
             self._blocked(around)
-            if command is None and not obstructed and self._failures:
+            if command is None and self._failures:
                 return MotionCommand(0.0, 0.0)  # in a tight gap the noise of one scan may leave no safe step
         return None
 
@@ -165,14 +133,19 @@ class Errand(ABC):
             self.trouble = f"got no nearer in {self._config.stall_steps} steps"
         return self._hopeless
 
-    def _arrived(self) -> None:
+    def _arrived(self) -> bool:
+        """Take note that the robot stands at the present place; return whether it looks twice from there.
+
+        A second scan, half a step of turn on, has its beams between those of the first.
+        """
         self._next_stage()
         self.looks_done += 1
+        return False
 
     def _blocked(self, around: Surroundings) -> None:
         assert self._pilot is not None
         self._failures += 1
-        squeeze = self._pilot.squeeze_world
+        squeeze = self._pilot.squeeze_world(around.pose_world)
         if squeeze is not None and (self._hopeless or self._failures >= self._config.squeezes):
             around.free_space.note_too_tight(squeeze)
         self._pilot = None

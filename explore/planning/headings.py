@@ -48,64 +48,37 @@ class Room:
 
 def cheapest(
     ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None, goals: Int[np.ndarray, "g 2"]
-) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], float, int] | None:
-    """Return cells and headings rad of the cheapest way to the cheapest of some cells, its cost in cells, and to which.
+) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], Float[np.ndarray, "p q k"]] | None:
+    """Return cells and headings rad of the cheapest way to the cheapest of some cells, and what ways from anywhere cost.
 
-    Cells are (row, column) of `ground.metre`. None where no way leads to any. Without a heading any will do to begin.
+    Cells are (row, column) of `ground.metre`, and costs are in cells, infinite where no way leads. None where none
+    leads to any from the start. Without a heading any will do to begin.
     """
-    driven = _Driven(ground, room, start, heading_rad)
-    cells, at, graph = driven.cells, driven.at, driven.graph
+    cells = np.argwhere(ground.metre > 0.0)
+    at = np.full(ground.metre.shape, -1)
+    at[tuple(cells.T)] = np.arange(len(cells))
     if at[tuple(start)] < 0:
         return None
-    lengths, before, _ = dijkstra(
-        graph, indices=COUNT * at[tuple(start)] + driven.begins, return_predecessors=True, min_only=True
-    )
+    of = ground.occupied, cells + ground.corner, room.robot, ground.cell_m
+    fits, has_room = rooms_of(*of, room.squeeze_m), rooms_of(*of, room.margin_m)
+    begins = np.arange(COUNT) if heading_rad is None else np.array([heading_of(heading_rad)])
+    fits[np.ix_(at[tuple(np.argwhere(ground.escape).T)], begins)] = True
+    fits[at[tuple(start)], begins] = True
+    costs = ground.metre[tuple(cells.T)][:, None] + np.where(has_room, 0.0, room.squeeze_cost)
+    graph = _graph(cells, at, fits, costs, ground.cell_m, room.robot.can_reverse)
     rows = at[tuple(goals.T)]
-    at_goals = np.where(rows >= 0, lengths.reshape(-1, COUNT)[rows].min(axis=1), np.inf)
-    best = int(np.argmin(at_goals))
-    if not np.isfinite(at_goals[best]):
+    ends = np.unique(COUNT * rows[rows >= 0, None] + np.arange(COUNT))
+    lengths, after, _ = dijkstra(graph, indices=ends, return_predecessors=True, min_only=True)
+    nodes = COUNT * at[tuple(start)] + begins
+    node = int(nodes[np.argmin(lengths[nodes])])
+    if not np.isfinite(lengths[node]):
         return None
-    node = COUNT * rows[best] + int(np.argmin(lengths.reshape(-1, COUNT)[rows[best]]))
     nodes = [node]
-    while (node := int(before[node])) >= 0:
+    while (node := int(after[node])) >= 0:
         nodes.append(node)
-    way = np.array(nodes[::-1])
-    return cells[way // COUNT], HEADINGS_RAD[way % COUNT], float(at_goals[best]), best
-
-
-def costs_to(
-    ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None, goal: Int[np.ndarray, "2"]
-) -> tuple[Float[np.ndarray, "p q k"], Float[np.ndarray, " k"]]:
-    """Return what the cheapest way from each cell and heading to a cell costs, in cells, and the headings, ascending.
-
-    Cells as above; infinite where no way leads.
-    """
-    driven = _Driven(ground, room, start, heading_rad)
-    goals = COUNT * driven.at[tuple(goal)] + np.arange(COUNT)
-    lengths = dijkstra(driven.graph.T.tocsr(), indices=goals, min_only=True)
-    costs = np.full((*ground.metre.shape, COUNT), np.inf)
-    order = np.argsort(HEADINGS_RAD)
-    costs[tuple(driven.cells.T)] = lengths.reshape(-1, COUNT)[:, order]
-    return costs, HEADINGS_RAD[order]
-
-
-class _Driven:
-    """Cells and headings as a graph."""
-
-    def __init__(
-        self, ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None
-    ) -> None:
-        self.cells = cells = np.argwhere(ground.metre > 0.0)
-        self.at = np.full(ground.metre.shape, -1)
-        self.at[tuple(cells.T)] = np.arange(len(cells))
-        self.begins = np.arange(COUNT) if heading_rad is None else np.array([heading_of(heading_rad)])
-        of = ground.occupied, cells + ground.corner, room.robot, ground.cell_m
-        fits, has_room = rooms_of(*of, room.squeeze_m), rooms_of(*of, room.margin_m)
-        fits[np.ix_(self.at[tuple(np.argwhere(ground.escape).T)], self.begins)] = True
-        if self.at[tuple(start)] >= 0:
-            fits[self.at[tuple(start)], self.begins] = True
-        costs = ground.metre[tuple(cells.T)][:, None] + np.where(has_room, 0.0, room.squeeze_cost)
-        self.graph = _graph(cells, self.at, fits, costs, ground.cell_m, room.robot.can_reverse)
+    way, everywhere = np.array(nodes), np.full((*ground.metre.shape, COUNT), np.inf)
+    everywhere[tuple(cells.T)] = lengths.reshape(-1, COUNT)
+    return cells[way // COUNT], HEADINGS_RAD[way % COUNT], everywhere
 
 
 def _graph(
@@ -116,7 +89,7 @@ def _graph(
     cell_m: float,
     can_reverse: bool,
 ) -> csr_array:
-    """Return what it costs, in cells, to get from one cell and heading to another; nodes count heading by heading."""
+    """Return what it costs, in cells, to get to one cell and heading from another; nodes count heading by heading."""
     edges: list[tuple[Int[np.ndarray, " e"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]] = []
     padded = np.pad(at, 2, constant_values=-1)
     every = np.arange(len(cells))
@@ -133,4 +106,4 @@ def _graph(
         turn = np.full(len(both), TURN_M / cell_m)
         edges += [(COUNT * both + k, COUNT * both + beside, turn), (COUNT * both + beside, COUNT * both + k, turn)]
     heads, tails, lengths = (np.concatenate(each) for each in zip(*edges, strict=True))
-    return csr_array((lengths, (heads, tails)), shape=(COUNT * len(cells), COUNT * len(cells)))
+    return csr_array((lengths, (tails, heads)), shape=(COUNT * len(cells), COUNT * len(cells)))

@@ -3,6 +3,7 @@
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,14 +12,29 @@ from skimage.graph import MCP_Geometric
 
 from ..floor.free_space import FreeSpace
 from .coarse_grid import block_cells, blocks_with_any, cells_of
-from .field import Field, outwards
-from .headings import Ground, Room, cheapest, costs_to
+from .headings import Ground, Room, cheapest
 from .passable import PathConfig, blind_blocks, metre_costs, passable
 
 BESIDE_M = 1.0
 """Paths are sought so far to each side of the shortest way by blocks."""
 ESCAPE_COST = 30.0
 """What a metre costs where the robot gets away from a wall that it is too near to."""
+
+
+OUTWARDS_CELLS, OUTWARDS_COST = 3, 8.0
+"""So far beyond where the body fits a field goes on, at so much a metre: the robot may stand there, and gets away.
+
+Two walls leave more cells between them in which it does not fit."""
+
+
+class Field(NamedTuple):
+    """How far it is to drive to some places from everywhere around the way there."""
+
+    metres: Float[np.ndarray, "h w k"]
+    """By cell and, for a body with an outline, by heading, ahead first; infinite where no way leads."""
+    corner_world: Float[np.ndarray, "2"]
+    """Where the first cell begins."""
+    cell_m: float
 
 
 @dataclass(frozen=True)
@@ -29,10 +45,8 @@ class Path:
     """Cell centres from the robot to the goal, m."""
     cost: float
     """Length in metres, with what narrow places cost on top."""
-    reached: int
-    """Which of the places asked for was the cheapest."""
-    headings_rad: Float[np.ndarray, " n"] | None = None
-    """Of a body with an outline, its heading at each of the points; None for a disc, which has none to keep."""
+    field: Field
+    """What is left of the way to any of the places from around it, a metre in a narrow place for more."""
 
 
 class Planner:
@@ -78,19 +92,9 @@ class Planner:
         corridor = self._corridor(cells[usable])
         if corridor is None:
             return None
-        found = self._cheapest(cells[usable], corridor)
-        if found is None:
-            # A block may hold cells that do not hang together, so that the way by blocks may be none.
-            usable = usable[self._is_connected[tuple(cells[usable].T)]]
-            found = self._cheapest(cells[usable], np.ones_like(corridor))
-        if found is None:
-            return None
-        way, headings, cost, reached = found
-        return Path(
-            self._free_space.points(way + self._corner),
-            cost * self._free_space.config.cell_m,
-            int(usable[reached]),
-            headings,
+        # A block may hold cells that do not hang together, so that the way by blocks may be none.
+        return self._cheapest(cells[usable], corridor) or self._cheapest(
+            cells[usable[self._is_connected[tuple(cells[usable].T)]]], np.ones_like(corridor)
         )
 
     def _corridor(self, goals: Int[np.ndarray, "g 2"]) -> Bool[np.ndarray, "p q"] | None:
@@ -106,72 +110,57 @@ class Planner:
         best = int(np.argmin(at_ends))
         if not np.isfinite(at_ends[best]):
             return None
-        return self._beside(np.array(search.traceback(tuple(ends[best]))))
-
-    def _beside(self, blocks: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, "p q"]:
-        """Return the blocks beside some."""
-        corridor = np.zeros(self._passable_blocks.shape, dtype=bool)
+        corridor = np.zeros(costs.shape, dtype=bool)
         beside = int(np.ceil(BESIDE_M / (self._block * self._free_space.config.cell_m) - 1e-9))
-        for r, c in blocks.tolist():
+        for r, c in search.traceback(tuple(ends[best])):
             corridor[max(r - beside, 0) : r + beside + 1, max(c - beside, 0) : c + beside + 1] = True
         return corridor
 
-    def field(self, points_world: Float[np.ndarray, "n 2"]) -> Field:
-        """Return how far it is to drive from everywhere beside a path to its end."""
-        cells = self._free_space.cells(points_world) - self._corner
-        corner, metre = self._ground(self._beside(np.unique(cells // self._block, axis=0)))
-        goal = np.clip(cells[-1] - corner, 0, np.array(metre.shape) - 1)
-        metre[tuple(goal)] = np.abs(metre[tuple(goal)])
-        cell_m, headings = self._free_space.config.cell_m, np.zeros(1)
-        if self._config.robot.outline_m is not None:
-            lengths, headings = costs_to(*self._room_on(corner, metre), cells[0] - corner, self._heading_rad, goal)
-        else:
-            lengths = MCP_Geometric(metre).find_costs([tuple(goal.tolist())])[0][..., None]
-        metres = outwards(cell_m * lengths, cell_m)
-        metres[tuple(slice(max(k - 1, 0), k + 2) for k in goal.tolist())] = 0.0
-        return Field(metres, self._free_space.origin_world + cell_m * (corner + self._corner)[::-1], cell_m, headings)
-
-    def _cheapest(
-        self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]
-    ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"] | None, float, int] | None:
-        """Return cells and headings of the cheapest path to the cheapest of some cells, its cost, and to which.
-
-        It leads over the blocks of a corridor; the cost is in cells. A disc has no headings.
-        """
-        corner, metre = self._ground(corridor)
-        goals, start = goals - corner, self._start - corner
-        inside = np.flatnonzero(np.all((goals >= 0) & (goals < metre.shape), axis=1))
-        inside = inside[metre[tuple(goals[inside].T)] > 0]
-        if not len(inside):
-            return None
-        if self._config.robot.outline_m is not None:
-            found = cheapest(*self._room_on(corner, metre), start, self._heading_rad, goals[inside])
-            return None if found is None else (found[0] + corner, *found[1:3], int(inside[found[3]]))
-        ends = [tuple(cell) for cell in goals[inside].tolist()]
-        search = MCP_Geometric(metre)
-        costs, _ = search.find_costs([tuple(start.tolist())], ends, find_all_ends=False)
-        at_ends = costs[tuple(goals[inside].T)]
-        best = int(np.argmin(at_ends))
-        if not np.isfinite(at_ends[best]):
-            return None
-        way = np.array(search.traceback(ends[best]), dtype=np.int64) + corner
-        return way, None, float(at_ends[best]), int(inside[best])
-
-    def _ground(self, corridor: Bool[np.ndarray, "p q"]) -> tuple[Int[np.ndarray, "2"], Float[np.ndarray, "h w"]]:
-        """Return the first cell of the part of the window that holds a corridor, and what a metre costs in it."""
+    def _cheapest(self, goals: Int[np.ndarray, "g 2"], corridor: Bool[np.ndarray, "p q"]) -> Path | None:
+        """Return the cheapest path over the blocks of a corridor to the cheapest of some cells."""
         blocks = np.argwhere(corridor)
         first, end = blocks.min(axis=0), blocks.max(axis=0) + 1
         corner, past = self._block * first, self._block * end
-        metre = self._metre((slice(corner[0], past[0]), slice(corner[1], past[1])))
+        box = (slice(corner[0], past[0]), slice(corner[1], past[1]))
+        metre = self._metre(box)
         metre[~cells_of(corridor[first[0] : end[0], first[1] : end[1]], metre.shape, self._block)] = -1.0
-        return corner, metre
+        goals, start = goals - corner, self._start - corner
+        goals = goals[np.all((goals >= 0) & (goals < metre.shape), axis=1)]
+        goals = goals[metre[tuple(goals.T)] > 0]
+        if not len(goals):
+            return None
+        if self._config.robot.outline_m is not None:
+            found = self._by_headings(corner, metre, start, goals)
+            if found is None:
+                return None
+            way, _, costs = found
+        else:
+            search = MCP_Geometric(metre)
+            costs = search.find_costs([tuple(goal) for goal in goals.tolist()])[0][..., None]
+            if not np.isfinite(costs[tuple(start)]):
+                return None
+            way = np.array(search.traceback(tuple(start.tolist())), dtype=np.int64)[::-1]
+        cell_m = self._free_space.config.cell_m
+        cost = cell_m * float(costs[tuple(start)].min())
+        metres = _outwards(cell_m * costs, cell_m)
+        for r, c in goals.tolist():
+            metres[max(r - 1, 0) : r + 2, max(c - 1, 0) : c + 2] = 0.0
+        corner_world = self._free_space.origin_world + cell_m * (corner + self._corner)[::-1]
+        return Path(self._free_space.points(way + corner + self._corner), cost, Field(metres, corner_world, cell_m))
 
-    def _room_on(self, corner: Int[np.ndarray, "2"], metre: Float[np.ndarray, "h w"]) -> tuple[Ground, Room]:
-        """Return the ground and the room of a body with an outline on a part of the window that begins at a corner."""
+    def _by_headings(
+        self,
+        corner: Int[np.ndarray, "2"],
+        metre: Float[np.ndarray, "h w"],
+        start: Int[np.ndarray, "2"],
+        goals: Int[np.ndarray, "g 2"],
+    ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], Float[np.ndarray, "h w k"]] | None:
+        """Return the way of a body with an outline over a part of the window that begins at a corner."""
         config, first = self._config, corner + self._corner
         part = tuple(slice(c, c + n) for c, n in zip(corner.tolist(), metre.shape, strict=True))
         ground = Ground(self._free_space.occupied, first, metre, self._escape[part], self._free_space.config.cell_m)
-        return ground, Room(config.robot, config.squeeze_beyond_m, config.margin_m, config.squeeze_cost)
+        room = Room(config.robot, config.squeeze_beyond_m, config.margin_m, config.squeeze_cost)
+        return cheapest(ground, room, start, self._heading_rad, goals)
 
     def _metre(self, box: tuple[slice, slice]) -> Float[np.ndarray, "h w"]:
         """Return what a metre costs in each cell of a part of the window, -1 where no way leads."""
@@ -274,3 +263,13 @@ class Planner:
         for cells in (self._passable, self._roomy):
             cells[box] |= self._escape[box]
             cells[r, c] = True
+
+
+def _outwards(metres: Float[np.ndarray, "h w k"], cell_m: float) -> Float[np.ndarray, "h w k"]:
+    """Return a field that goes on a few cells beyond where a way leads."""
+    metres = np.where(np.isfinite(metres), metres, np.inf)
+    for _ in range(OUTWARDS_CELLS):
+        padded = np.pad(metres, ((1, 1), (1, 1), (0, 0)), constant_values=np.inf)
+        beside = np.minimum.reduce([padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:]])
+        metres = np.where(np.isfinite(metres), metres, beside + OUTWARDS_COST * cell_m)
+    return metres
