@@ -44,7 +44,7 @@ class Controller:
         points = to_world(obstacles(around, config), pose)
         plan, cost_m = self._plan, cost_of_plan(pose, self._plan, points, motions, field)
         if len(plan) < 2 or not np.isfinite(cost_m):
-            found = search(pose, points, motions, field, config.gain_m)
+            found = search(pose, points, motions, field, config.better_m)
             if cost_of_plan(pose, found, points, motions, field) < cost_m - config.better_m or not np.isfinite(cost_m):
                 plan = found
         self._plan = plan[1:]

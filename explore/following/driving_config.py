@@ -18,17 +18,15 @@ class DrivingConfig:
     clear_share: Share = 0.1
     """... and more by this share of the step."""
     wide_m: Size = 0.05
-    """Where the body has less room than this a step costs more, up to twice as much."""
+    """Where the body has less room than this a step costs more, up to four times as much."""
     step_cost_m: Size = 0.05
     """What a step costs besides the way of the faster wheel."""
     back: Factor = 1.5
     """What a metre backwards costs, of one ahead."""
     rest: Factor = 2.0
     """The way beyond the horizon weighs so many times as much as that up to it: fewer poses are looked at."""
-    better_m: Distance = 0.1
-    """A plan is kept until another is cheaper by this."""
-    gain_m: Distance = 0.05
-    """Where no way to the horizon is found, one that saves so much will do."""
+    better_m: Distance = 0.2
+    """A plan is kept until another is cheaper by this; one that leads nowhere near the horizon has to save as much."""
     careful_m: Size = 0.05
     """Longest step onto floor that no scan has seen."""
 

@@ -13,6 +13,8 @@ from ..planning.paths import Field
 
 WALK_CELLS = 6
 """Where the field leads on from a place is told over so many cells."""
+NARROW = 3.0
+"""Where there is no room beside the body a step costs so many times more."""
 MOST = 3000
 """A search looks at so many poses at most."""
 
@@ -26,7 +28,7 @@ class Motions(NamedTuple):
     clear_m: Float[np.ndarray, " a"]
     """Between the body and all returns on the way of each, unless the step comes no nearer to any."""
     wide_m: float
-    """Where there is less room than this a step costs more."""
+    """Where there is less room than this a step costs more, up to four times as much."""
     horizon_m: float
     apart_m: float
     apart_rad: float
@@ -123,13 +125,21 @@ def _room_m(
 ) -> float:
     """Return the clearance on a step, -inf where the step is not safe."""
     c, s, least = math.cos(pose[2]), math.sin(pose[2]), motions.wide_m
+    # On the spot wheels slip aside, so that a turn may come nearer, unlike a step that leads away.
+    allowed = min(motions.clear_m[a], now_m if motions.places[a, -1, 0] != 0.0 else math.inf)
     for k in range(motions.places.shape[1] - 1, -1, -1):  # what is in the way mostly is so at the end
         px, py, turn = motions.places[a, k]
         x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
         least = clearance_m(x, y, pose[2] + turn, points, motions, least)
-        if least < min(motions.clear_m[a], now_m):
+        if least < allowed:
             return -math.inf
     return least
+
+
+@compiled
+def _narrow(room_m: float, motions: Motions) -> float:
+    """Return how many times what it costs on open floor a step costs with so much room."""
+    return 1.0 + NARROW * (1.0 - room_m / motions.wide_m) ** 2
 
 
 @compiled
@@ -154,7 +164,7 @@ def cost_of_plan(
     for a in plan:
         now_m = clearance_m(pose[0], pose[1], pose[2], points, motions, motions.wide_m)
         room_m = _room_m(pose, a, now_m, points, motions)
-        cost += motions.costs_m[a] * (2.0 - room_m / motions.wide_m)
+        cost += motions.costs_m[a] * _narrow(room_m, motions)
         pose = after(pose, a, motions)
     return cost + _rest_m(pose[0], pose[1], pose[2], field, motions)
 
@@ -197,7 +207,7 @@ def search(
                 continue
             rest_m = _rest_m(to[0], to[1], to[2], field, motions)
             room_m = _room_m(pose, a, clear[node], near, motions) if math.isfinite(rest_m) else -math.inf
-            cost += motions.costs_m[a] * (1.0 - room_m / motions.wide_m)
+            cost = spent[node] + motions.costs_m[a] * _narrow(room_m, motions)
             if not math.isfinite(cost) or 0.0 < seen[row, column, turn] <= cost:
                 continue
             seen[row, column, turn] = cost

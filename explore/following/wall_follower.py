@@ -21,7 +21,7 @@ AIM_M, FACING_RAD = 0.3, float(np.deg2rad(30.0))
 """The robot has turned round once it faces the place of the track so far ahead to within this."""
 ON_TRACK = 0.3
 """An approach ends within this share of the stand-off of the track; following goes on up to twice the stand-off."""
-PROGRESS_M, PATIENCE_STEPS = 0.02, 30
+PROGRESS_M, PATIENCE_STEPS = 0.1, 30
 """A motion is no longer possible, too, where so many steps led no farther along the track than this: a turn on the
 spot takes up to 18 of them."""
 IN_VAIN = 4

@@ -242,14 +242,6 @@ class Planner:
         """Return at which places, cells of the window, the body has room enough and need not squeeze."""
         return self._roomy[tuple((self._free_space.cells(points_world) - self._corner).T)]
 
-    def clear_ahead(self, start_world: Float[np.ndarray, "2"], end_world: Float[np.ndarray, "2"]) -> bool:
-        """Return whether the straight way between two places leads over cells with room enough only."""
-        length = float(np.hypot(*(end_world - start_world)))
-        share = np.linspace(0.0, 1.0, max(int(np.ceil(length / (0.5 * self._free_space.config.cell_m))), 1) + 1)
-        cells = self._free_space.cells(start_world + share[:, None] * (end_world - start_world)) - self._corner
-        on_grid = np.all((cells >= 0) & (cells < self._roomy.shape), axis=1)
-        return bool(np.all(on_grid) and np.all(self._roomy[tuple(cells.T)]))
-
     def _open_start(self, is_free: Bool[np.ndarray, "h w"]) -> None:
         """Make the free cells around the robot passable at a price, where they bring it no nearer to a wall."""
         reach = int(np.ceil(self._config.escape_m / self._free_space.config.cell_m))

@@ -69,7 +69,7 @@ NEAR = {
     "real_log": "real_log",
     "replay_driver": "lost",
     "driving": "driving narrow_doors",
-    "safe_steps": "driving narrow_doors",
+    "motion_kernels": "driving narrow_doors",
     "wall_following": "errands wall_sequence navigation clearance_while_growing ping_pong endings",
     "end_errand": "errands wall_sequence navigation clearance_while_growing ping_pong endings",
     "explorer": "round_things setting_aside patience ends_of_missions endings mission",

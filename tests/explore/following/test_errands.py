@@ -22,19 +22,15 @@ def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
         return self._stage == 0
 
     monkeypatch.setattr(PlaceErrand, "_plan", plan)
-    for name, told in (("arrived", False), ("is_obstructed", False), ("command", None)):
+    for name, told in (("arrived", False), ("command", None), ("remaining_m", 1.0), ("squeeze_world", None)):
         monkeypatch.setattr(Pilot, name, lambda *_, told=told: told)
-    monkeypatch.setattr(Pilot, "remaining_m", 1.0)
-    monkeypatch.setattr(Pilot, "squeeze_world", None)
     return PlaceErrand(np.zeros((1, 2)), "there", CONFIG)
 
 
 @pytest.fixture
 def around() -> Mock:
     """The errand's pilot is told of it, and looks at nothing."""
-    around = Mock(spec=Surroundings)
-    around.scan = around.free_space = around.recent_robot = around.touched_robot = None
-    return around
+    return Mock(spec=Surroundings)
 
 
 def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, monkeypatch) -> None:
@@ -48,8 +44,3 @@ def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, 
 def test_after_as_many_scans_as_tries_the_place_is_given_up(errand, around) -> None:
     assert [errand.command(around) for _ in range(CONFIG.tries)] == [REST] * (CONFIG.tries - 1) + [None]
     assert errand.trouble == "the way was blocked"
-
-
-def test_where_something_stands_on_the_path_the_errand_does_not_wait(errand, around, monkeypatch) -> None:
-    monkeypatch.setattr(Pilot, "is_obstructed", lambda *_: True)
-    assert errand.command(around) is None

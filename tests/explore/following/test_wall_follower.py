@@ -11,7 +11,7 @@ import shapely
 from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.following import wall_follower as module
 from chainslam.explore.following.behaviour import Behaviour
-from chainslam.explore.following.driving import Ahead
+from chainslam.explore.following.driving import Controller
 from chainslam.explore.following.track import Track
 from chainslam.explore.following.wall_follower import WallFollower
 from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
@@ -23,7 +23,6 @@ from chainslam.slam.robot import MotionCommand, Scan
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
 CONFIG = FollowingConfig()
-BACK = MotionCommand(-0.05, 0.0)
 STANDOFF_M = CONFIG.viewpoints.standoff_m
 
 
@@ -154,12 +153,10 @@ def test_one_scan_without_a_safe_step_is_followed_by_another_and_two_turn_the_ro
     for word in safe.split():
         with monkeypatch.context() as patched:
             if word == "no":
-                patched.setattr(module, "step_towards", lambda *_: None)
-                patched.setattr(module, "step_away", lambda *_: BACK)
+                patched.setattr(Controller, "command", lambda *_: None)
             command = follower.command(around)
         sides.append(int(follower.behaviour is Behaviour.REVERSE))
-        waits = MotionCommand(0.0, 0.0) if not sides[-1] else BACK
-        assert command == waits if word == "no" else command.forward_m > 0.1
+        assert command == MotionCommand(0.0, 0.0) if word == "no" else command.forward_m > 0.1
     assert sides == turns
 
 
@@ -190,20 +187,6 @@ def test_without_a_side_the_nearer_end_is_first(hall_with_board, side):
     assert np.sign(poses[-1, 0] - start[0]) == (1.0 if side == TAIL else -1.0)
 
 
-def test_where_no_step_is_safe_at_the_standoff_nearer_places_are_tried(hall_with_board, monkeypatch):
-    """At each distance the farther aim first."""
-    follower, pose = WallFollower(7, HEAD, CONFIG), np.array([4.0, 3.0 - STANDOFF_M, np.pi])
-    finder, aims = RangeFinder(hall_with_board.faces, LidarConfig()), []
-    scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
-    monkeypatch.setattr(module, "step_towards", lambda aim, *_: aims.append(aim))
-    monkeypatch.setattr(module, "ahead_of", lambda aim, *_: Ahead(aim, np.zeros((0, 2)), np.inf, False))
-    follower.command(Surroundings(hall_with_board.walls(pose), hall_with_board.grid, scan))
-    ahead, aside = np.array(aims).T
-    np.testing.assert_allclose(ahead, [0.3, 0.15] * 3, atol=1e-9)
-    nearer = STANDOFF_M - np.linspace(STANDOFF_M, CONFIG.viewpoints.close_m, 3)
-    np.testing.assert_allclose(-aside, np.repeat(nearer, 2), atol=1e-9)
-
-
 def test_what_stands_in_the_way_unseen_turns_it_back_on_its_track_only():
     follower = WallFollower(0, TAIL, CONFIG)
     follower.interrupt(None)
@@ -222,7 +205,7 @@ def test_over_floor_that_was_not_seen_its_steps_are_short(hall_with_board):
     for seen in (hall_with_board.grid, floor):
         around = Surroundings(hall_with_board.walls(pose), seen, scan)
         steps.append(WallFollower(7, HEAD, CONFIG).command(around).forward_m)
-    assert steps[0] > CONFIG.driving.slow_m == steps[1]
+    assert steps[0] > CONFIG.driving.careful_m == steps[1]
 
 
 @pytest.mark.parametrize("trouble", ["", "no way leads there"])

@@ -1,0 +1,85 @@
+"""Steps of a body with an outline: against shapely, and along paths with headings."""
+
+import numpy as np
+import pytest
+import shapely
+
+from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.explore.following.driving import Pilot, keeps_clear, motions_of
+from chainslam.explore.following.driving_config import DrivingConfig
+from chainslam.explore.following.motion_kernels import clearance_m
+from chainslam.explore.planning.passable import PathConfig
+from chainslam.explore.planning.paths import Planner
+from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.geometry.poses import arc, compose, to_world
+from chainslam.slam.robot import MotionCommand, RobotSpec, Scan, fitted
+from tests.explore.following.test_driving import around
+from tests.slam.test_mapper import faces_of
+
+LONG = RobotSpec(outline_m=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2)))
+CONFIG = fitted(DrivingConfig(), LONG)
+
+
+def body_at(pose):
+    return shapely.Polygon(to_world(np.array(LONG.outline_m), np.asarray(pose)))
+
+
+def test_the_clearance_of_a_body_is_shapelys():
+    rng, motions = np.random.default_rng(3), motions_of(CONFIG)[1]
+    for _ in range(30):
+        pose, points = rng.uniform(-3.0, 3.0, 3), rng.uniform(-4.0, 4.0, (20, 2))
+        body = body_at(pose)
+        away = [body.distance(point) or -body.exterior.distance(point) for point in shapely.points(points)]
+        assert clearance_m(*pose, points, motions, 9.0) == pytest.approx(min(away), abs=1e-9)
+        assert clearance_m(*pose, points, motions, -1.0) == -1.0
+
+
+def test_what_a_body_does_not_cover_yet_it_does_not_come_to_cover_on_the_way_back():
+    post = np.array([[0.47, 0.245]])
+    assert not keeps_clear(MotionCommand(0.0, 0.17), post, CONFIG)
+    assert keeps_clear(MotionCommand(0.0, -0.17), post, CONFIG)
+    assert not keeps_clear(MotionCommand(0.1, 0.0), np.array([[0.55, 0.1]]), CONFIG)
+    assert keeps_clear(MotionCommand(0.1, 0.0), np.array([[0.3, 0.25]]), CONFIG)
+
+
+DOOR = shapely.box(0, 0, 6, 4).difference(
+    shapely.union_all([shapely.box(3.0, -0.1, 3.1, 1.75), shapely.box(3.0, 2.25, 3.1, 4.1)])
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_path_through_a_narrow_door_is_driven_without_touching_it(seed):
+    """The body is 0.4 m wide and 0.8 m long, the door 0.5 m; noise of ranges, no slip."""
+    rng, finder = np.random.default_rng(seed), RangeFinder(faces_of(DOOR), LidarConfig(beams=360, range_max_m=6.0))
+    floor, pose = FreeSpace(fitted(FreeSpaceConfig(), LONG)), np.array([1.5, 1.2, 1.5])
+    goal = np.array([[4.5, 2.6]])
+
+    def sensed():
+        ranges = finder.cast(pose)[0] + 0.01 * rng.standard_normal(360)
+        return Scan(finder.bearings_rad, ranges, 0.01, 6.0, 0.0)
+
+    for place in ([1.5, 1.2, 0.0], [2.6, 2.0, 0.0], [3.6, 2.0, 0.0], [4.5, 2.6, 0.0]):
+        floor.integrate(np.array(place), Scan(finder.bearings_rad, finder.cast(np.array(place))[0], 0.01, 6.0, 0.0))
+    paths = fitted(PathConfig(), LONG)
+    planner = Planner(floor, pose[:2], paths, None, float(pose[2]))
+    pilot = Pilot(planner.to(goal), planner, CONFIG)
+    for _ in range(120):
+        scan = sensed()
+        if pilot.arrived(pose):
+            break
+        command = pilot.command(around(pose, scan, floor))
+        if command is None:
+            planner = Planner(floor, pose[:2], paths, None, float(pose[2]))
+            pilot = Pilot(planner.to(goal), planner, CONFIG)
+            continue
+        pose = compose(pose, arc(command.forward_m, command.turn_rad))
+        assert DOOR.contains(body_at(pose))
+    assert np.hypot(*(pose[:2] - goal[0])) < 0.1
+
+
+def test_a_long_body_leaves_room_for_what_its_corners_swing_out_where_the_wheels_slip():
+    """On a step of 5 cm its corner may swing out by 1 cm more than a disc does."""
+    (commands, long), (_, disc) = motions_of(CONFIG), motions_of(DrivingConfig())
+    swing = dict(zip([(c.forward_m, c.turn_rad) for c in commands], long.clear_m - disc.clear_m, strict=True))
+    assert swing[0.15 / 3.0, 0.0] == pytest.approx(0.0107, abs=5e-4)
+    assert swing[0.13 * 0.15, 0.0] < swing[0.15 / 3.0, 0.0] < swing[0.15, 0.0]
