@@ -44,6 +44,7 @@ def steadied(
 ) -> Float[np.ndarray, "m 2"]:
     """Return the points that a scan hit, those nearby at the mean of the distances that the last scans had there, m.
 
+    What the last scans hit and this one does not follows as it was: a corner between two of its beams, or behind it.
     Between two walls the nearest of a dozen noisy returns on each side are 2.5 cm nearer than the walls.
     """
     points_robot = returns(scan, robot.scanner)
@@ -56,7 +57,7 @@ def steadied(
     same = (turn < SAME_STEPS * scan.step_rad) & (np.abs(rho[near, None] - before) < same_m)
     mean = rho.copy()
     mean[near] = (rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))
-    return points_robot * (mean / np.maximum(rho, 1e-9))[:, None]
+    return np.concatenate([points_robot * (mean / np.maximum(rho, 1e-9))[:, None], recent_robot[~same.any(axis=0)]])
 
 
 def returns(scan: Scan, scanner: ScannerSpec) -> Float[np.ndarray, "m 2"]:

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
-from chainslam.slam.geometry.poses import arc, compose, to_robot, to_world, wrap
+from chainslam.slam.geometry.poses import arc, compose, to_world
 from chainslam.slam.robot import MotionCommand
 from chainslam.slam.robot.body import reaches_m, rim_of
 
@@ -82,16 +82,8 @@ class Pilot:
 
 
 def obstacles(around: Surroundings, config: DrivingConfig) -> Float[np.ndarray, "m 2"]:
-    """Return what the body keeps clear of, robot frame, m: returns, the mean of those of the last scans where they
-    agree, those out of the view of this one, and what the body touched.
-    """
-    scan, recent, scanner = around.scan, around.recent_robot, config.robot.scanner
-    points = [steadied(scan, recent, config.robot), around.touched_robot]
-    if not scan.is_full_turn:
-        off = to_robot(recent, scanner.pose_robot)
-        bearing, middle = np.arctan2(off[:, 1], off[:, 0]), 0.5 * (scan.bearings_rad[0] + scan.bearings_rad[-1])
-        points.append(recent[np.abs(wrap(bearing - middle)) > scan.bearings_rad[-1] - middle + scan.step_rad])
-    return np.concatenate(points)
+    """Return what the body keeps clear of: what the last scans hit and what it touched, robot frame, m."""
+    return np.concatenate([steadied(around.scan, around.recent_robot, config.robot), around.touched_robot])
 
 
 @lru_cache(maxsize=16)
@@ -114,6 +106,7 @@ def motions_of(config: DrivingConfig) -> tuple[tuple[MotionCommand, ...], Motion
         places=places,
         costs_m=wheel_m + step_m,
         clear_m=clear_m,
+        is_short=(forward != 0.0) & (np.abs(forward) <= config.careful_m + 1e-9),
         wide_m=config.wide_m,
         horizon_m=config.horizon * robot.step_m,
         apart_m=robot.step_m / 12.0,

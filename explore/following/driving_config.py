@@ -14,7 +14,7 @@ class DrivingConfig:
     horizon: Factor = 3.0
     """Whole steps are planned so many of the longest far."""
     clear_m: Distance = 0.004
-    """Smallest distance kept between the body and any return, unless the step comes no nearer to any ..."""
+    """Smallest distance kept between the body and any return, unless a short step comes no nearer to any ..."""
     clear_share: Share = 0.1
     """... and more by this share of the step."""
     wide_m: Size = 0.05
@@ -28,7 +28,7 @@ class DrivingConfig:
     better_m: Distance = 0.2
     """A plan is kept until another is cheaper by this; one that leads nowhere near the horizon has to save as much."""
     careful_m: Size = 0.05
-    """Longest step onto floor that no scan has seen."""
+    """Longest step onto floor that no scan has seen, and where there is less room than it asks for."""
 
     @property
     def radius_m(self) -> float:

@@ -5,7 +5,7 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from chainslam.slam.geometry.compiled import compiled
 
@@ -26,7 +26,9 @@ class Motions(NamedTuple):
     """Poses on the way of each step, m m rad from its start, the last at its end."""
     costs_m: Float[np.ndarray, " a"]
     clear_m: Float[np.ndarray, " a"]
-    """Between the body and all returns on the way of each, unless the step comes no nearer to any."""
+    """Between the body and all returns on the way of each ..."""
+    is_short: Bool[np.ndarray, " a"]
+    """... unless it comes no nearer to any, is short, and no turn on the spot, on which wheels slip aside."""
     wide_m: float
     """Where there is less room than this a step costs more, up to four times as much."""
     horizon_m: float
@@ -125,8 +127,7 @@ def _room_m(
 ) -> float:
     """Return the clearance on a step, -inf where the step is not safe."""
     c, s, least = math.cos(pose[2]), math.sin(pose[2]), motions.wide_m
-    # On the spot wheels slip aside, so that a turn may come nearer, unlike a step that leads away.
-    allowed = min(motions.clear_m[a], now_m if motions.places[a, -1, 0] != 0.0 else math.inf)
+    allowed = min(motions.clear_m[a], now_m if motions.is_short[a] else math.inf)
     for k in range(motions.places.shape[1] - 1, -1, -1):  # what is in the way mostly is so at the end
         px, py, turn = motions.places[a, k]
         x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
