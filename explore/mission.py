@@ -16,7 +16,7 @@ from .floor.accumulated_returns import AccumulatedReturns
 from .floor.floor_memory import FloorMemory, FloorMemoryConfig
 from .floor.free_space import FreeSpace, FreeSpaceConfig
 from .floor.lost_returns import LostReturns
-from .following.wall_following import Surroundings
+from .following.surroundings import Surroundings
 from .goal import GivenUp
 from .goals.decider import Driver
 from .goals.explorer import Explorer

@@ -1,4 +1,4 @@
-"""From a path to one safe motion command: the first of the cheapest whole steps to a horizon, by what the scans show."""
+"""From a path to one safe motion command: the first of the cheapest whole steps to a horizon, by what scans show."""
 
 from functools import lru_cache
 
@@ -62,18 +62,19 @@ class Pilot:
 
     def remaining_m(self, pose_world: Float[np.ndarray, "3"]) -> float:
         """Return what is left of the way, m, a metre in a narrow place for more."""
-        return metres_at(*pose_world, self._field)
+        x, y, heading = pose_world.tolist()
+        return metres_at(x, y, heading, self._field)
 
     def squeeze_world(self, pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"] | None:
         """Return where, within the next half metre, there is hardly room for the body; None if nowhere."""
-        cells = cells_ahead(*pose_world[:2], 10, self._field)
+        cells = cells_ahead(pose_world[0], pose_world[1], 10, self._field)
         ahead = self._field.corner_world + (cells[:, ::-1] + 0.5) * self._field.cell_m
         tight = np.flatnonzero(~self._planner.has_room(ahead))
         return ahead[tight[len(tight) // 2]] if len(tight) else None
 
     def arrived(self, pose_world: Float[np.ndarray, "3"]) -> bool:
         """Return whether the robot stands where nothing is left of the way."""
-        here = cells_ahead(*pose_world[:2], 1, self._field)
+        here = cells_ahead(pose_world[0], pose_world[1], 1, self._field)
         return bool(np.any(self._field.metres[tuple(here.T)] <= 0.0))
 
     def command(self, around: Surroundings) -> MotionCommand | None:
@@ -124,7 +125,8 @@ def keeps_clear(command: MotionCommand, points_robot: Float[np.ndarray, "m 2"], 
     """Return whether the body comes to cover nothing that it does not cover now: enough on a way that it came."""
     beside = points_robot[reaches_m(points_robot, config.robot) > config.radius_m + config.clear_m]
     ways = [arc(share * command.forward_m, share * command.turn_rad) for share in ON_THE_WAY]
-    return all(clearance_m(*way, beside, motions_of(config)[1], 1.0) >= config.clear_m for way in ways)
+    motions = motions_of(config)[1]
+    return all(clearance_m(x, y, heading, beside, motions, 1.0) >= config.clear_m for x, y, heading in ways)
 
 
 def careful(command: MotionCommand, around: Surroundings, config: DrivingConfig) -> MotionCommand:

@@ -10,7 +10,8 @@ from chainslam.slam.map.chains import OpenEnd
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_beyond, places_near, places_that_see
 from .behaviour import Behaviour
-from .wall_following import Errand, FollowingConfig, Surroundings
+from .surroundings import Surroundings
+from .wall_following import Errand, FollowingConfig
 
 NO_PLACE = np.zeros((0, 2))
 

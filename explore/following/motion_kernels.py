@@ -74,7 +74,7 @@ def metres_at(x: float, y: float, heading: float, field: Field) -> float:
     h, w, turns = field.metres.shape
     u, v = (x - field.corner_world[0]) / field.cell_m - 0.5, (y - field.corner_world[1]) / field.cell_m - 0.5
     k = heading / (2.0 * math.pi) * turns
-    column, row, turn = int(math.floor(u)), int(math.floor(v)), int(math.floor(k))
+    column, row, turn = math.floor(u), math.floor(v), math.floor(k)
     total, weight = 0.0, 0.0
     for r in range(max(row, 0), min(row + 2, h)):
         for c in range(max(column, 0), min(column + 2, w)):
@@ -89,8 +89,8 @@ def metres_at(x: float, y: float, heading: float, field: Field) -> float:
 def cells_ahead(x: float, y: float, count: int, field: Field) -> Int[np.ndarray, "n 2"]:
     """Return the cells (row, column) by which the field leads on from a place, its own first; none outside of it."""
     h, w, turns = field.metres.shape
-    c = int(math.floor((x - field.corner_world[0]) / field.cell_m))
-    r = int(math.floor((y - field.corner_world[1]) / field.cell_m))
+    c = math.floor((x - field.corner_world[0]) / field.cell_m)
+    r = math.floor((y - field.corner_world[1]) / field.cell_m)
     cells, least = np.empty((count, 2), np.int64), math.inf
     if not (0 <= r < h and 0 <= c < w):
         return cells[:0]
@@ -160,7 +160,7 @@ def cost_of_plan(
     motions: Motions,
     field: Field,
 ) -> float:
-    """Return what steps and the way from their end cost from a pose, m; infinite without any, or where one is unsafe."""
+    """Return what steps and the way from their end cost, m; infinite without any, or where one is not safe."""
     cost = 0.0 if len(plan) else math.inf
     for a in plan:
         now_m = clearance_m(pose[0], pose[1], pose[2], points, motions, motions.wide_m)

@@ -8,7 +8,8 @@ from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
 from ..planning.paths import Planner
 from ..survey.viewpoints import LOOKS, ideal_places, lane, places_near
 from .behaviour import Behaviour
-from .wall_following import Errand, FollowingConfig, Surroundings
+from .surroundings import Surroundings
+from .wall_following import Errand, FollowingConfig
 
 ROUNDING = LOOKS[:3]
 """In front of the end, past it, round it: as far as a motion free of collision is possible."""

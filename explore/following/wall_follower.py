@@ -14,8 +14,9 @@ from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
 from .behaviour import Behaviour
 from .driving import Controller
+from .surroundings import Surroundings
 from .track import Track, track_of
-from .wall_following import FollowingConfig, PlaceErrand, Surroundings
+from .wall_following import FollowingConfig, PlaceErrand
 
 AIM_M, FACING_RAD = 0.3, float(np.deg2rad(30.0))
 """The robot has turned round once it faces the place of the track so far ahead to within this."""

@@ -10,16 +10,12 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
-from chainslam.slam.association.joint_compatibility import NO_NIS, Nis
 from chainslam.slam.geometry.quantities import Count, Distance, Number, Size
-from chainslam.slam.map.stochastic_map import StochasticMap
-from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, Scan, of_robot
+from chainslam.slam.robot import MotionCommand, RobotSpec, of_robot
 
-from ..floor.free_space import FreeSpace
 from ..planning.navigators import NAVIGATORS, Navigation, Surveyed, Way
 from ..planning.passable import PathConfig
 from ..planning.paths import Planner

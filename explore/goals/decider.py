@@ -11,7 +11,7 @@ from chainslam.slam.map.chains import Chain
 from chainslam.slam.robot import MotionCommand, Odometry
 
 from ..following.behaviour import Behaviour
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from ..goal import GivenUp, Goal
 from ..outcome import Outcome
 

@@ -13,7 +13,8 @@ from chainslam.slam.robot import MotionCommand
 
 from ..following.end_errand import EndErrand
 from ..following.ping_pong import WallErrand
-from ..following.wall_following import Errand, PlaceErrand, Surroundings
+from ..following.surroundings import Surroundings
+from ..following.wall_following import Errand, PlaceErrand
 from ..goal import Goal
 from ..outcome import Outcome
 from ..planning.wall_routes import route

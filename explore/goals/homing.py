@@ -13,7 +13,8 @@ from chainslam.slam.map.chains import Chain
 from chainslam.slam.robot import RobotSpec, of_robot
 
 from ..following.behaviour import Behaviour
-from ..following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from ..following.surroundings import Surroundings
+from ..following.wall_following import FollowingConfig, PlaceErrand
 from ..goal import Goal
 from ..planning.sight import cells_within
 from .decider import Decision

@@ -17,9 +17,9 @@ from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
 from ..following.behaviour import Behaviour
-from ..following.driving_config import DrivingConfig
 from ..following.driving import keeps_clear
-from ..following.wall_following import Surroundings
+from ..following.driving_config import DrivingConfig
+from ..following.surroundings import Surroundings
 from ..goal import GivenUp
 from ..outcome import Outcome
 from .decider import Decision, Driver

@@ -14,8 +14,9 @@ from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
 from chainslam.slam.robot import MotionCommand
 
 from ..following.behaviour import Behaviour
+from ..following.surroundings import Surroundings
 from ..following.wall_follower import WallFollower
-from ..following.wall_following import FollowingConfig, Surroundings
+from ..following.wall_following import FollowingConfig
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
 from ..planning.visibility_graph import followed_wall

@@ -7,7 +7,7 @@ import networkx as nx
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.robot import MotionCommand, Odometry
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from ..outcome import Outcome
 from .decider import Decision
 from .lost import LostConfig

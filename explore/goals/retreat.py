@@ -17,7 +17,8 @@ from ..floor.floor_memory import FloorMemory
 from ..floor.touches import Touches
 from ..following.behaviour import Behaviour
 from ..following.driving import keeps_clear
-from ..following.wall_following import FollowingConfig, Surroundings
+from ..following.surroundings import Surroundings
+from ..following.wall_following import FollowingConfig
 from ..outcome import Outcome
 from ..planning.driving_field import DrivingField
 from ..planning.paths import Planner

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from chainslam.slam.map.chains import OpenEnd
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from ..survey.frontiers import known_floor
 from ..survey.moving_things import moving_returns
 from .explorer_config import ExplorerConfig

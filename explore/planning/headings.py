@@ -49,7 +49,7 @@ class Room:
 def cheapest(
     ground: Ground, room: Room, start: Int[np.ndarray, "2"], heading_rad: float | None, goals: Int[np.ndarray, "g 2"]
 ) -> tuple[Int[np.ndarray, "n 2"], Float[np.ndarray, " n"], Float[np.ndarray, "p q k"]] | None:
-    """Return cells and headings rad of the cheapest way to the cheapest of some cells, and what ways from anywhere cost.
+    """Return cells and headings rad of the cheapest way to the cheapest of some cells, and what each way costs.
 
     Cells are (row, column) of `ground.metre`, and costs are in cells, infinite where no way leads. None where none
     leads to any from the start. Without a heading any will do to begin.

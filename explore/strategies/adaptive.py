@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from chainslam.slam.estimation.gates import gate_level
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from ..survey.viewpoints import ideal_places, lane
 from .inconsistency import LEVEL, Monitor
 from .nearest_robot import NearestRobot

@@ -18,7 +18,7 @@ from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.geometry.poses import J
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from .expectation import OBSERVATION_SIGMAS
 
 LEVEL = MatchingConfig().gate

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from ..survey.frontiers import borders_on_unseen
 from ..survey.unmapped_obstacles import is_mapped
 from .strategy import Choice, Place, Situation

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from .strategy import Choice, Situation, Strategy, Watchful
 
 

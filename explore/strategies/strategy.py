@@ -14,7 +14,8 @@ from jaxtyping import Float
 from chainslam.slam.map.chains import Chain, OpenEnd
 from chainslam.slam.map.stochastic_map import StochasticMap
 
-from ..following.wall_following import FollowingConfig, Surroundings
+from ..following.surroundings import Surroundings
+from ..following.wall_following import FollowingConfig
 from ..planning.driving_field import DrivingField
 from ..planning.visibility_graph import followed_wall
 from ..survey.frontiers import LEAST_CELLS, frontiers, pieces

@@ -13,7 +13,6 @@ from rich.table import Table
 
 from chainslam.experiments.scenario import TrialConfig, check, load_world
 from chainslam.experiments.terminal.console import plain_console
-from chainslam.explore.following.driving_config import DrivingConfig
 from chainslam.sim.robot import RobotConfig
 from chainslam.sim.worlds import World
 from chainslam.slam.robot import ScannerSpec
@@ -34,8 +33,8 @@ CASES: Mapping[str, RobotConfig] = {
     "scanner 0.12 m ahead": RobotConfig(scanner=ScannerSpec(0.12)),
     "scanner 0.1 m behind, 0.05 m left, turned": RobotConfig(scanner=ScannerSpec(-0.1, 0.05, 0.5 * np.pi)),
 }
-FITS_SHARE = 0.9
-"""A building's doors fit a body that covers so much of what the paper's robot does, with the pilot's room beside it."""
+SPARE_M, FITS_SHARE = 0.0125, 0.9
+"""A building's doors fit a body that, with so much room on either side, covers so much of what the paper's robot does."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +80,8 @@ class BodiesStudy:
 
 
 def fits(world: World, radius_m: float) -> bool:
-    """Return whether a body gets through the doors of a building, with as much to spare as it asks for."""
-    spare_m = 0.5 * DrivingConfig.fits_beyond_m
-    covered = [world.reachable(radius + spare_m).buffer(radius).area for radius in (radius_m, RobotConfig.radius_m)]
+    """Return whether a body gets through the doors of a building, with so much to spare on either side."""
+    covered = [world.reachable(radius + SPARE_M).buffer(radius).area for radius in (radius_m, RobotConfig.radius_m)]
     return bool(covered[0] >= FITS_SHARE * covered[1])
 
 

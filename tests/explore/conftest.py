@@ -9,7 +9,8 @@ import pytest
 import shapely
 
 from chainslam.explore.floor.free_space import FreeSpace
-from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.following.surroundings import Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.strategies import Situation
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.estimation.backend import Belief, Joint

@@ -182,7 +182,8 @@ def test_past_a_post_beside_its_path_the_robot_drives_and_before_a_wall_across_i
     post = np.array([[[0.7, 0.14], [0.72, 0.12]], [[0.72, 0.12], [0.7, 0.1]], [[0.7, 0.1], [0.7, 0.14]]])
     wall = np.array([[[0.7, 3.0], [0.7, -3.0]]])[:, ::-1]
     for faces, arrives in ((post, True), (wall, False)):
-        finder, pose, pilot = RangeFinder(faces, LidarConfig()), np.zeros(3), pilot_to(goal, np.zeros(3), grid)
+        finder, pose, planner = RangeFinder(faces, LidarConfig()), np.zeros(3), Planner(grid, np.zeros(2), PathConfig())
+        pilot = Pilot(planner.to(goal[None]), planner, CONFIG)
         for _ in range(60):
             scan = Scan(finder.bearings_rad, finder.cast(pose)[0], 0.01, 4.0, 0.0)
             command = None if pilot.arrived(pose) else pilot.command(around(pose, scan, grid))

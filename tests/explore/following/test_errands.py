@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chainslam.explore.following.driving import Pilot
-from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from chainslam.explore.following.surroundings import Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand
 from chainslam.slam.robot import MotionCommand
 
 CONFIG = FollowingConfig()

@@ -9,7 +9,8 @@ import shapely
 
 from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.following.ping_pong import WallErrand
-from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.following.surroundings import Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.goals.explorer import Explorer
 from chainslam.explore.goals.explorer_config import ExplorerConfig
 from chainslam.explore.strategies.nearest_robot import NearestRobot

@@ -12,9 +12,10 @@ from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.following import wall_follower as module
 from chainslam.explore.following.behaviour import Behaviour
 from chainslam.explore.following.driving import Controller
+from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.following.track import Track
 from chainslam.explore.following.wall_follower import WallFollower
-from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.geometry.poses import arc, compose
 from chainslam.slam.map.chains import HEAD, TAIL

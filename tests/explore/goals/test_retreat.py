@@ -10,7 +10,8 @@ import shapely
 from chainslam.explore.floor.floor_memory import FloorMemory
 from chainslam.explore.floor.free_space import FloorTooLargeError, FreeSpace
 from chainslam.explore.floor.touches import REACH_M, Touches
-from chainslam.explore.following.wall_following import FollowingConfig, Surroundings
+from chainslam.explore.following.surroundings import Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.goals.decider import Decision
 from chainslam.explore.goals.retreat import Retreat, RetreatConfig
 from chainslam.explore.limits import Limits, limited

@@ -9,7 +9,7 @@ import shapely
 
 from chainslam.explore.certificate import certify
 from chainslam.explore.floor.free_space import FreeSpace
-from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.goal import GivenUp, LeftPlace
 from chainslam.explore.goals.explorer import Explorer
 from chainslam.explore.goals.explorer_config import ExplorerConfig

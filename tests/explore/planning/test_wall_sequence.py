@@ -7,7 +7,8 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand, Surroundings
+from chainslam.explore.following.surroundings import Surroundings
+from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand
 from chainslam.explore.planning.navigators import NAVIGATORS, FloorNavigator, Surveyed, WallNavigator
 from chainslam.explore.planning.passable import PathConfig
 from chainslam.explore.planning.paths import Planner

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.strategies.inconsistency import LEVEL, Monitor, gained_information, stated
 from chainslam.slam.association.joint_compatibility import Nis
 from chainslam.slam.estimation.backend import Joint

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from chainslam.explore.floor.free_space import FreeSpace
-from chainslam.explore.following.wall_following import Surroundings
+from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.goal import GivenUp
 from chainslam.explore.goals.explorer import Explorer
 from chainslam.explore.goals.explorer_config import ExplorerConfig
