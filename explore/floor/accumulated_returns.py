@@ -12,9 +12,8 @@ SCANS = 4
 """So many scans before the present one are remembered; over so few steps the odometry errs by millimetres."""
 NEAR_BEYOND_M = 0.4
 """Returns farther off the body than this matter to no step from here."""
-SAME_STEPS, SAME_SIGMAS = 0.6, 6.0
-"""Returns of two scans so near in bearing and distance are of one place: half a beam's step, and four sigmas of how far
-they differ."""
+SAME_STEPS, SAME_SIGMAS = 0.6, 4.0
+"""Returns of two scans so near in bearing and distance are of one place: half a beam's step, and four sigmas."""
 
 
 class AccumulatedReturns:

@@ -34,7 +34,7 @@ CASES: Mapping[str, RobotConfig] = {
     "scanner 0.1 m behind, 0.05 m left, turned": RobotConfig(scanner=ScannerSpec(-0.1, 0.05, 0.5 * np.pi)),
 }
 SPARE_M, FITS_SHARE = 0.0125, 0.9
-"""A building's doors fit a body that, with so much room on either side, covers so much of what the paper's robot does."""
+"""A building's doors fit a body that, with so much room beside it, covers so much of what the paper's robot does."""
 
 
 @dataclass(frozen=True)
