@@ -142,11 +142,12 @@ class Planner:
             way = np.array(search.traceback(tuple(start.tolist())), dtype=np.int64)[::-1]
         cell_m = self._free_space.config.cell_m
         cost = cell_m * float(costs[tuple(start)].min())
-        metres = _outwards(cell_m * costs, cell_m)
-        for r, c in goals.tolist():
-            metres[max(r - 1, 0) : r + 2, max(c - 1, 0) : c + 2] = 0.0
         corner_world = self._free_space.origin_world + cell_m * (corner + self._corner)[::-1]
-        return Path(self._free_space.points(way + corner + self._corner), cost, Field(metres, corner_world, cell_m))
+        return Path(
+            self._free_space.points(way + corner + self._corner),
+            cost,
+            Field(_outwards(cell_m * costs, cell_m), corner_world, cell_m),
+        )
 
     def _by_headings(
         self,
