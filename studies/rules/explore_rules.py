@@ -6,15 +6,15 @@ NO = "np.zeros_like(on())"
 YES = "np.ones_like(on())"
 
 DRIVING = (
-    Switch("driving.steadied", "explore.floor.accumulated_returns",
+    Switch("driving.mean", "explore.floor.accumulated_returns",
            "mean[near] = «(rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))»",
            "rho[near]", "the mean of five scans is kept clear of, not one"),
-    Switch("driving.recent", "explore.floor.accumulated_returns", "recent_robot[«~same.any(axis=0)»]",
+    Switch("driving.earlier", "explore.floor.accumulated_returns", "recent_robot[«~same.any(axis=0)»]",
            NO, "what the scans before this one hit counts, too"),
     Switch("driving.careful", "explore.following.driving",
            "share < 1.0 and «np.any(around.free_space.unknown_at(end[:2] + rim))»",
            "False", "steps onto floor not seen yet are short"),
-    Switch("driving.no_nearer", "explore.following.motion_kernels", "«now_m if motions.is_short[a] else math.inf»",
+    Switch("driving.excused", "explore.following.motion_kernels", "«now_m if motions.is_short[a] else math.inf»",
            "math.inf", "a short step that comes no nearer is safe"),
     Switch("driving.second_scan", "explore.following.end_errand", "super()._arrived()\n        return «True»",
            "False", "an end is looked at by two scans from each place"),

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from chainslam.explore.following.driving import Pilot
+from chainslam.explore.following.end_errand import EndErrand
 from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.following.wall_following import FollowingConfig, PlaceErrand
+from chainslam.slam.map.chains import OpenEnd
 from chainslam.slam.robot import MotionCommand
 
 CONFIG = FollowingConfig()
@@ -45,3 +47,14 @@ def test_a_scan_that_leaves_no_safe_step_is_followed_by_another(errand, around, 
 def test_after_as_many_scans_as_tries_the_place_is_given_up(errand, around) -> None:
     assert [errand.command(around) for _ in range(CONFIG.tries)] == [REST] * (CONFIG.tries - 1) + [None]
     assert errand.trouble == "the way was blocked"
+
+
+def test_an_open_end_is_looked_at_twice_from_each_place_and_other_places_once(errand, around, monkeypatch) -> None:
+    """The second scan has its beams between those of the first."""
+    half = MotionCommand(0.0, 0.5 * CONFIG.robot.turn_rad)
+    end = EndErrand(OpenEnd(3, 1, np.zeros(2)), (), CONFIG)
+    for each, first in ((end, half), (errand, None)):
+        each._pilot = Pilot.__new__(Pilot)
+        monkeypatch.setattr(Pilot, "arrived", lambda *_: True)
+        assert each.command(around) == first
+        assert each.looks_done == 1
