@@ -14,7 +14,7 @@ class DrivingConfig:
     horizon: Factor = 3.0
     """Whole steps are planned so many of the longest far."""
     clear_m: Distance = 0.004
-    """Smallest distance kept between the body and any return, unless a short step comes no nearer to any ..."""
+    """Smallest distance kept between the body and any return, on a short step as little as there is before it ..."""
     clear_share: Share = 0.1
     """... and more by this share of the step."""
     wide_m: Size = 0.05

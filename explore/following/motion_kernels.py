@@ -28,7 +28,8 @@ class Motions(NamedTuple):
     clear_m: Float[np.ndarray, " a"]
     """Between the body and all returns on the way of each ..."""
     is_short: Bool[np.ndarray, " a"]
-    """... unless it comes no nearer to any, is short, and no turn on the spot, on which wheels slip aside."""
+    """... or as little as there is before, where a step is short and no turn on the spot, on which wheels slip aside;
+    what is nearer still, by noise, it comes no nearer to."""
     wide_m: float
     """Where there is less room than this a step costs more, up to four times as much."""
     horizon_m: float
@@ -47,24 +48,31 @@ class Motions(NamedTuple):
 
 
 @compiled
+def gap_m(dx: float, dy: float, heading: float, body: Motions) -> float:
+    """Return how far a point, from the middle of the body, lies off its rim; below 0 inside."""
+    corners, c, s = body.corners_m, math.cos(heading), math.sin(heading)
+    if not len(corners):
+        return math.hypot(dx, dy) - body.radius_m
+    x, y, inside, away = c * dx + s * dy, c * dy - s * dx, True, math.inf
+    for k in range(len(corners)):
+        ex, ey = corners[k] - corners[k - 1]
+        ax, ay = x - corners[k - 1, 0], y - corners[k - 1, 1]
+        inside = inside and ex * ay - ey * ax >= 0.0
+        share = min(max((ex * ax + ey * ay) / (ex * ex + ey * ey), 0.0), 1.0)
+        away = min(away, math.hypot(ax - share * ex, ay - share * ey))
+    return -away if inside else away
+
+
+@compiled
 def clearance_m(
     x: float, y: float, heading: float, points: Float[np.ndarray, "m 2"], body: Motions, most_m: float
 ) -> float:
     """Return the distance between the body at a pose and the nearest point, at most `most_m`; below 0 inside."""
-    least, c, s, corners = most_m, math.cos(heading), math.sin(heading), body.corners_m
+    least = most_m
     for n in range(len(points)):
         dx, dy = points[n, 0] - x, points[n, 1] - y
-        away = math.hypot(dx, dy) - body.radius_m
-        if len(corners) and away < least:
-            px, py, inside, away = c * dx + s * dy, c * dy - s * dx, True, math.inf
-            for k in range(len(corners)):
-                ex, ey = corners[k] - corners[k - 1]
-                ax, ay = px - corners[k - 1, 0], py - corners[k - 1, 1]
-                inside = inside and ex * ay - ey * ax >= 0.0
-                share = min(max((ex * ax + ey * ay) / (ex * ex + ey * ey), 0.0), 1.0)
-                away = min(away, math.hypot(ax - share * ex, ay - share * ey))
-            away = -away if inside else away
-        least = min(least, away)
+        if math.hypot(dx, dy) - body.radius_m < least:
+            least = min(least, gap_m(dx, dy, heading, body))
     return least
 
 
@@ -125,15 +133,22 @@ def _rest_m(x: float, y: float, heading: float, field: Field, motions: Motions) 
 def _room_m(
     pose: Float[np.ndarray, "3"], a: int, now_m: float, points: Float[np.ndarray, "m 2"], motions: Motions
 ) -> float:
-    """Return the clearance on a step, -inf where the step is not safe."""
-    c, s, least = math.cos(pose[2]), math.sin(pose[2]), motions.wide_m
-    allowed = min(motions.clear_m[a], now_m if motions.is_short[a] else math.inf)
+    """Return the clearance on a step, -inf where the step is not safe; `now_m` is that before it."""
+    c, s, least, is_short = math.cos(pose[2]), math.sin(pose[2]), motions.wide_m, motions.is_short[a]
+    asked_m = min(motions.clear_m[a], max(now_m, 0.0)) if is_short else motions.clear_m[a]
     for k in range(motions.places.shape[1] - 1, -1, -1):  # what is in the way mostly is so at the end
         px, py, turn = motions.places[a, k]
         x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
-        least = clearance_m(x, y, pose[2] + turn, points, motions, least)
-        if least < allowed:
-            return -math.inf
+        for n in range(len(points)):
+            dx, dy = points[n, 0] - x, points[n, 1] - y
+            if math.hypot(dx, dy) - motions.radius_m >= least:
+                continue
+            away = gap_m(dx, dy, pose[2] + turn, motions)
+            if away < asked_m and not (
+                is_short and away >= gap_m(points[n, 0] - pose[0], points[n, 1] - pose[1], pose[2], motions)
+            ):
+                return -math.inf
+            least = min(least, away)
     return least
 
 

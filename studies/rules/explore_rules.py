@@ -14,8 +14,9 @@ DRIVING = (
     Switch("driving.careful", "explore.following.driving",
            "share < 1.0 and «np.any(around.free_space.unknown_at(end[:2] + rim))»",
            "False", "steps onto floor not seen yet are short"),
-    Switch("driving.excused", "explore.following.motion_kernels", "«now_m if motions.is_short[a] else math.inf»",
-           "math.inf", "a short step that comes no nearer is safe"),
+    Switch("driving.excused", "explore.following.motion_kernels",
+           "asked_m = «min(motions.clear_m[a], max(now_m, 0.0)) if is_short else motions.clear_m[a]»",
+           "motions.clear_m[a]", "a short step may leave as little room as there is"),
     Switch("driving.second_scan", "explore.following.end_errand", "super()._arrived()\n        return «True»",
            "False", "an end is looked at by two scans from each place"),
 )  # fmt: skip
