@@ -18,7 +18,7 @@ def seen(width_m):
     """Return the floor of two rooms with a gap between them, as scans along the middle of both see it."""
     door = shapely.box(2.9, 1.5 - width_m / 2, 3.2, 1.5 + width_m / 2)
     floor = shapely.orient_polygons(shapely.union_all([*ROOMS, door]))
-    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(floor)]
+    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(floor))]
     faces = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
     finder, space = RangeFinder(faces, LidarConfig(360)), FreeSpace(FreeSpaceConfig())
     for x in (1.0, 1.5, 2.0, 4.5):
