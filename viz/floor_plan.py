@@ -30,7 +30,7 @@ LETTERS_M = 0.22
 """Height of the letters on the plan; a shorter side has smaller ones, down to `SMALLEST_M`, else none."""
 SMALLEST_M = 0.12
 """Smaller letters cannot be read in print: where the interval would need them, it is left to the tooltip."""
-ACROSS = 1.7
+ACROSS = 1.5
 """Letters of height one that fit along a side of length one."""
 BARS_M = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
 BAR_SHARE = 0.25
@@ -54,16 +54,18 @@ class Dimension:
     @property
     def shown(self) -> str:
         """The words for which there is room; nothing without room for any."""
+        if self._fitting_m(len(self.words)) >= SMALLEST_M:
+            return self.words
         value = self.words.partition(" ±")[0] + (" m²" if self.is_area else "")
-        return next((words for words in (self.words, value) if self._fitting_m(words) >= SMALLEST_M), "")
+        return value if self._fitting_m(len(value) + 2) >= SMALLEST_M else ""
 
     @property
     def letters_m(self) -> float:
         """Height of its letters."""
-        return min(LETTERS_M, self._fitting_m(self.shown or self.words))
+        return float(np.clip(self._fitting_m(len(self.words)), SMALLEST_M, LETTERS_M))
 
-    def _fitting_m(self, words: str) -> float:
-        return ACROSS * float(np.hypot(*self.along_world)) / max(len(words), 1)
+    def _fitting_m(self, letters: int) -> float:
+        return ACROSS * float(np.hypot(*self.along_world)) / max(letters, 1)
 
     @property
     def beside_world(self) -> Float[np.ndarray, "2"]:
@@ -196,10 +198,9 @@ class _Plan:
         """Draw a bar of four parts above the footer, at the right edge of the page, its length beside it."""
         left, top, part = width_m - 0.2 - length_m, height_m - 0.72, length_m / 4.0
         for k in range(4):
-            x, fill = f"{left + k * part:g}", BAR if k % 2 == 0 else palette.PAGE
-            self._add(
-                "rect", x=x, y=f"{top:g}", width=f"{part:g}", height="0.07", fill=fill, stroke=BAR, stroke_width="0.01"
-            )
+            x, fill = left + k * part, BAR if k % 2 == 0 else palette.PAGE
+            box = f"M{x:g},{top:g} h{part:g} v0.07 h{-part:g} Z"
+            self._add("path", d=box, fill=fill, stroke=BAR, stroke_width="0.01")
         label = self._add(
             "text", x=f"{left - 0.1:g}", y=f"{top + 0.035:g}", fill="#6A6A6A", font_size="0.2", text_anchor="end",
             dominant_baseline="central", font_family="sans-serif",
