@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from chainslam.sim.logs.archive import regular
-from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.evaluation.consistency import NOISE_MODELS, noise_model
 from chainslam.viz import palette
 from chainslam.viz.figures.maps import Picture, saved
 from chainslam.viz.figures.panels import map_figures
@@ -153,7 +153,7 @@ def _told(value: Any, scale: float) -> str:
 def _more(run: Row) -> Row:
     """Return further figures of a run: the verdict of the NIS on the stated noise, and those of offline refinement."""
     nis, share = run.get("nis"), run.get("nis_in_band")
-    noise = None if nis is None or share is None else verdict_on_noise(nis, share)
+    noise = None if nis is None or share is None else NOISE_MODELS[noise_model(nis, share)]
     return {"noise": noise} | {f"refined_{key}": value for key, value in (run.get("second_looks") or {}).items()}
 
 

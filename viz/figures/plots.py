@@ -18,6 +18,7 @@ from .. import palette
 from ..shapes import SIGMAS, VAGUE_RAD, ellipses
 from ..text import literal
 from . import own_look
+from .map_axes import scale_bar
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
@@ -31,6 +32,10 @@ NARROW = (5.0, 3.3)
 """Inches of a figure whose letters are as large as those of the text on a phone."""
 MOST_SPREADS = 4
 """Curves beyond which pale bands would only cover one another."""
+BAR_BELOW = 0.042
+"""A plan's scale bar lies so far below it, as a share of its width."""
+LEGEND_INCH = 1.1
+"""Width of the legend of shades beside a plan."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 """Driven once, twice, ..., five times or more, as in the paper's figures 5 and 6."""
 
@@ -120,6 +125,7 @@ def draw_trajectories(
     for (backend, path), width in zip(estimated_world.items(), widths, strict=False):
         axes.plot(path[:, 0], path[:, 1], color=palette.of_backend(backend), linewidth=width, label=backend)
     axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    _scale(axes)
     return figure
 
 
@@ -162,7 +168,7 @@ def draw_model_space(
 @own_look()
 def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: str) -> Figure:
     """Return the path shaded by how often each stretch was driven, the start in a circle (paper, figures 5 and 6)."""
-    figure, axes = _plan(rings, title)
+    figure, axes = _plan(rings, title, LEGEND_INCH)
     places = _dense(path_world[:, :2])
     times = traversals(places)
     pieces = np.stack([places[:-1], places[1:]], axis=1)
@@ -178,6 +184,7 @@ def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: st
     bar.ax.set_yticklabels([*(str(k) for k in range(1, len(GREYS))), f"{len(GREYS)} or more"], fontsize=7)
     bar.set_label("times driven", fontsize=8)
     axes.plot(*places[0], "o", markersize=9, color="none", markeredgecolor=palette.ALARM, mew=1.6, zorder=4)
+    _scale(axes)
     return figure
 
 
@@ -195,11 +202,11 @@ def _dense(places: Float[np.ndarray, "s 2"]) -> Float[np.ndarray, "p 2"]:
     return np.stack([np.interp(at, along, places[:, axis]) for axis in (0, 1)], axis=-1)
 
 
-def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
-    """Return axes in metres with the true walls, if any."""
+def _plan(rings: Rings, title: str, beside_inch: float = 0.0) -> tuple[Figure, Axes]:
+    """Return axes in metres with the true walls, if any, and room beside them."""
     size = np.ptp(np.concatenate(rings), axis=0) if len(rings) else np.array([1.0, 1.0])
     width, height = size * 7.0 / max(size[0], 1.3 * size[1])
-    figure, axes = _figure(title, (float(width) + 0.9, float(height) + 1.0))
+    figure, axes = _figure(title, (float(width) + 0.9 + beside_inch, float(height) + 1.0))
     for ring in rings:
         axes.plot(*np.concatenate([ring, ring[:1]]).T, color=palette.WALL_LINE, linewidth=1.4, zorder=2)
     axes.set_aspect("equal")
@@ -208,6 +215,16 @@ def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
     axes.yaxis.set_major_locator(MultipleLocator(2.0))
     axes.grid(color=palette.GRID, linewidth=0.5)
     return figure, axes
+
+
+def _scale(axes: Axes) -> None:
+    """Name the unit of a plan on which all is drawn, and add a scale bar."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+    axes.set_xlabel("x, m", fontsize=8)
+    axes.set_ylabel("y, m", fontsize=8)
+    scale_bar(axes, right - left, BAR_BELOW * (right - left) / (high - low))
 
 
 def _figure(title: str, size: tuple[float, float]) -> tuple[Figure, Axes]:
