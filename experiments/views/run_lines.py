@@ -75,8 +75,8 @@ def _untrue(summary: Row) -> str:
         words += f"; median error of {number(relations['count'])} relations {number(metres)} m and"
         words += f" {number(degrees(turn))} degrees"
     stated = (summary.get(f"relations{tail}_normalised") or {}).get("all", {}).get("anees")
-    ideal = ("ANEES", stated) if stated is not None else ("NIS", summary.get("nis"))
-    return f"{words}, {ideal[0]} {number(ideal[1])} (1 is ideal)"
+    name, value = ("ANEES", stated) if stated is not None else ("NIS", summary.get("nis"))
+    return words if value is None else f"{words}, {name} {number(value)} (1 is ideal)"
 
 
 def notes_of(summary: Row) -> list[str]:

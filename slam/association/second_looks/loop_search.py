@@ -5,6 +5,7 @@ where two searches agree. Where a scan does not fit those before it, the robot h
 are tried then, from either side of it and whenever the robot comes by again.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +34,7 @@ class LoopSearch:
         drive: Drive,
         returns: Returns,
         config: SecondLooksConfig,
+        goes_on: Callable[[float], bool] = lambda share: True,
     ) -> None:
         motions = drive.motions
         self.poses = np.tile(start_world, (len(motions) + 1, 1))
@@ -43,12 +45,13 @@ class LoopSearch:
         self._found: list[Closure] = []
         """What the searches found, believed or not."""
         self._ways = np.append(0.0, np.cumsum(np.hypot(*motions[:, :2].T)))
-        asked = 0.0
+        asked, searches = 0.0, True
         for k in range(1, len(self.poses)):
             self._go_to(k)
-            if self._ways[k] - asked >= config.closures.every_m:
+            if searches and self._ways[k] - asked >= config.closures.every_m:
                 asked = self._ways[k]
                 self._look(k)
+                searches = goes_on(k / len(self.poses))
 
     @property
     def drive(self) -> Drive:
