@@ -82,23 +82,26 @@ class LoopSearch:
         place = self._place(new)
         if place is None:
             return
-        found, is_far = place
+        found, candidate = place
         # What is sought far around has more places to be mistaken for.
-        needed = self._config.closures.far_agree - 1 if is_far else 1
+        needed = 1 if candidate.drift is None else self._config.closures.far_agree - 1
         partners = [each for each in reversed(self._found) if self._agree(each, found)][:needed]
         self._found.append(found)
-        if len(partners) == needed:
+        if len(partners) == needed and (self._is_known(found) or self._is_alone(found, candidate)):
             self.closures += [each for each in (*partners, found) if each not in self.closures]
             self._settle(found)
 
-    def _place(self, new: int) -> tuple[Closure, bool] | None:
-        """Return where a scan was taken, as seen from the old scans on which it lies best, and whether these are far.
+    def _query(self, new: int) -> Float[np.ndarray, "n 2"]:
+        """Return the latest returns up to a scan, in its frame."""
+        first = int(np.searchsorted(self._ways, self._ways[new] - self._config.closures.query_m))
+        return self._returns.seen_from(range(max([first, *self._slipped[-1:]]), new + 1), self.poses, new)
+
+    def _place(self, new: int) -> tuple[Closure, Candidate] | None:
+        """Return where a scan was taken, as seen from the old scans on which it lies best, and how it was sought.
 
         None if there are rivals.
         """
-        c = self._config.closures
-        first = int(np.searchsorted(self._ways, self._ways[new] - c.query_m))
-        points = self._returns.seen_from(range(max([first, *self._slipped[-1:]]), new + 1), self.poses, new)
+        c, points = self._config.closures, self._query(new)
         if len(points) < c.least_points:
             return None
         found: list[tuple[Place, Candidate]] = []
@@ -117,7 +120,22 @@ class LoopSearch:
             return None
         around = self._around(at, new)
         old = around[int(np.argmin(np.hypot(*(self.poses[around, :2] - best.pose[:2]).T)))]
-        return Closure(old, new, compose(inverse(self.poses[old]), best.pose)), at.drift is not None
+        return Closure(old, new, compose(inverse(self.poses[old]), best.pose)), at
+
+    def _is_known(self, closure: Closure) -> bool:
+        """Return whether a closure is what the poses say already."""
+        c = self._config.closures
+        off = compose(inverse(self.poses[closure.new]), compose(self.poses[closure.old], closure.motion))
+        return bool(np.hypot(*off[:2]) < 0.5 * c.agree_m and abs(off[2]) < 0.5 * c.agree_rad)
+
+    def _is_alone(self, closure: Closure, candidate: Candidate) -> bool:
+        """Return whether no other place is nearly as good twice as far around: a bare corridor fits itself anywhere."""
+        c, window = self._config.closures, candidate.window
+        wide = replace(candidate, window=replace(window, half_m=2.0 * window.half_m))
+        surface = self._returns.surface(self._around(wide, closure.new), self.poses)
+        place = place_on(surface, self._query(closure.new), wide.window, c.place)
+        put = compose(self.poses[closure.old], closure.motion)
+        return place is not None and place.is_right(c.place) and not apart(place.pose[None], put, c.place)[0]
 
     def _allows(self, drift: Float[np.ndarray, "3 3"], off: Float[np.ndarray, "3"]) -> bool:
         """Return whether a pose may be off by so much: a closure there raises chi-square by no more than it may."""
@@ -129,7 +147,7 @@ class LoopSearch:
     def _around(self, candidate: Candidate, new: int) -> range:
         """Return the scans about an old one that may have seen the place, up to the next slip on either side."""
         c, old = self._config.closures, candidate.old
-        beside_m = c.beside_m if candidate.drift is None else max(c.beside_m, candidate.window.half_m)
+        beside_m = max(c.beside_m, candidate.window.half_m)
         first, last = np.searchsorted(self._ways, self._ways[old] + np.array([-beside_m, beside_m]))
         low = max([int(first), *(k for k in self._slipped if k <= old)])
         high = min([int(last), new - c.recent // 2, *(k for k in self._slipped if k > old)])
@@ -215,10 +233,8 @@ class LoopSearch:
 
     def _settle(self, last: Closure) -> None:
         """Bring the poses so far into agreement with all closures, if the last one is not what they say already."""
-        c, new = self._config.closures, last.new
-        put = compose(self.poses[last.old], last.motion)
-        off = compose(inverse(self.poses[new]), put)
-        if np.hypot(*off[:2]) < 0.5 * c.agree_m and abs(off[2]) < 0.5 * c.agree_rad:
+        new, put = last.new, compose(self.poses[last.old], last.motion)
+        if self._is_known(last):
             return
         between = [k for k in self._slipped if last.old < k <= new]
         if between:
