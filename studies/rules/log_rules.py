@@ -79,7 +79,7 @@ PLACES = (
            "c.beside_m", "an old submap reaches as far as the search"),
     Switch("loop_search.closed_ways", SEARCH, "np.full(len(closed), «NEAR_M»)",
            "1e6", "ways are short over closures"),
-    Switch("loop_search.places", SEARCH, "for k in nearest[: «c.places»]",
+    Switch("loop_search.places", SEARCH, "nearest = nearest[: «c.places»]",
            "None", "three stretches of the path are tried, the nearest"),
     Switch("loop_search.settled_before", SEARCH,
            "if «self._is_known(last)»:",
