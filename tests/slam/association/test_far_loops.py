@@ -79,7 +79,18 @@ def test_what_is_far_needs_a_third_that_agrees(is_far, needed, monkeypatch):
         given = put(81 - new, new), Candidate(81 - new, Window(np.zeros(3), 1.0, 0.1), drift)
         monkeypatch.setattr(looked, "_place", lambda _, given=given: given)
         looked._look(new)
-        assert (len(looked.closures) >= needed) is (count >= needed)
+        assert len(looked.closures) == (count if count >= needed else 0)
+
+
+def test_a_closure_that_would_move_the_path_is_refused_where_it_has_a_rival(monkeypatch):
+    looked = search()
+    monkeypatch.setattr(looked, "_is_alone", lambda *_: False)
+    for off, count in (((0.0, 1.0, 0.0), 0), ((0.0, 0.0, 0.0), 2)):
+        for new in (66, 69):
+            given = put(81 - new, new, off), Candidate(81 - new, Window(np.zeros(3), 1.0, 0.1))
+            monkeypatch.setattr(looked, "_place", lambda _, given=given: given)
+            looked._look(new)
+        assert len(looked.closures) == count
 
 
 @pytest.mark.parametrize(("off", "is_found"), [((0.6, 0.0, 0.0), True), ((9.0, 0.0, 0.0), False), ((0, 0, 1.5), False)])
