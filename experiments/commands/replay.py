@@ -111,9 +111,12 @@ class Replay:
             recording = self._timeline(source, names)
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
-                result = held_against(self._one(source, name, recording), references)
-                settle(folder, configs[name])
-                problems += write_results(result, folder, configs[name])
+                mapped = self._one(source, name, recording)
+                # What was computed is written first, which takes seconds.
+                with first_interrupt_waits():
+                    result = held_against(mapped, references)
+                    settle(folder, configs[name])
+                    problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)
                 status = max(status, result.ending.exit_status)
                 if status == INTERRUPTED:

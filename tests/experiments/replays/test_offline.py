@@ -99,3 +99,16 @@ def test_sigterm_keeps_the_map_of_the_scans_so_far(stage, scans, tmp_path, monke
     assert len(walls_of(tmp_path / "out")) == summary["lines"]
     assert scans <= len(np.loadtxt(tmp_path / "out" / "trajectory_estimated.tum")) <= 24
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_sigterm_while_files_are_written_waits_for_them(tmp_path, monkeypatch):
+    written = replay.write_results
+
+    def interrupted(*given):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return written(*given)
+
+    monkeypatch.setattr(replay, "write_results", interrupted)
+    log = write_log(tmp_path / "room.log")
+    assert main(["replay", str(log), "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == WITHOUT_BACKEND
