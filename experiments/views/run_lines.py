@@ -106,7 +106,9 @@ def _untrue(summary: Row) -> str:
     if stated is not None:
         return f"{words}, ANEES {number(stated)} (1 is ideal)"
     nis, share = summary.get("nis"), summary.get("nis_in_band")
-    model = CONSISTENT if nis is None or share is None else noise_model(nis, share)
+    if nis is None:
+        return words
+    model = CONSISTENT if share is None else noise_model(nis, share)
     meaning = "" if model == CONSISTENT else f"; {NOISE_MODELS[model]}"
     return f"{words}, NIS {number(nis)} (1 is ideal{meaning})"
 

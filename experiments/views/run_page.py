@@ -27,7 +27,7 @@ from ..artifacts.settings import KEYS, differing, leaves, options_of
 from ..replays.real_log import REAL_WALLS
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..replays.sources import RECORDED, was_real
-from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..scenario import OFFLINE, STRATEGY_OF_REPLAYS, TrialConfig
 from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 from .measured import measured_tables
@@ -265,7 +265,8 @@ def _command_real(trial: TrialConfig, names: list[str], said: Any) -> str:
     """Return the command that maps a real robot's log again."""
     of_every_log = list(leaves(REAL_WALLS))
     tuned = [item for item in differing(trial) if item[0].split(".")[0] in OPEN_TO_REPLAYS and item not in of_every_log]
-    words = ["chainslam", "replay", trial.world, "--backend", *names, *options_of(tuned)]
+    named = [] if names == [OFFLINE] else ["--backend", *names]
+    words = ["chainslam", "replay", trial.world, *named, *options_of(tuned)]
     for key, value in sorted(said[RECORDED].items()):
         words += [] if value is False else _option(key, value)
     return shlex.join([*words, "--out", "DIR"])
