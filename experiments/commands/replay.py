@@ -16,6 +16,8 @@ from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..artifacts.settings import parse_settings
 from ..library.asked import asked_source
+from ..library.earlier import scored
+from ..library.sessions import placed_log
 from ..replays.measured import check_references, held_against
 from ..replays.real_log import RealOptions
 from ..replays.replay import Association, ReplayOptions
@@ -70,6 +72,9 @@ class Replay:
     compared."""
     reference: Path | None = None
     """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
+    map: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Go on with the map of an earlier run in the same building, of this results folder: the robot's place in that map
+    is found from the log, and both are mapped as one."""
     robot: str | None = None
     """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
     file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
@@ -92,7 +97,11 @@ class Replay:
         for name in self.backend:
             choose("back end", name, BACKENDS, OR_OWN)
         references = read_references(self.relations, self.reference)
-        source = self.source()
+        source, session = self.source(), None
+        if self.map is not None:
+            if not isinstance(source, OwnLog):
+                raise UsageError(f"expected the log of a run with the truth for --map, found {self.log}: leave it out")
+            source, session = placed_log(source, self.map, self.backend[0])
         check_references(references, *source.odometry)
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
@@ -109,6 +118,8 @@ class Replay:
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
                 result = held_against(self._one(source, name, recording), references)
+                if session is not None:
+                    result.summary["session"] = scored(session, result)
                 settle(folder, configs[name])
                 problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)
