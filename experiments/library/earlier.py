@@ -50,7 +50,8 @@ class Earlier:
     def faces_in(self, world: World) -> Int[np.ndarray, "s k"]:
         """Return the true face of each beam; -1 for all where the building has changed since."""
         faces = self.run.true_face_of_beam
-        return faces if np.array_equal(world.faces, self.run.true_faces) else np.full_like(faces, -1)
+        known = self.run.true_faces is not None and np.array_equal(world.faces, self.run.true_faces)
+        return faces if known else np.full_like(faces, -1)
 
 
 def read_earlier(folder: Path, config: TrialConfig) -> Earlier:
