@@ -89,6 +89,8 @@ class TrialConfig:
     """The run is stopped once the odometry has counted this path length."""
     time_limit_s: Period | None = None
     """The run is stopped after this time on the robot's own clock."""
+    map: str | None = None
+    """Results folder of an earlier run in the same building: the robot finds its place in that map and continues it."""
     odometry: OdometrySource = "wheels"
     """Source of the motion between two scans: wheel odometry, or scan matching that starts from it."""
     robot: RobotConfig = field(default_factory=RobotConfig)

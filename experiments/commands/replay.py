@@ -16,6 +16,8 @@ from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..artifacts.settings import parse_settings
 from ..library.asked import asked_source
+from ..library.earlier import scored
+from ..library.sessions import placed_log
 from ..replays.measured import check_references, held_against
 from ..replays.real_log import RealOptions
 from ..replays.replay import Association, ReplayOptions
@@ -72,6 +74,9 @@ class Replay:
     compared."""
     reference: Path | None = None
     """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
+    map: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Go on with the map of an earlier run in the same building, of this results folder: the robot's place in that map
+    is found from the log, and both are mapped as one."""
     robot: str | None = None
     """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
     file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
@@ -94,10 +99,14 @@ class Replay:
         for name in self.backend:
             choose("back end", name, BACKENDS, OR_OWN)
         references = read_references(self.relations, self.reference)
-        source = self.source()
+        source, session = self.source(), None
+        names = self.backend or (source.backend,)
+        if self.map is not None:
+            if not isinstance(source, OwnLog):
+                raise UsageError(f"expected the log of a run with the truth for --map, found {self.log}: leave it out")
+            source, session = placed_log(source, self.map, names[0])
         check_references(references, *source.odometry)
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
-        names = self.backend or (source.backend,)
         folders = {name: out / name if len(names) > 1 else out for name in names}
         with ExitStack() as stack:
             for folder in folders.values():
@@ -115,6 +124,8 @@ class Replay:
                 # What was computed is written first, which takes seconds.
                 with first_interrupt_waits():
                     result = held_against(mapped, references)
+                    if session is not None:
+                        result.summary["session"] = scored(session, result)
                     settle(folder, configs[name])
                     problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)

@@ -59,6 +59,7 @@ def explore(
     level: str | None = None,
     threshold: float | None = None,
     negate: bool = False,
+    map: str | Path | Run | None = None,
     fence: str | None = None,
     preset: PresetName | None = None,
     robot: str | Path | RobotSpec | None = None,
@@ -86,6 +87,7 @@ def explore(
         "backend": backend, "strategy": strategy, "seed": seed, "p0": p0, "errorless": errorless, "sweep": sweep,
         "navigation": navigation, "following": following, "odometry": odometry, "max_steps": max_steps,
         "max_path": max_path, "time_limit": time_limit, "return_to_start": return_to_start, "start": start,
+        "map": map.folder if isinstance(map, Run) else map,
     }  # fmt: skip
     said = {key: value for key, value in said.items() if value is not None and value != DEFAULTS[key]}
     drawing = drawing_said(

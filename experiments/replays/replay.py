@@ -78,6 +78,8 @@ class RecordedRun:
     start_cov: Float[np.ndarray, "3 3"]
     true_poses_world: Float[np.ndarray, "s 3"]
     true_face_of_beam: Int[np.ndarray, "s k"]
+    true_faces: Float[np.ndarray, "f 2 2"] | None = None
+    """The faces of its world; None where the world itself is at hand."""
     cut_short: str = ""
     """Why the drive ended early, in words."""
 
@@ -120,7 +122,7 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
         raise UsageError(
             "expected a log with the truth, found one that does not come from a simulated run: record it again"
         )
-    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces)
+    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces, arrays["true_faces"])
 
 
 class ReplayedRobot(RecordedRobot):

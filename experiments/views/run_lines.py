@@ -120,7 +120,8 @@ def notes_of(summary: Row) -> list[str]:
         "lost_steps": "steps without a place in the map",
         "own_beams": "returns from the robot's own body, left out",
     }
-    notes = [f"{number(summary[key])} {words}" for key, words in counts.items() if summary.get(key)]
+    notes = [words_on_session(summary["session"])] if summary.get("session") else []
+    notes += [f"{number(summary[key])} {words}" for key, words in counts.items() if summary.get(key)]
     notes += [f"the scanner's ranges have {words}" for words in words_on_ranges(range_errors_of(summary))]
     if (summary.get("curved_share") or 0.0) > MOSTLY:
         notes.append(
@@ -132,6 +133,18 @@ def notes_of(summary: Row) -> list[str]:
     if way_back is not None and way_back <= MOST_LOCKED:
         notes.append(f"the robot can drive only {percent(way_back)} % of its path again")
     return notes
+
+
+def words_on_session(said: Row) -> str:
+    """Return where a later session found itself in the map of an earlier one, or why it has a map of its own."""
+    places = listed([f"({x:.2f}, {y:.2f}) m, {degrees(turn):.0f} degrees" for x, y, turn in said["places_world"]])
+    if said["first_step"]:
+        after = number(said["placed_at_step"] - said["first_step"] + 1)
+        return f"the robot's place in the map of {said['map']} was found after {after} scans; both sessions are one map"
+    why = {0: "nothing fits", 1: f"it may be {places}, but only one search says so"}.get(
+        len(said["places_world"]), f"two places are possible: {places}"
+    )
+    return f"the robot's place in the map of {said['map']} was not found ({why}): this session has a map of its own"
 
 
 def words_on_ranges(errors: RangeErrors) -> list[str]:
