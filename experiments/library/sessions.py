@@ -138,15 +138,13 @@ def placed_log(source: OwnLog, folder: Path, backend: str) -> tuple[OwnLog, dict
         return replace(source, run=run), told
     both = replace(
         run,
-        trial=_beyond(earlier.run, run.trial),
         recording=joined(earlier.run.recording, run.recording, carried[0]),
         start_pose=earlier.run.start_pose,
         start_cov=earlier.run.start_cov,
         true_poses_world=np.vstack([earlier.run.true_poses_world, run.true_poses_world]),
         true_face_of_beam=np.vstack([earlier.faces_in(source.world), run.true_face_of_beam]),
     )
-    world = replace(source.world, start=earlier.run.true_poses_world[0])
-    return replace(source, run=both, world=world), told
+    return replace(source, run=both), told
 
 
 def begin_later(folder: Path, scenario: Scenario, watch: Watch) -> Begun:

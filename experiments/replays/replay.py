@@ -187,6 +187,9 @@ def replay(
     check(config)
     world = world or load_world(config.world, config.start, config.drawing)
     recording = run.recording
+    if recording.carried is not None:  # Start and limits in the settings are those of the last session.
+        world = replace(world, start=run.true_poses_world[0])
+        config = replace(config, max_steps=len(recording) + 1, max_path_m=None, time_limit_s=None)
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))
     backend_made = make_backend(config, run.start_pose, run.start_cov)

@@ -20,6 +20,7 @@ SQUARE = {
         }
     ],
 }
+pytestmark = pytest.mark.long
 ELSEWHERE = ("rooms", "--seed", "2", "--start", "4.5", "1.5", "2.0")
 
 
