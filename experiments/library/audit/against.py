@@ -1,0 +1,72 @@
+"""What a trajectory is compared with: the truth or a reference at the same times."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ...scoring.without_truth.relations import interpolated
+from ...usage import UsageError
+from .stated import Stated
+
+GAP_S = 1.0
+"""Longer gaps of the truth are not interpolated."""
+SAME_S = 1e-5
+"""Files write times with six digits."""
+CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}
+
+
+@dataclass(frozen=True)
+class Paired:
+    """The true poses at the times of a trajectory, NaN where they are unknown."""
+
+    poses_world: Float[np.ndarray, "n 3"]
+    known: Bool[np.ndarray, " n"]
+    note: str
+
+
+def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Paired:
+    """Return the truth at the times of a trajectory; raises UsageError if their clocks do not overlap.
+
+    It is interpolated between samples that are at most a second apart, or the nearest within `nearest_s`.
+    """
+    asked, known_s = stated.time_s, truth.time_s
+    after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
+    before = np.maximum(after - 1, 0)
+    rows = np.where(np.abs(known_s[before] - asked) <= np.abs(known_s[after] - asked), before, after)
+    if nearest_s is not None:
+        known = np.abs(known_s[rows] - asked) <= nearest_s
+        poses, words = truth.poses_world[rows], f"nearest within {nearest_s:g} s"
+    else:
+        exact = np.abs(known_s[rows] - asked) <= SAME_S
+        known = exact | ((known_s[before] <= asked) & (asked <= known_s[after]) & (after > before)
+                         & (known_s[after] - known_s[before] <= GAP_S))  # fmt: skip
+        poses = np.where(exact[:, None], truth.poses_world[rows], interpolated(known_s, truth.poses_world, asked))
+        words = "" if np.all(exact[known]) else "interpolated"
+    if not np.any(known):
+        raise UsageError(_no_common_time(stated, truth, nearest_s))
+    left = len(asked) - int(np.count_nonzero(known))
+    notes = [f"{truth.name} is {words}"] if words else []
+    notes += [f"{left} of {len(asked)} poses have no time in it"] if left else []
+    return Paired(poses, known, "; ".join(notes))
+
+
+def _no_common_time(stated: Stated, truth: Stated, nearest_s: float | None) -> str:
+    low, high, least, most = (float(each) for path in (stated, truth) for each in path.time_s[[0, -1]])
+    unit = next((name for name, s in CLOCKS.items() if s * most >= low and s * least <= high), None)
+    back = next((name for name, s in CLOCKS.items() if most >= s * low and least <= s * high), None)
+    if most >= low and least <= high:
+        near = f"within {nearest_s:g} s" if nearest_s is not None else f"between samples at most {GAP_S:g} s apart"
+        return (
+            f"expected times of {stated.name} {near} of {truth.name}, found none: --nearest SECONDS takes nearer ones"
+        )
+    if unit is not None or back is not None:
+        hint = f"the times of {truth.name if unit else stated.name} are in {unit or back}: divide them"
+    elif most - least <= 2.0 * (high - low) and min(abs(least), abs(low)) < 1.0:
+        hint = f"the times of one count from its beginning: add {abs(low - least):.3f} s"
+    else:
+        hint = "use one of the same drive, on the same clock"
+    return (
+        f"expected a common time, found {stated.name} of {low:.3f} to {high:.3f} s and {truth.name} of {least:.3f} to"
+        f" {most:.3f} s: {hint}"
+    )
