@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..library.audit.auditing import audit
+from ..artifacts.files import replacing
+from ..library.audit.auditing import REPORT, audit
 from ..terminal.answers import found
+from ..terminal.console import say
 from ..terminal.streams import one_line
 
 
@@ -38,7 +40,9 @@ class Audit:
     nearest: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Take the nearest true pose within so many seconds, instead of interpolating between poses at most 1 s apart."""
     topic: str | None = None
-    """Topic of a ROS bag's poses, if it has several."""
+    """Topic of a ROS bag's poses with covariance, if it has several."""
+    truth_topic: str | None = None
+    """Topic of the true poses in a bag that is given as --truth or --reference."""
     out: Path | None = None
     """Folder for audit.json, report.html and tables.tex."""
 
@@ -46,9 +50,13 @@ class Audit:
         """Run the command and return its exit status; raises UsageError for bad input."""
         audited = audit(
             self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations, error=self.error,
-            align=self.align, reference_sigma=self.reference_sigma, nearest=self.nearest,
+            align=self.align, reference_sigma=self.reference_sigma, nearest=self.nearest, topic=self.topic,
+            truth_topic=self.truth_topic,
         )  # fmt: skip
         found(**audited.record())
         for line in audited.verdict:
             print(f"{'  ' if line.startswith(' ') else ''}{one_line(line)}")
+        if self.out is not None:
+            replaced = replacing(self.out / REPORT)
+            say(f"report in {audited.report(self.out)}{replaced}")
         return 0

@@ -48,19 +48,21 @@ class NeesCurve:
     """Where that of a consistent estimator lies in 95 % of all cases."""
     quartiles: Float[np.ndarray, "2 p"] | None = None
     """Of many runs; drawn as a pale band."""
+    colour: str | None = None
+    """None takes that of the back end."""
 
 
 @own_look()
-def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
-    """Return the NEES of estimators against the path length, on a logarithmic axis, with the band of a consistent one.
+def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)") -> Figure:
+    """Return the NEES of estimators on a logarithmic axis, with the band of a consistent one.
 
-    It is as wide as a phone's screen, so that its letters can be read there.
+    `along` names what it is drawn against. It is as wide as a phone's screen, so that its letters can be read there.
     """
     figure, axes = _figure("", NARROW)
     longest = max(curves, key=lambda curve: curve.path_m[-1])
     axes.fill_between(longest.path_m, *longest.band, color=palette.SOLID, linewidth=0, zorder=1)
     for curve in curves:
-        colour = palette.of_backend(curve.name)
+        colour = curve.colour or palette.of_backend(curve.name)
         if curve.quartiles is not None and len(curves) <= MOST_SPREADS:
             axes.fill_between(curve.path_m, *curve.quartiles, color=colour, alpha=0.15, linewidth=0, zorder=2)
         width = 1.5 if curve.quartiles is not None else 0.9
@@ -68,7 +70,7 @@ def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
     axes.fill_between([], [], [], color=palette.SOLID, linewidth=0, label="95 % band")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    _label(axes, "path length (m)", "NEES of the pose")
+    _label(axes, along, "NEES of the pose")
     return figure
 
 

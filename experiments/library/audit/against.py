@@ -11,8 +11,8 @@ from .stated import Stated
 
 GAP_S = 1.0
 """Longer gaps of the truth are not interpolated."""
-SAME_S = 1e-5
-"""Files write times with six digits."""
+SAME_S = 1e-3
+"""Times closer than this are one: a robot moves a millimetre meanwhile."""
 CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}
 
 
@@ -28,21 +28,22 @@ class Paired:
 def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Paired:
     """Return the truth at the times of a trajectory; raises UsageError if their clocks do not overlap.
 
-    It is interpolated between samples that are at most a second apart, or the nearest within `nearest_s`.
+    If most samples of the truth are at times of the trajectory, to 1 ms, only these are taken; otherwise it is
+    interpolated between samples that are at most a second apart. `nearest_s` takes the nearest one within it.
     """
     asked, known_s = stated.time_s, truth.time_s
     after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
     before = np.maximum(after - 1, 0)
     rows = np.where(np.abs(known_s[before] - asked) <= np.abs(known_s[after] - asked), before, after)
+    off = np.abs(known_s[rows] - asked)
+    inside = np.count_nonzero((known_s >= asked[0] - SAME_S) & (known_s <= asked[-1] + SAME_S))
     if nearest_s is not None:
-        known = np.abs(known_s[rows] - asked) <= nearest_s
-        poses, words = truth.poses_world[rows], f"nearest within {nearest_s:g} s"
+        known, poses, words = off <= nearest_s, truth.poses_world[rows], f"nearest within {nearest_s:g} s"
+    elif np.count_nonzero(off <= SAME_S) > 0.5 * inside:
+        known, poses, words = off <= SAME_S, truth.poses_world[rows], ""
     else:
-        exact = np.abs(known_s[rows] - asked) <= SAME_S
-        known = exact | ((known_s[before] <= asked) & (asked <= known_s[after]) & (after > before)
-                         & (known_s[after] - known_s[before] <= GAP_S))  # fmt: skip
-        poses = np.where(exact[:, None], truth.poses_world[rows], interpolated(known_s, truth.poses_world, asked))
-        words = "" if np.all(exact[known]) else "interpolated"
+        known = (known_s[before] <= asked) & (asked <= known_s[after]) & (known_s[after] - known_s[before] <= GAP_S)
+        poses, words = interpolated(known_s, truth.poses_world, asked), "interpolated"
     if not np.any(known):
         raise UsageError(_no_common_time(stated, truth, nearest_s))
     left = len(asked) - int(np.count_nonzero(known))
@@ -53,8 +54,8 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
 
 def _no_common_time(stated: Stated, truth: Stated, nearest_s: float | None) -> str:
     low, high, least, most = (float(each) for path in (stated, truth) for each in path.time_s[[0, -1]])
-    unit = next((name for name, s in CLOCKS.items() if s * most >= low and s * least <= high), None)
-    back = next((name for name, s in CLOCKS.items() if most >= s * low and least <= s * high), None)
+    unit = next((name for name, s in CLOCKS.items() if _agree((low, high), (s * least, s * most))), None)
+    back = next((name for name, s in CLOCKS.items() if _agree((s * low, s * high), (least, most))), None)
     if most >= low and least <= high:
         near = f"within {nearest_s:g} s" if nearest_s is not None else f"between samples at most {GAP_S:g} s apart"
         return (
@@ -70,3 +71,9 @@ def _no_common_time(stated: Stated, truth: Stated, nearest_s: float | None) -> s
         f"expected a common time, found {stated.name} of {low:.3f} to {high:.3f} s and {truth.name} of {least:.3f} to"
         f" {most:.3f} s: {hint}"
     )
+
+
+def _agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether two spans of time overlap and are about as long."""
+    lengths = sorted((one[1] - one[0], other[1] - other[0]))
+    return one[1] >= other[0] and one[0] <= other[1] and lengths[1] <= 10.0 * lengths[0]

@@ -128,10 +128,17 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
             f" {len(rows)}: give more of the drive"
         )
     poses, true, covs = stated.poses_world[rows], at.poses_world[rows], covs[rows]
-    align: Align = "start" if stated.is_from_start else options.align
+    align: Align = options.align if stated.held is None else "start"
     if align != "none":
-        first = (stated.poses_world[at.known], at.poses_world[at.known])
-        motion = motion_at_start(*first) if align == "start" else motion_of_all(*first)
+        start = int(np.argmax(at.known)) if stated.held is None else stated.held
+        if not at.known[start]:
+            raise UsageError(
+                f"expected the truth of the pose that {stated.name} is told from, its {start + 1}th, found none in"
+                f" {truth.name}: add it"
+            )
+        both = (stated.poses_world[at.known], at.poses_world[at.known])
+        start = int(np.count_nonzero(at.known[:start]))
+        motion = motion_of_all(*both) if align == "all" else motion_at_start(*(path[start:] for path in both))
         poses, covs = moved(poses, motion), moved_covs(covs, motion, frame)
     if options.reference_sigma is not None:
         covs = covs + _of_reference(poses, options.reference_sigma, frame)

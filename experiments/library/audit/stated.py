@@ -58,8 +58,8 @@ class Stated:
     """What was assumed, in words."""
     frame: Frame | None = None
     """The frame of the errors, if the file tells it."""
-    is_from_start: bool = False
-    """Whether the first pose is the frame of the others."""
+    held: int | None = None
+    """Row of the pose that is the frame of the others, and known in it."""
     pair_covs: PairCovs | None = None
     """The joint covariance of two poses, each in its body frame, given their rows."""
     truth: Path | None = None
@@ -120,7 +120,7 @@ def _by_place(path: Path, rows: Float[np.ndarray, "n w"]) -> Columns:
     if first == PLANAR:
         heading = _in_radians(rows[:, 3], path)
     else:
-        heading, notes = _headings(rows[:, 4:8], path)
+        heading, notes = heading_of(rows[:, 4:8], path)
     size = WIDTHS[width - first]
     covs = symmetric(rows[:, first:], size) if size else None
     return rows[:, 0], np.column_stack([rows[:, 1:3], heading]), covs, notes
@@ -139,7 +139,7 @@ def _by_name(path: Path, header: Sequence[str], rows: Float[np.ndarray, "n w"]) 
         heading = _in_radians(rows[:, known["theta"]], path)
     else:
         parts = [rows[:, known[q]] if q in known else np.zeros(len(rows)) for q in ("qx", "qy", "qz", "qw")]
-        heading, notes = _headings(np.stack(parts, axis=1), path)
+        heading, notes = heading_of(np.stack(parts, axis=1), path)
     cells = {pair: k for k, name in enumerate(names) if (pair := _pair(name)) is not None and k not in known.values()}
     poses = np.column_stack([rows[:, known["x"]], rows[:, known["y"]], heading])
     if not {(0, 0), (1, 1), (2, 2)} <= set(cells):
@@ -175,7 +175,7 @@ def symmetric(cells: Float[np.ndarray, "n w"], size: int) -> Float[np.ndarray, "
     return covs
 
 
-def _headings(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
+def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
     """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
     length = np.linalg.norm(q, axis=1)
     if np.any(bad := ~(np.abs(length - 1.0) < UNIT)):

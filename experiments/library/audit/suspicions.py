@@ -47,7 +47,7 @@ def check(stated: Stated) -> Checked:
             " heading, or the 21 of ROS"
         )
     finite = np.all(np.isfinite(covs), axis=(1, 2))
-    zero = finite & np.all(covs == 0.0, axis=(1, 2))
+    zero = finite & np.all(covs == 0.0, axis=(1, 2)) & (np.arange(len(covs)) != stated.held)
     symmetric = np.zeros(len(covs), dtype=bool)
     symmetric[finite] = np.all(
         np.abs(covs - covs.swapaxes(1, 2))[finite] <= ASYMMETRIC * np.abs(covs[finite]).max(axis=(1, 2))[:, None, None],
@@ -58,7 +58,7 @@ def check(stated: Stated) -> Checked:
         "NaN or infinite": ~finite,
         "all zero": zero,
         "not symmetric": finite & ~symmetric,
-        "not positive definite": finite & ~zero & symmetric & ~definite,
+        "not positive definite": finite & ~zero & symmetric & ~definite & (np.arange(len(covs)) != stated.held),
     }
     usable = finite & symmetric & definite & ~zero
     notes = []
