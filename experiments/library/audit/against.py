@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ...scoring.without_truth.relations import interpolated
+from ...scoring.without_truth.relations import SAME_TIME_S, interpolated
 from ...usage import UsageError
 from .stated import Stated
 
@@ -29,7 +29,8 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
     """Return the truth at the times of a trajectory; raises UsageError if their clocks do not overlap.
 
     If most samples of the truth are at times of the trajectory, to 1 ms, only these are taken; otherwise it is
-    interpolated between samples that are at most a second apart. `nearest_s` takes the nearest one within it.
+    interpolated between samples that are at most a second apart, or, where most are farther apart, the nearest within
+    10 ms. `nearest_s` takes the nearest within it.
     """
     asked, known_s = stated.time_s, truth.time_s
     after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
@@ -44,6 +45,8 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
     else:
         known = (known_s[before] <= asked) & (asked <= known_s[after]) & (known_s[after] - known_s[before] <= GAP_S)
         poses, words = interpolated(known_s, truth.poses_world, asked), "interpolated"
+        if np.count_nonzero(off <= SAME_TIME_S) > np.count_nonzero(known):
+            return paired(stated, truth, SAME_TIME_S)
     if not np.any(known):
         raise UsageError(_no_common_time(stated, truth, nearest_s))
     left = len(asked) - int(np.count_nonzero(known))
@@ -63,8 +66,8 @@ def _no_common_time(stated: Stated, truth: Stated, nearest_s: float | None) -> s
         )
     if unit is not None or back is not None:
         hint = f"the times of {truth.name if unit else stated.name} are in {unit or back}: divide them"
-    elif most - least <= 2.0 * (high - low) and min(abs(least), abs(low)) < 1.0:
-        hint = f"the times of one count from its beginning: add {abs(low - least):.3f} s"
+    elif _agree((0.0, high - low), (0.0, most - least)):
+        hint = f"if they count from different beginnings, shift one by about {abs(low - least):.3f} s"
     else:
         hint = "use one of the same drive, on the same clock"
     return (

@@ -151,7 +151,7 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
         stated.name, frame, stated.time_s[rows], left, covs, *_scores(left, covs),
         stated.anees_from_start or _from_start(poses, true, covs, frame), _lags(stated, rows, poses, true, covs, frame),
         tuple(filter(None, (*stated.notes, at.note, *checked.notes, _aligned(align)))),
-        tuple(filter(None, (*hints(left, covs), order))),
+        (order,) if order else tuple(hints(left, covs)),
     )  # fmt: skip
 
 

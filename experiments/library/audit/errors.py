@@ -76,7 +76,9 @@ def motion_of_all(estimated: Poses, true: Poses) -> Float[np.ndarray, "3"]:
     return alignment_of_paths(estimated, true)
 
 
-def since_start(estimated: Poses, true: Poses, covs: Covs, frame: Frame) -> tuple[Poses, Covs]:
+def since_start(
+    estimated: Poses, true: Poses, covs: Covs, frame: Frame
+) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 3 3"]]:
     """Return the errors of the poses relative to the first one, and their covariances, which may be none.
 
     The error of the first pose is taken for one that the estimate carries along, as one that nothing observes: in the

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...campaign.comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT, WITHIN
-from ...scoring.statistics import FEW_RUNS, estimate, mean_interval
+from ...scoring.statistics import FEW_RUNS, estimate
 from ...views.numbers import number
 from .draws import Score, interval, pooled_dof
 
@@ -16,7 +16,8 @@ NO_MATTER = 1.21
 """An ANEES within this factor of 1, errors within 10 % of the stated sigma, is consistent however sure it is."""
 LEAST_DOF = 10.0
 """A few errors that last may be small by luck: with fewer degrees of freedom nothing is called too cautious."""
-LEAST_BLOCKS = 5
+STRETCH = 4.0
+"""Times that an error lasts: means over shorter stretches are not independent."""
 
 
 @dataclass(frozen=True)
@@ -105,15 +106,17 @@ def compare(
 ) -> Pair:
     """Return the comparison of two series of NEES at the same times, which tell as much as `draws` independent ones.
 
-    The series are cut into as many stretches at most, each as long as its errors last, and the logarithms of their
-    mean NEES are compared in pairs.
+    The series are cut into stretches several times as long as errors last, and the logarithms of their mean NEES are
+    compared in pairs, by Student's t.
     """
-    blocks = max(int(min(draws, len(first))), 1)
+    blocks = max(int(min(draws, len(first)) / STRETCH), 1)
     logs = [
         np.log([max(float(part.mean()), 1e-300) for part in np.array_split(series, blocks)])
         for series in (first, second)
     ]
     off = logs[0] - logs[1]
-    within = mean_interval(off) if blocks >= LEAST_BLOCKS else None
-    ends = None if within is None else (float(np.exp(within[0])), float(np.exp(within[1])))
+    found = estimate({(str(k), 0): float(value) for k, value in enumerate(off)})
+    ends: tuple[float, float] | None = None
+    if found is not None and found.low_buildings is not None and found.high_buildings is not None:
+        ends = float(np.exp(found.low_buildings)), float(np.exp(found.high_buildings))
     return Pair(*names, float(np.exp(np.mean(off))), ends, blocks)
