@@ -1,6 +1,7 @@
 """An audit in words."""
 
 from math import degrees
+from typing import Any
 
 from ...views.numbers import number, percent
 from .audited import DEFAULT, IN_WORDS, Audited
@@ -30,7 +31,7 @@ def lines(found: Audited, is_told: bool) -> list[str]:
     return told
 
 
-def _sizes(record: dict[str, float], kind: str) -> str:
+def _sizes(record: dict[str, Any], kind: str) -> str:
     metres, turn = record[f"{kind}_position_m"], record[f"{kind}_heading_rad"]
     return f"{number(metres)} m and {number(degrees(turn))} degrees"
 
