@@ -110,7 +110,7 @@ class Audited:
 def _figures(of: Score) -> dict[str, Any]:
     coverage = {f"{level:g}": share for level, share in zip(LEVELS, of.covered, strict=True)}
     return {
-        "count": of.count, "anees": of.anees, "anees_interval": [of.low, of.high], "independent": of.draws,
+        "count": of.count, "anees": of.anees, "anees_interval": [of.low, of.high], "effective_samples": of.draws,
         "median": of.median, "coverage": coverage,
     }  # fmt: skip
 
@@ -155,7 +155,7 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
     )  # fmt: skip
 
 
-def held_against(stated: Stated, relations: Relations, options: Options) -> Audited:
+def audited_relations(stated: Stated, relations: Relations, options: Options) -> Audited:
     """Return a trajectory's relations between poses against measured ones; raises UsageError where nothing can be said.
 
     Without the joint covariance of two poses the largest possible one is taken, 2 (P_a + P_b), of whatever correlation.

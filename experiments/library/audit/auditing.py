@@ -16,7 +16,7 @@ from ...artifacts.files import json_bytes, stamp, write
 from ...artifacts.run_folder import prepare
 from ...scoring.without_truth.references import read_relations
 from ...usage import UsageError
-from .audited import Align, Audited, Options, audited, held_against
+from .audited import Align, Audited, Options, audited, audited_relations
 from .bags import read_poses
 from .graphs import is_graph, read_graph
 from .stated import Frame, Stated, read_folder, read_text
@@ -120,7 +120,7 @@ def audit(
     stated = _named([read(path, topic) for path in paths])
     if relations is not None:
         measured = read_relations(Path(relations))
-        found = tuple(held_against(each, measured, options) for each in stated)
+        found = tuple(audited_relations(each, measured, options) for each in stated)
         return Audit(found, None, _pairs(found, stated[:1] * len(found)), tuple(asked))
     known = true or references or _own(stated)
     if len(known) not in (1, len(paths)):

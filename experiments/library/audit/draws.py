@@ -32,7 +32,7 @@ class Score:
     high: float
     """95 % interval of the ANEES."""
     draws: float
-    """Independent errors that tell as much."""
+    """Effective sample size: how many independent errors have a mean that scatters as much."""
     dof: float
     """Degrees of freedom of the interval."""
     median: float

@@ -52,8 +52,8 @@ def _how(found: Sequence[Audited]) -> str:
     frames = " and ".join(dict.fromkeys(IN_WORDS[each.frame] for each in found))
     return (
         f"NEES: squared error over stated covariance; {frames}. ANEES: its mean over the number of its axes, ideally 1,"
-        " with the 95 % interval in brackets. Independent: errors that last from pose to pose tell less than their"
-        " number; the interval is that of so many."
+        " with the 95 % interval in brackets. Effective samples: errors that last from pose to pose count once, and the"
+        " interval is that of so many independent ones."
     )
 
 
@@ -79,7 +79,7 @@ def _table(found: Sequence[Audited], pooled: Pooled | None) -> PageTable:
             "position": lambda row: _mean(row["position"]) if "position" in row else NONE,
             "heading": lambda row: _mean(row["heading"]) if "heading" in row else NONE,
             "from the start": lambda row: number(row.get("anees_from_start")),
-            "independent": lambda row: number(row.get("independent"), 2),
+            "effective samples": lambda row: number(row.get("effective_samples"), 2),
             "error, m": lambda row: _beside(row, "position_m", 1.0),
             "error, degrees": lambda row: _beside(row, "heading_rad", degrees(1.0)),
         },

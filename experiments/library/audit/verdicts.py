@@ -104,7 +104,7 @@ class Pair:
 def compare(
     names: tuple[str, str], first: Float[np.ndarray, " n"], second: Float[np.ndarray, " n"], draws: float
 ) -> Pair:
-    """Return the comparison of two series of NEES at the same times, which tell as much as `draws` independent ones.
+    """Return the comparison of two series of NEES at the same times with an effective sample size of `draws`.
 
     The series are cut into stretches several times as long as errors last, and the logarithms of their mean NEES are
     compared in pairs, by Student's t.

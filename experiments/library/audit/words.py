@@ -20,7 +20,7 @@ def lines(found: Audited, is_told: bool) -> list[str]:
         f"{found.name}: {found.verdict.told()}",
         f"  ANEES {least}{number(pose.anees)} (95 % interval {number(pose.low)} to {number(pose.high)}; ideally 1):"
         f" position {number(found.position.anees)}, heading {number(found.heading.anees)}{start}",
-        f"  {pose.count:,} {found.what}, as telling as {number(pose.draws, 2)} independent ones; {inside} % of them in"
+        f"  {pose.count:,} {found.what}, effective sample size {number(pose.draws, 2)}; {inside} % of them inside"
         f" their 95 % region; {frame}",
         f"  rms error {_sizes(record, 'rms')}, stated {_sizes(record, 'stated')}",
     ]
