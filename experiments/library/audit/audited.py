@@ -16,7 +16,7 @@ from .against import paired
 from .draws import LEVELS, Score, score, whitened
 from .errors import errors, motion_at_start, motion_of_all, moved, moved_covs, since_start, to_frame
 from .stated import Frame, Stated
-from .suspicions import check, hints, order_hint
+from .suspicions import check, definite, hints, order_hint
 from .verdicts import Verdict, judge
 
 Align = Literal["none", "start", "all"]
@@ -192,6 +192,11 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
 
 
 def _scores(left: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> tuple[Score, Score, Score]:
+    if not np.all(rest := definite(covs)):
+        raise UsageError(
+            f"expected covariances that are positive definite beside those of the errors' frame, found"
+            f" {np.count_nonzero(~rest)} that are not: give more digits, or move the origin nearer"
+        )
     parts = (slice(0, 3), slice(0, 2), slice(2, 3))
     pose, position, heading = (score(whitened(left[:, at], covs[:, at, at])) for at in parts)
     return pose, position, heading
@@ -225,7 +230,7 @@ def _from_start(
     """Return the ANEES of the poses relative to the first one; None where the covariance falls below that of it."""
     left, stated = since_start(poses, true, covs, frame)
     stated = 0.5 * (stated + stated.swapaxes(1, 2)) + KNOWN_START
-    if np.any(np.linalg.eigvalsh(stated)[:, 0] <= 0.0):
+    if not np.all(definite(stated)):
         return None
     return anees(np.sum(whitened(left, stated) ** 2, axis=1), left.shape[1])
 
@@ -244,6 +249,8 @@ def _lags(
             break
         left = between(between(true[:-steps], true[steps:]), between(poses[:-steps], poses[steps:]))
         total, is_bound = _between_covs(stated, rows[:-steps], rows[steps:], frame)
+        if not np.all(definite(total)):
+            continue
         told = score(whitened(left, total))
         found.append(Lag(steps, rms(np.hypot(*left[:, :2].T)), rms(left[:, 2]), told, is_bound))
     return tuple(found)

@@ -107,7 +107,7 @@ def audit(
     seconds, which is otherwise interpolated. Raises UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
-    given = {
+    given: dict[str, Any] = {
         "truth": true, "reference": references, "relations": [] if relations is None else [relations],
         "error": [] if error is None else [error], "align": [] if align == "none" else [align],
         "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],

@@ -26,6 +26,8 @@ VERTEX, EDGE, FIX = "VERTEX_SE2", "EDGE_SE2", "FIX"
 COLUMNS = {VERTEX: 4, EDGE: 11}
 AT_ONCE = 300
 """Columns of the inverse that are computed together."""
+LARGEST = 1e15
+"""Numbers beyond it are none that a graph has."""
 LEFT_OUT = 0.5
 """Share of lines of other kinds beyond which a file is refused."""
 
@@ -95,7 +97,7 @@ def graph_at(path: Path) -> Graph:
                 numbers = [float(word) for word in words]
             except ValueError as error:
                 raise UsageError(f"{expected} with numbers, found other words in line {at}: correct it") from error
-            if kind != FIX and (len(numbers) != COLUMNS[kind] or not np.all(np.isfinite(numbers))):
+            if kind != FIX and (len(numbers) != COLUMNS[kind] or not np.all(np.abs(numbers) <= LARGEST)):
                 raise UsageError(f"{expected} with {COLUMNS[kind]} numbers, found others in line {at}: correct it")
             fixed.extend(numbers) if kind == FIX else rows[kind].append(numbers)
         elif not kind.startswith("#"):

@@ -177,7 +177,7 @@ def symmetric(cells: Float[np.ndarray, "n w"], size: int) -> Float[np.ndarray, "
 
 def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
     """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
-    length = np.linalg.norm(q, axis=1)
+    length = np.linalg.norm(np.clip(q, -9.0, 9.0), axis=1)  # beyond, its square may be infinite
     if np.any(bad := ~(np.abs(length - 1.0) < UNIT)):
         raise UsageError(
             f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in row"

@@ -17,6 +17,8 @@ DEGREES = float(np.rad2deg(1.0)) ** 2
 """The ratio of variances in degrees and in radians."""
 NEAR = 4.0
 """A ratio within this factor of another one is explained by it."""
+SMALLEST = 1e-24
+"""A variance below it is zero."""
 SINGULAR = 1e-10
 """Smallest eigenvalue of the correlations of a covariance that can be inverted."""
 USABLE = 0.5
@@ -28,6 +30,8 @@ ORDERS_OF_6 = {
 }
 """By name, the column of xx xy xt yy yt tt in other orders of the six."""
 ASYMMETRIC = 1e-6
+LARGEST = 1e12
+"""A variance beyond it, m2 or rad2, says nothing."""
 
 
 @dataclass(frozen=True)
@@ -46,21 +50,22 @@ def check(stated: Stated) -> Checked:
             f"expected {stated.name} with covariances, found poses only: append 6 columns xx xy xt yy yt tt of x, y and"
             " heading, or the 21 of ROS"
         )
-    finite = np.all(np.isfinite(covs), axis=(1, 2))
+    finite = np.all(np.abs(covs) <= LARGEST, axis=(1, 2))  # NaN is not
     zero = finite & np.all(covs == 0.0, axis=(1, 2)) & (np.arange(len(covs)) != stated.held)
     symmetric = np.zeros(len(covs), dtype=bool)
     symmetric[finite] = np.all(
-        np.abs(covs - covs.swapaxes(1, 2))[finite] <= ASYMMETRIC * np.abs(covs[finite]).max(axis=(1, 2))[:, None, None],
+        np.abs(covs[finite] - covs[finite].swapaxes(1, 2))
+        <= ASYMMETRIC * np.abs(covs[finite]).max(axis=(1, 2))[:, None, None],
         axis=(1, 2),
     )
-    definite = _definite(covs)
+    invertible = definite(covs)
     faults = {
-        "NaN or infinite": ~finite,
+        f"NaN or beyond {LARGEST:g}": ~finite,
         "all zero": zero,
         "not symmetric": finite & ~symmetric,
-        "not positive definite": finite & ~zero & symmetric & ~definite & (np.arange(len(covs)) != stated.held),
+        "not positive definite": finite & ~zero & symmetric & ~invertible & (np.arange(len(covs)) != stated.held),
     }
-    usable = finite & symmetric & definite & ~zero
+    usable = finite & symmetric & invertible & ~zero
     notes = []
     for words, wrong in faults.items():
         if np.any(wrong):
@@ -75,10 +80,10 @@ def check(stated: Stated) -> Checked:
     return Checked(usable, tuple(f"{words}: left out" for words in notes))
 
 
-def _definite(covs: Float[np.ndarray, "n d d"]) -> Bool[np.ndarray, " n"]:
+def definite(covs: Float[np.ndarray, "n d d"]) -> Bool[np.ndarray, " n"]:
     """Return which matrices are positive definite, in whatever units their axes are."""
     diagonal = np.einsum("nii->ni", covs)
-    good = np.all(np.isfinite(covs), axis=(1, 2)) & np.all(np.where(np.isfinite(diagonal), diagonal, 0.0) > 0.0, axis=1)
+    good = np.all(np.abs(covs) <= LARGEST, axis=(1, 2)) & np.all(diagonal > SMALLEST, axis=1)
     definite = np.zeros(len(covs), dtype=bool)
     if np.any(good):
         sigmas = np.sqrt(diagonal[good])
@@ -114,11 +119,11 @@ def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -
     """
     given = stated.planar
     assert given is not None
-    is_odd = np.mean(_definite(given)) < 0.9
+    is_odd = np.mean(definite(given)) < 0.9
     for words, covs in other_orders(stated).items():
-        if np.mean(_definite(covs)) < 0.99:
+        if np.mean(definite(covs)) < 0.99:
             continue
-        if is_odd and np.mean(_definite(given)) < USABLE:
+        if is_odd and np.mean(definite(given)) < USABLE:
             return f"they would be positive definite in the order {words}"
         if errors is not None and not _both_fit(errors, given) and _both_fit(errors, covs):
             return f"they would be consistent in the order {words}"
@@ -127,7 +132,7 @@ def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -
 
 def _both_fit(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> bool:
     """Return whether the ANEES of position and of heading are both near 1."""
-    rows = _definite(covs) & np.all(np.isfinite(errors), axis=1)
+    rows = definite(covs) & np.all(np.isfinite(errors), axis=1)
     if not np.any(rows):
         return False
     parts = (whitened(errors[rows][:, at], covs[rows][:, at, at]) for at in (slice(0, 2), slice(2, 3)))
