@@ -29,6 +29,8 @@ ENLARGED = 10.0
 """How much ellipses of the model space are enlarged."""
 NARROW = (5.0, 3.3)
 """Inches of a figure whose letters are as large as those of the text on a phone."""
+WIDEST = 50
+"""Letters of a legend's row beyond which it has two names in place of four."""
 MOST_SPREADS = 4
 """Curves beyond which pale bands would only cover one another."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
@@ -96,7 +98,9 @@ def _label(axes: Axes, x: str, y: str) -> None:
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
     look: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 1.4, "columnspacing": 1.2}
-    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
+    names = [str(words) for words in axes.get_legend_handles_labels()[1]]
+    wide = max((sum(map(len, names[k : k + 4])) for k in range(0, len(names), 4)), default=0) > WIDEST
+    axes.legend(ncols=2 if wide else 4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
 
 
 @own_look()

@@ -44,11 +44,11 @@ class Audit:
     def verdict(self) -> list[str]:
         """The findings, in words: four to six lines for each trajectory."""
         is_told = "--error" in self.asked
-        return [*(line for found in self.trajectories for line in lines(found, is_told)), *self._together()]
+        each = [line for found in self.trajectories for line in lines(found, is_told)]
+        return [*each, *self._pooled(), *(pair.told() for pair in self.pairs)]
 
-    def _together(self) -> list[str]:
-        pooled = [] if self.pooled is None else [pooled_line(self.pooled)]
-        return [*pooled, *(pair.told() for pair in self.pairs)]
+    def _pooled(self) -> list[str]:
+        return [] if self.pooled is None else [pooled_line(self.pooled)]
 
     def record(self) -> dict[str, Any]:
         """Return all figures, by name."""
@@ -74,7 +74,8 @@ class Audit:
 
         place = Path(folder)
         prepare(place)
-        told = [*self._together(), *(f"{each.name}: {each.verdict.told()}" for each in self.trajectories)]
+        singles = [f"{each.name}: {each.verdict.told()}" for each in self.trajectories]
+        told = [*self._pooled(), *singles, *(pair.told() for pair in self.pairs)]
         page = page_of(self.trajectories, self.pooled, self.pairs, told, self.asked)
         write(place / RECORD, json_bytes({**stamp(), "command": list(self.asked), **self.record()}))
         write(place / TABLES, latex(page.all_tables))
