@@ -83,6 +83,11 @@ COMMANDS = {
         "Measure",
         "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
     ),
+    "audit": Entry(
+        "audit",
+        "Audit",
+        "Check the covariances of trajectories against the truth: consistent, overconfident, or too cautious.",
+    ),
     "view": Entry(
         "view",
         "View",

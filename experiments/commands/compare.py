@@ -31,13 +31,13 @@ from ..campaign.plan import (
 from ..campaign.runner import missing, on_cores, run_campaign
 from ..campaign.store import opened
 from ..library.asked import CampaignName, asked_campaign
+from ..library.echo import campaign_line, echo_world
 from ..replays.replay import Association
 from ..scenario import P0, load_world
 from ..terminal.answers import found
 from ..terminal.console import say, written
 from ..terminal.interrupts import INTERRUPTED
 from ..usage import UsageError
-from .echo import campaign_line, echo_world
 
 FAILED = 1
 JOBS_A_CORE = 8

@@ -24,6 +24,7 @@ from ..artifacts.settings import (
 )
 from ..library.asked import SETTLED, asked_trial, continued, refuse_settled
 from ..library.driving import Finished, Watch, begin, go_on
+from ..library.echo import echo_world, expected_steps, run_line
 from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, Scenario, TrialConfig, check, load_world
 from ..terminal.answers import found
 from ..terminal.console import say, written
@@ -33,7 +34,6 @@ from ..trial import TrialResult
 from ..usage import UsageError
 from ..views.run_lines import lines_of, notes_of
 from ..views.timelines import TimelineOutput
-from .echo import echo_world, expected_steps, run_line
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,8 @@ ENLARGED = 10.0
 """How much ellipses of the model space are enlarged."""
 NARROW = (5.0, 3.3)
 """Inches of a figure whose letters are as large as those of the text on a phone."""
+WIDEST = 50
+"""Letters of a legend's row beyond which it has two names in place of four."""
 MOST_SPREADS = 4
 """Curves beyond which pale bands would only cover one another."""
 BAR_BELOW = 0.042
@@ -53,19 +55,21 @@ class NeesCurve:
     """Where that of a consistent estimator lies in 95 % of all cases."""
     quartiles: Float[np.ndarray, "2 p"] | None = None
     """Of many runs; drawn as a pale band."""
+    colour: str | None = None
+    """None takes that of the back end."""
 
 
 @own_look()
-def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
-    """Return the NEES of estimators against the path length, on a logarithmic axis, with the band of a consistent one.
+def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)") -> Figure:
+    """Return the NEES of estimators on a logarithmic axis, with the band of a consistent one.
 
-    It is as wide as a phone's screen, so that its letters can be read there.
+    `along` names what it is drawn against. It is as wide as a phone's screen, so that its letters can be read there.
     """
     figure, axes = _figure("", NARROW)
     longest = max(curves, key=lambda curve: curve.path_m[-1])
     axes.fill_between(longest.path_m, *longest.band, color=palette.SOLID, linewidth=0, zorder=1)
     for curve in curves:
-        colour = palette.of_backend(curve.name)
+        colour = curve.colour or palette.of_backend(curve.name)
         if curve.quartiles is not None and len(curves) <= MOST_SPREADS:
             axes.fill_between(curve.path_m, *curve.quartiles, color=colour, alpha=0.15, linewidth=0, zorder=2)
         width = 1.5 if curve.quartiles is not None else 0.9
@@ -73,7 +77,7 @@ def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
     axes.fill_between([], [], [], color=palette.SOLID, linewidth=0, label="95 % band")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    _label(axes, "path length (m)", "NEES of the pose")
+    _label(axes, along, "NEES of the pose")
     return figure
 
 
@@ -99,7 +103,9 @@ def _label(axes: Axes, x: str, y: str) -> None:
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
     look: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 1.4, "columnspacing": 1.2}
-    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
+    names = [str(words) for words in axes.get_legend_handles_labels()[1]]
+    wide = max((sum(map(len, names[k : k + 4])) for k in range(0, len(names), 4)), default=0) > WIDEST
+    axes.legend(ncols=2 if wide else 4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
 
 
 @own_look()

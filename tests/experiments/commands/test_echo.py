@@ -11,7 +11,7 @@ from PIL import Image
 
 from chainslam.experiments.artifacts.files import json_bytes
 from chainslam.experiments.commands.cli import main
-from chainslam.experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
+from chainslam.experiments.library.echo import campaign_line, expected_steps, run_line, world_lines
 from chainslam.experiments.scenario import TrialConfig, load_world
 from chainslam.experiments.terminal.console import say
 from chainslam.experiments.trial import run_trial
