@@ -83,6 +83,11 @@ COMMANDS = {
         "Measure",
         "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
     ),
+    "plan": Entry(
+        "plan",
+        "Plan",
+        "Draw a dimensioned plan of a run's or a log's map: SVG, PDF, PNG, DXF or GeoJSON, by the file's ending.",
+    ),
     "view": Entry(
         "view",
         "View",

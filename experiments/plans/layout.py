@@ -98,7 +98,7 @@ def _walls(found: Survey) -> tuple[shapely.Geometry, shapely.Geometry]:
 
 
 def _between(faces: Faces, pair: Pair) -> shapely.Geometry:
-    """Return what lies between two faces, up to where the longer ends, but no farther past the other than it is thick."""
+    """Return what lies between two faces, to the end of the longer one, but not far past the end of the other."""
     t = directions(faces.means[pair.first, 0])
     along = np.sort(faces.ends_world[[pair.first, pair.second]] @ t, axis=1)
     low, high = along.min(axis=0)[0], along.max(axis=0)[1]

@@ -12,7 +12,7 @@ from chainslam.slam.map.chains import HEAD, TAIL
 
 from ..scoring.maps.measurements import perimeter
 from .faces import Faces, Node
-from .measuring import Dimension, Kind, area_of, are_firm, walls_of
+from .measuring import Dimension, Kind, are_firm, area_of, walls_of
 from .openings import Gap
 
 LEAST_M2 = 1.0

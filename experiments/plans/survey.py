@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import count
 
 import numpy as np
 import shapely
@@ -127,14 +126,3 @@ def _clutter(faces: Faces, held: set[int]) -> set[int]:
         if not closed and faces.lengths_m[list(chain)].sum() < CLUTTER_M and not held & set(chain):
             found |= set(chain)
     return found
-
-
-def numbered(dimensions: tuple[Dimension, ...]) -> list[str]:
-    """Return a name for each dimension: its kind, and its number among those."""
-    counters = {kind: count(1) for kind in Kind}
-    return [f"{dimension.kind} {next(counters[dimension.kind])}" for dimension in dimensions]
-
-
-def total_m(faces: Faces) -> float:
-    """Return the length of all walls, m."""
-    return float(np.sum(faces.lengths_m))

@@ -1,4 +1,4 @@
-"""A dimensioned plan on a sheet of paper at a scale: walls, dimension lines, rooms, a scale bar and a small title block."""
+"""A dimensioned plan on a sheet of paper: walls, dimension lines, rooms, scale bar and title block, true to scale."""
 
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -176,14 +176,16 @@ def _dimension(axes: Axes, told: DimensionLine, mm: float) -> None:
         if abs(told.offset_m) > 3.0 * TICK_MM * mm:
             parts.append(np.array([end + left * TICK_MM * mm, at + left * TICK_MM * mm]))
     axes.add_collection(LineCollection(parts, colors=THIN, linewidths=0.35), autolim=False)
-    slant = np.array([along + [-along[1], along[0]]])[0] * 0.7 * TICK_MM * mm
+    slant = (along + np.array([-along[1], along[0]])) * 0.7 * TICK_MM * mm
     axes.add_collection(
         LineCollection([np.array([at - slant, at + slant]) for at in line], colors=THIN, linewidths=0.8), autolim=False
     )
     turn = np.deg2rad(told.turn_deg)
     above = np.array([-np.sin(turn), np.cos(turn)]) * (0.5 + 0.5 * LETTER_MM) * mm
-    axes.text(*(line.mean(axis=0) + above), literal(told.words), rotation=told.turn_deg, rotation_mode="anchor", ha="center",
-              va="center", fontsize=LETTER_MM / POINT_MM, color=THIN)  # fmt: skip
+    axes.text(
+        *(line.mean(axis=0) + above), literal(told.words), rotation=told.turn_deg, rotation_mode="anchor",
+        ha="center", va="center", fontsize=LETTER_MM / POINT_MM, color=THIN,
+    )  # fmt: skip
 
 
 def _foot(figure: Figure, sheet: Sheet, said: str, scale: int, width: float, height: float) -> None:
@@ -212,8 +214,10 @@ def _foot(figure: Figure, sheet: Sheet, said: str, scale: int, width: float, hei
         Rectangle((width - 5 - block, 5), block, tall, facecolor=palette.PAGE, edgecolor=palette.INK, linewidth=0.7)
     )
     for k, line in enumerate(words):
-        paper.text(width - 3 - block, 5 + tall - 3.4 - 3.2 * k, literal(line), fontsize=6.5 if k == 0 else 5.5, color=palette.INK,
-                   fontweight="bold" if k == 0 else "normal")  # fmt: skip
+        paper.text(
+            width - 3 - block, 5 + tall - 3.4 - 3.2 * k, literal(line), fontsize=6.5 if k == 0 else 5.5,
+            color=palette.INK, fontweight="bold" if k == 0 else "normal",
+        )  # fmt: skip
 
 
 def letters_m(words: Sequence[str] | str, scale: int, mm: float = LETTER_MM) -> Float[np.ndarray, "2"]:
