@@ -147,7 +147,7 @@ def _lines(
     openings = [each for each in found.dimensions if each.kind is Kind.OPENING]
     rest = sorted((each for each in widths if id(each) not in used), key=lambda each: -each.overlap_m)
     for each in (*openings, *rest):
-        ends, told = _turned(each.ends_world, turn), words_of(each)
+        ends, told = _upright(_turned(each.ends_world, turn)), words_of(each)
         line = DimensionLine(ends, 0.0, told)
         box = _box(line.line.mean(axis=0), letters_m(told, scale), np.deg2rad(line.turn_deg))
         stroke = shapely.LineString(ends).buffer(5e-4 * scale)
@@ -173,6 +173,12 @@ def _axis(each: Dimension, turn: float) -> int | None:
     along = np.abs(np.diff(_turned(each.ends_world, turn), axis=0)[0])
     along = along / max(float(np.hypot(*along)), 1e-9)
     return 0 if along[0] >= SQUARE else 1 if along[1] >= SQUARE else None
+
+
+def _upright(ends: Float[np.ndarray, "2 2"]) -> Float[np.ndarray, "2 2"]:
+    """Return the ends in the order in which text along them is read from below or from the right."""
+    x, y = ends[1] - ends[0]
+    return ends if x > 1e-6 * abs(y) or (abs(x) <= 1e-6 * abs(y) and y > 0.0) else ends[::-1]
 
 
 def _outside(each: Dimension, turn: float, axis: int, edge: float) -> DimensionLine:
