@@ -88,6 +88,11 @@ COMMANDS = {
         "Plan",
         "Draw a dimensioned plan of a run's or a log's map: SVG, PDF, PNG, DXF or GeoJSON, by the file's ending.",
     ),
+    "check": Entry(
+        "check",
+        "Check",
+        "Compare a map with a drawing of the building: which walls are within tolerance, moved, missing or extra.",
+    ),
     "view": Entry(
         "view",
         "View",

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import shapely
 from jaxtyping import Bool, Float, Int
 
 from chainslam.slam.geometry.lines import directions, normals, through
@@ -26,6 +27,8 @@ RIVAL, APART_M, APART_RAD = 0.95, 0.5, float(np.deg2rad(45.0))
 """Another alignment, so far away, must not fit as well as this share of the best."""
 PEAKS = 12
 ROUNDS = 8
+BEHIND_M = 0.05
+"""Where a wall is, its face hides what is so far behind."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,9 @@ def look(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarra
         low, high = np.maximum(span.min(axis=1), 0.0), np.minimum(span.max(axis=1), lengths)
         middle = design[:, 0] + 0.5 * (low + high)[:, None] * t
         off = (ends[wall, 0] - middle) @ normals(alpha[wall]) / np.cos(alpha[wall] - lines[:, 0])
-        good = (np.abs(wrap(alpha[wall] - lines[:, 0])) <= NEAR_RAD) & (high - low >= OVERLAP_M) & (np.abs(off) <= NEAR_M)
+        good = (
+            (np.abs(wrap(alpha[wall] - lines[:, 0])) <= NEAR_RAD) & (high - low >= OVERLAP_M) & (np.abs(off) <= NEAR_M)
+        )
         good &= lengths >= SHORT_M
         if not good.any():
             continue
@@ -66,9 +71,10 @@ def look(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarra
     return found
 
 
-def _back(point: Float[np.ndarray, "2"], pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
+def _back(points: Float[np.ndarray, "*n 2"], pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 2"]:
+    """Return points of the drawing in the frame of the map."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.asarray(np.array([[c, s], [-s, c]]) @ (point - pose[:2]))
+    return np.asarray((points - pose[:2]) @ np.array([[c, -s], [s, c]]))
 
 
 def offsets(
@@ -82,7 +88,9 @@ def offsets(
     return off, np.column_stack([n, np.vecdot(n, np.stack([-turned[:, 1], turned[:, 0]], axis=-1))])
 
 
-def align(faces: Faces, design: Float[np.ndarray, "f 2 2"], guess: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3"]:
+def align(
+    faces: Faces, design: Float[np.ndarray, "f 2 2"], guess: Float[np.ndarray, "3"] | None
+) -> Float[np.ndarray, "3"]:
     """Return the pose of the map's frame in the drawing, by its walls; from a guess, or from anywhere.
 
     Raises UsageError where too little fits, or where two alignments fit about as well.
@@ -90,12 +98,14 @@ def align(faces: Faces, design: Float[np.ndarray, "f 2 2"], guess: Float[np.ndar
     if guess is not None and (fine := refined(faces, design, guess)) is not None and fit(faces, design, fine) >= ENOUGH:
         return fine
     ranked = sorted(((fit(faces, design, pose), tuple(pose)) for pose in _candidates(faces, design)), reverse=True)
-    best = next((fine for _, pose in ranked[:PEAKS] if (fine := refined(faces, design, np.array(pose))) is not None), None)
+    best = next(
+        (fine for _, pose in ranked[:PEAKS] if (fine := refined(faces, design, np.array(pose))) is not None), None
+    )
     score = 0.0 if best is None else fit(faces, design, best)
     if best is None or score < ENOUGH:
         raise UsageError(
-            f"expected a map of the building that is drawn, found {100 * score:.0f} % of its walls on faces of the drawing"
-            f" where it fits best ({100 * ENOUGH:.0f} needed): name the drawing of this building, or say where by --at"
+            f"expected a map of the building that is drawn, found {100 * score:.0f} % of its walls on those of the"
+            f" drawing where it fits best ({100 * ENOUGH:.0f} % needed): name the building's own drawing, or give --at"
         )
     for other, pose in ranked:
         far = np.hypot(pose[0] - best[0], pose[1] - best[1]) > APART_M or abs(wrap(pose[2] - best[2])) > APART_RAD
@@ -108,14 +118,18 @@ def align(faces: Faces, design: Float[np.ndarray, "f 2 2"], guess: Float[np.ndar
     return best
 
 
-def refined(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"] | None:
+def refined(
+    faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3"] | None:
     """Return a pose moved so that the walls lie on their faces, by least absolute offsets; None where nothing does."""
     for _ in range(ROUNDS):
         sightings = look(faces, design, pose)
         if len(sightings) < 3:
             return None
         off, by_pose = offsets(sightings, design, pose)
-        weight = np.array([high - low for low, high in (each.span_m for each in sightings)]) / np.maximum(np.abs(off), 0.005)
+        weight = np.array([high - low for low, high in (each.span_m for each in sightings)]) / np.maximum(
+            np.abs(off), 0.005
+        )
         normal = by_pose.T @ (weight[:, None] * by_pose)
         if np.linalg.cond(normal) > 1e10:
             return None
@@ -125,18 +139,36 @@ def refined(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.nda
 
 def fit(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]) -> float:
     """Return which share of the walls' length lies on faces that look the same way."""
-    points, normal = _samples(faces)
-    on = _on(to_world(points, pose), normal + pose[2], design)
+    points, alpha, _ = _samples(faces)
+    on = _on(to_world(points, pose), alpha + pose[2], design)
     return float(on.mean()) if len(on) else 0.0
 
 
-def _samples(faces: Faces) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, " m"]]:
+def off_design(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]) -> list[int]:
+    """Return the rows of walls of which most lies on no face."""
+    points, alpha, row = _samples(faces)
+    on = _on(to_world(points, pose), alpha + pose[2], design)
+    return [int(wall) for wall in np.unique(row) if on[row == wall].mean() < 0.5]
+
+
+def saw_through(
+    solid: shapely.Geometry, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]
+) -> Bool[np.ndarray, " f"]:
+    """Return behind which faces most is floor that the robot saw; `solid` is all else, in the frame of the map."""
+    share = np.linspace(0.1, 0.9, 9)[:, None, None]
+    behind = design[:, 0] + share * (design[:, 1] - design[:, 0]) + BEHIND_M * normals(through(design)[:, 0])
+    points = _back(behind.reshape(-1, 2), pose)
+    shapely.prepare(solid)
+    return np.asarray(~shapely.contains_xy(solid, *points.T).reshape(9, -1)).mean(axis=0) > 0.5
+
+
+def _samples(faces: Faces) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, " m"], Int[np.ndarray, " m"]]:
     walls = np.flatnonzero(faces.lengths_m >= SHORT_M)
     counts = np.maximum((faces.lengths_m[walls] / SAMPLE_M).astype(int), 1)
     row = np.repeat(walls, counts)
     share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts]) if len(walls) else np.zeros(0)
     ends = faces.ends_world[row]
-    return ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0]), faces.means[row, 0]
+    return ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0]), faces.means[row, 0], row
 
 
 def _on(
@@ -174,7 +206,7 @@ def _peaks(votes: Float[np.ndarray, " v"], weights: Float[np.ndarray, " v"]) -> 
     cells: Int[np.ndarray, " v"] = np.round(votes / 0.1).astype(np.int64)
     if not len(cells):
         return []
-    values, inverse = np.unique(cells, return_inverse=True)
+    _, inverse = np.unique(cells, return_inverse=True)
     score = np.bincount(inverse, weights)
     best = np.argsort(-score, kind="stable")[:PEAKS]
     return [float(np.average(votes[inverse == k], weights=weights[inverse == k])) for k in best]

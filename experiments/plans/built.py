@@ -1,4 +1,4 @@
-"""As built against as designed: has each face of the drawing been built where it is drawn, as far as the map can tell?
+"""As built against as designed: how far each face of a drawing was built from where it is drawn.
 
 Offsets y of walls from their faces are B theta + S s + e: the alignment theta, which nobody knows, the shift s of each
 face, and errors e of the map's joint covariance. Which faces were moved is searched for one by one (data snooping, as
@@ -16,12 +16,14 @@ from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions
 from chainslam.slam.geometry.numerics import TINY
 
-from .alignment import Sighting, look, offsets
+from ..usage import UsageError
+from .alignment import SHORT_M, Sighting, look, off_design, offsets
 from .faces import Faces
 
 FLOOR_M = 0.5e-3
 """What lines of the map err by besides their noise: fits are biased to second order in the noise of ranges."""
 NORMAL = NormalDist()
+LEAST = 3
 OUTSTANDING = 4.0
 """A face that is off by so many times the median stands out."""
 COVERED = 0.2
@@ -113,13 +115,15 @@ class _Fit:
 
 def compare(
     faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"], tolerance_m: float, level: float,
-    is_free: Bool[np.ndarray, " f"], compared: Int[np.ndarray, " c"],
+    is_free: Bool[np.ndarray, " f"],
 ) -> Comparison:  # fmt: skip
     """Compare a map, whose frame lies in the drawing at about `pose`, with the faces of the drawing.
 
-    `is_free` says through which faces the robot saw; those in `compared` get a finding.
+    `is_free` says through which faces the robot saw. Short faces get no finding. Raises UsageError if nothing fits.
     """
     sightings = look(faces, design, pose)
+    if len(sightings) < LEAST:
+        raise UsageError(f"expected walls on {LEAST} faces of the drawing, found {len(sightings)}: give another --at")
     seen: Int[np.ndarray, " m"] = np.unique([each.face for each in sightings]).astype(np.int64)
     model = _model(faces, design, pose, sightings, seen, tolerance_m)
     moved = _moved(model, tolerance_m, level)
@@ -128,7 +132,7 @@ def compare(
     cov = np.linalg.pinv(D.T @ model.W @ D, rcond=TINY, hermitian=True)
     theta = -(cov @ D.T @ model.W @ model.y)[:3]
     findings = []
-    for face in compared.tolist():
+    for face in np.flatnonzero(np.hypot(*(design[:, 1] - design[:, 0]).T) >= SHORT_M).tolist():
         walls = tuple(dict.fromkeys(each.wall for each in sightings if each.face == face))
         share = _covered([each.span_m for each in sightings if each.face == face], design[face])
         at = int(np.searchsorted(seen, face))
@@ -139,6 +143,9 @@ def compare(
         within = abs(values[at]) + NORMAL.inv_cdf(0.975) * sigmas[at] <= tolerance_m
         verdict = Verdict.MOVED if at in moved else Verdict.WITHIN if within else Verdict.UNCLEAR
         findings.append(Finding(verdict, face, walls, float(values[at]), float(sigmas[at]), share))
+    on = {each.wall for each in sightings}
+    extra = [row for row in off_design(faces, design, pose + theta) if row not in on]
+    findings += [Finding(Verdict.EXTRA, row, (row,)) for row in extra]
     return Comparison(pose + theta, cov[:3, :3], tuple(findings), len(seen))
 
 

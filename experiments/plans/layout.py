@@ -25,6 +25,8 @@ ROW_MM = 7.0
 """Distance between rows of dimensions outside, on paper."""
 SQUARE = float(np.cos(np.deg2rad(1.0)))
 """Dimensions within 1 degree of the page's axes are drawn in rows outside."""
+REACH = 0.5
+"""Dimensions are drawn outside that are no farther from there than this share of the plan."""
 SHORTEST_M = 0.3
 
 
@@ -139,7 +141,7 @@ def _lines(
     for axis in (0, 1):
         for sign in (-1.0, 1.0):
             edge = low[1 - axis] - row_m if sign < 0 else high[1 - axis] + row_m
-            for each in _row(widths, turn, axis, sign, used):
+            for each in _row(widths, turn, axis, sign, used, edge, REACH * float(high[1 - axis] - low[1 - axis])):
                 yield _outside(each, turn, axis, edge)
         overall = [each for each in found.dimensions if each.kind is Kind.OVERALL and _axis(each, turn) == axis]
         for each in overall[:1]:
@@ -156,10 +158,13 @@ def _lines(
             yield line
 
 
-def _row(widths: Sequence[Dimension], turn: float, axis: int, sign: float, used: set[int]) -> Iterator[Dimension]:
-    """Choose the dimensions that stand nearest to one side of the page, none over another."""
+def _row(
+    widths: Sequence[Dimension], turn: float, axis: int, sign: float, used: set[int], edge: float, reach: float
+) -> Iterator[Dimension]:
+    """Choose the dimensions that stand nearest to one side of the page, within reach, none over another."""
     spans: list[tuple[float, float]] = []
     mine = [each for each in widths if _axis(each, turn) == axis and id(each) not in used]
+    mine = [each for each in mine if abs(_turned(each.at_world, turn)[1 - axis] - edge) <= reach]
     for each in sorted(mine, key=lambda each: -sign * _turned(each.at_world, turn)[1 - axis]):
         low, high = np.sort(_turned(each.ends_world, turn)[:, axis]).tolist()
         if all(high <= other[0] + 0.02 or low >= other[1] - 0.02 for other in spans):

@@ -1,1 +1,1 @@
-"""Are the dimensions of plans, and what is said of walls that were built elsewhere, as true as they are stated?"""
+"""Whether dimensions of plans, and what is said of walls that were built elsewhere, are as true as stated."""

@@ -37,7 +37,9 @@ def with_moved(world: World, count: int, seed: int) -> tuple[World, tuple[Moved,
         if len(moved) == count:
             break
         by_m = float(np.exp(chance.uniform(np.log(0.01), np.log(0.1)))) * float(chance.choice([-1.0, 1.0]))
-        near = any(world.face_rings[face] == world.face_rings[each.face] and abs(face - each.face) < APART for each in moved)
+        near = any(
+            world.face_rings[face] == world.face_rings[each.face] and abs(face - each.face) < APART for each in moved
+        )
         for shift in () if near else (by_m, -by_m):
             if (changed := _with(world, free, face, shift)) is not None:
                 free = orient(changed, 1.0)
@@ -64,11 +66,19 @@ def _with(world: World, free: shapely.Polygon, face: int, by_m: float) -> shapel
         changed = free.difference(strip) if free.buffer(1e-5).contains(beyond) else None
     changed = None if changed is None else shapely.set_precision(changed, 1e-6).simplify(1e-5)
     is_one = isinstance(changed, shapely.Polygon) and changed.is_valid and len(changed.interiors) == len(free.interiors)
-    return changed if is_one and changed is not None and changed.contains(shapely.Point(world.start[:2]).buffer(0.3)) else None
+    return (
+        changed
+        if is_one and changed is not None and changed.contains(shapely.Point(world.start[:2]).buffer(0.3))
+        else None
+    )
 
 
 def _is_square(
-    free: shapely.Polygon, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"], n: Float[np.ndarray, "2"], least_m: float
+    free: shapely.Polygon,
+    a: Float[np.ndarray, "2"],
+    b: Float[np.ndarray, "2"],
+    n: Float[np.ndarray, "2"],
+    least_m: float,
 ) -> bool:
     """Return whether both neighbours of a face of the floor stand square to it and are long enough to give way."""
     for ring in (free.exterior, *free.interiors):
