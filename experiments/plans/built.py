@@ -20,8 +20,11 @@ from ..usage import UsageError
 from .alignment import SHORT_M, Sighting, look, off_design, offsets
 from .faces import Faces
 
-FLOOR_M = 0.5e-3
-"""What lines of the map err by besides their noise: fits are biased to second order in the noise of ranges."""
+FLOOR_M = 0.2e-3
+"""What lines of the map err by besides their noise."""
+PIECE_M = 5e-3
+"""The same, of a line that lies on several faces: the mapper makes one line of walls that are offset by less than the
+noise of a beam, so that each of them may be that far off it."""
 NORMAL = NormalDist()
 LEAST = 3
 OUTSTANDING = 4.0
@@ -160,7 +163,9 @@ def _model(
         A[k, POSE + 2 * each.wall : POSE + 2 * each.wall + 2] = -along, 1.0
     S = (np.array([each.face for each in sightings])[:, None] == seen).astype(np.float64)
     spread = tolerance_m**2 / 3.0
-    cov = A @ faces.cov @ A.T + FLOOR_M**2 * np.eye(len(y)) + spread * S @ S.T
+    pieces = np.bincount([each.wall for each in sightings])[[each.wall for each in sightings]]
+    floor = np.diag(np.where(pieces > 1, PIECE_M, FLOOR_M) ** 2)
+    cov = A @ faces.cov @ A.T + floor + spread * S @ S.T
     return _Fit(y, B, S, np.linalg.inv(cov), spread)
 
 

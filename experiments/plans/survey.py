@@ -24,8 +24,8 @@ THICKEST_M = 0.6
 FACES_OVERLAP_M = 0.3
 FURNITURE_M2 = 4.0
 """What stands alone in a room is furniture if it covers less than this; otherwise it is a part of the building."""
-CLUTTER_M = 1.5
-"""An open chain of this length is clutter if it stands by itself."""
+CLUTTER_M = 1.0
+"""A shorter open chain is clutter if it stands by itself."""
 
 
 @dataclass(frozen=True)

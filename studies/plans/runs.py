@@ -20,6 +20,11 @@ def plans_in(folder: Path, named: str, most: int) -> list[Path]:
     return found
 
 
+def as_drawn(world: World) -> World:
+    """Return the building of a drawing, built as it is drawn."""
+    return world
+
+
 def explored(
     plans: Sequence[Path], backend: str, seed: int, home: Path, jobs: int, built: Callable[[World], World]
 ) -> list[Path]:
