@@ -10,15 +10,13 @@ import tyro
 from rich.table import Table
 
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
-from chainslam.sim.worlds.readers.ros_map import read_ros_map
-from chainslam.sim.worlds.solid import solid_of
 from chainslam.slam.geometry.poses import to_world
 
 from ..artifacts.files import replacing, write_anywhere
 from ..artifacts.saved import read_config
 from ..plans.alignment import align, saw_through
 from ..plans.built import Comparison, Finding, Verdict, compare
-from ..plans.faces import Faces, read_faces
+from ..plans.faces import Faces, read_faces, read_solid
 from ..scenario import STRATEGY_OF_REPLAYS, load_world
 from ..scoring.maps.measurements import Z_95
 from ..terminal.answers import found
@@ -65,16 +63,12 @@ class Check:
             )
         faces, world = read_faces(self.folder), load_world(self.plan, self.start, self.drawing)
         pose = align(faces, world.faces, self._guess())
-        floor = self.folder / "map.yaml"
-        free = (
-            saw_through(solid_of(read_ros_map(floor)), world.faces, pose)
-            if floor.exists()
-            else np.zeros(len(world.faces), dtype=bool)
-        )
+        solid = read_solid(self.folder)
+        free = np.zeros(len(world.faces), dtype=bool) if solid is None else saw_through(solid, world.faces, pose)
         compared = compare(faces, world.faces, pose, self.tolerance, self.false_alarms, free)
         found(**_record(compared, faces, world.faces), tolerance_m=self.tolerance, false_alarms=self.false_alarms)
         self._print(compared, faces, world.faces)
-        if not floor.exists():
+        if solid is None:
             say("no map.yaml in the folder: a wall that is missing is told as not seen")
         if self.out is not None:
             replaced = replacing(self.out)

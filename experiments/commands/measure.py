@@ -11,9 +11,9 @@ from rich.table import Table
 
 from ..artifacts.maps.mapped import MappedCorners, read_corners
 from ..artifacts.saved import read_config
-from ..plans.faces import END_SIGMA_M, read_faces
+from ..plans.faces import END_SIGMA_M
 from ..plans.records import HEAD, ROUGH, dimension_record, dimension_rows, direction_record, named
-from ..plans.survey import survey
+from ..plans.survey import survey_at
 from ..scoring.maps.measurements import Measured
 from ..terminal.answers import found
 from ..terminal.console import plain_console
@@ -54,7 +54,7 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         corners=[_corner_record(mapped, k) for k in range(len(mapped))],
         rooms=[_room_record(mapped, room) for room in mapped.rooms],
     )
-    measured = survey(read_faces(folder))
+    measured = survey_at(folder)
     found(
         dimensions=[dimension_record(measured, name, each) for name, each in named(measured)],
         main_direction=direction_record(measured),

@@ -9,10 +9,9 @@ import tyro
 
 from ..artifacts.files import json_bytes, replacing, write_anywhere
 from ..artifacts.saved import cut_short
-from ..plans.faces import read_faces
 from ..plans.layout import sheet_of
 from ..plans.records import plan_geojson
-from ..plans.survey import Survey, survey
+from ..plans.survey import Survey, survey_at
 from ..terminal.answers import found
 from ..terminal.console import say
 from ..usage import UsageError
@@ -40,7 +39,7 @@ class Plan:
                 raise UsageError(
                     f"expected a file ending in {', '.join(WRITERS)}, found {file.name}: choose one of these"
                 )
-        measured = survey(read_faces(self.folder))
+        measured = survey_at(self.folder)
         title = self.folder.resolve().name
         end = cut_short(self.folder)
         notes = (WORDS, *([f"the run ended early: {end}"] if end else []))

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float, Int
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import directions, normals, through
 from chainslam.slam.geometry.poses import to_world, wrap
@@ -39,8 +40,8 @@ class Sighting:
     """Row in the map."""
     face: int
     """Row among the faces."""
-    at_map: Float[np.ndarray, "2"]
-    """The point of the wall in the middle of what both have in common, m, in the frame of the map."""
+    at_map: Float[np.ndarray, "2 2"]
+    """The points of the wall at both ends of what both have in common, m, in the frame of the map."""
     span_m: tuple[float, float]
     """From and to along the face, m from its first end."""
 
@@ -66,8 +67,10 @@ def look(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarra
         # Of two faces one behind the other, as of a step, the nearer one; along one line it may be several.
         nearest = np.abs(off[good]).min()
         for face in np.flatnonzero(good & (np.abs(off) <= nearest + 0.05)).tolist():
-            point = middle[face] + off[face] * normals(lines[face, 0])
-            found.append(Sighting(wall, face, _back(point, pose), (float(low[face]), float(high[face]))))
+            ends_of = design[face, 0] + np.array([[low[face]], [high[face]]]) * t[face]
+            n, own = normals(lines[face, 0]), normals(alpha[wall])
+            points = ends_of + (((ends[wall, 0] - ends_of) @ own) / (n @ own))[:, None] * n
+            found.append(Sighting(wall, face, _back(points, pose), (float(low[face]), float(high[face]))))
     return found
 
 
@@ -79,10 +82,13 @@ def _back(points: Float[np.ndarray, "*n 2"], pose: Float[np.ndarray, "3"]) -> Fl
 
 def offsets(
     sightings: list[Sighting], design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k 3"]]:
-    """Return how far (m) each wall is behind its face, and the derivative by the pose of the map in the drawing."""
+) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, "e 3"]]:
+    """Return how far (m) each wall is behind its face, and the derivative by the pose of the map in the drawing.
+
+    Two rows for each sighting, one for each end of what both have in common.
+    """
     points = np.array([each.at_map for each in sightings]).reshape(-1, 2)
-    lines = through(design[[each.face for each in sightings]])
+    lines = through(design[[each.face for each in sightings for _ in range(2)]])
     n, turned = normals(lines[:, 0]), to_world(points, np.array([0.0, 0.0, pose[2]]))
     off = np.vecdot(n, turned + pose[:2]) - lines[:, 1]
     return off, np.column_stack([n, np.vecdot(n, np.stack([-turned[:, 1], turned[:, 0]], axis=-1))])
@@ -127,14 +133,14 @@ def refined(
         if len(sightings) < 3:
             return None
         off, by_pose = offsets(sightings, design, pose)
-        weight = np.array([high - low for low, high in (each.span_m for each in sightings)]) / np.maximum(
+        weight = np.repeat([high - low for low, high in (each.span_m for each in sightings)], 2) / np.maximum(
             np.abs(off), 0.005
         )
         normal = by_pose.T @ (weight[:, None] * by_pose)
         if np.linalg.cond(normal) > 1e10:
             return None
         pose = pose - np.linalg.solve(normal, by_pose.T @ (weight * off))
-    return pose
+    return np.array([*pose[:2], wrap(pose[2])])
 
 
 def fit(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]) -> float:
@@ -152,7 +158,7 @@ def off_design(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.
 
 
 def saw_through(
-    solid: shapely.Geometry, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]
+    solid: BaseGeometry, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarray, "3"]
 ) -> Bool[np.ndarray, " f"]:
     """Return behind which faces most is floor that the robot saw; `solid` is all else, in the frame of the map."""
     share = np.linspace(0.1, 0.9, 9)[:, None, None]

@@ -157,14 +157,15 @@ def _model(
     seen: Int[np.ndarray, " m"], tolerance_m: float,
 ) -> _Fit:  # fmt: skip
     y, B = offsets(sightings, design, pose)
-    A = np.zeros((len(sightings), POSE + 2 * len(faces)))
+    A = np.zeros((len(y), POSE + 2 * len(faces)))
     for k, each in enumerate(sightings):
-        along = directions(faces.means[each.wall, 0]) @ (each.at_map - faces.anchors[each.wall])
-        A[k, POSE + 2 * each.wall : POSE + 2 * each.wall + 2] = -along, 1.0
-    S = (np.array([each.face for each in sightings])[:, None] == seen).astype(np.float64)
+        along = (each.at_map - faces.anchors[each.wall]) @ directions(faces.means[each.wall, 0])
+        A[2 * k : 2 * k + 2, POSE + 2 * each.wall] = -along
+        A[2 * k : 2 * k + 2, POSE + 2 * each.wall + 1] = 1.0
+    S = np.repeat(np.array([each.face for each in sightings])[:, None] == seen, 2, axis=0).astype(np.float64)
     spread = tolerance_m**2 / 3.0
     pieces = np.bincount([each.wall for each in sightings])[[each.wall for each in sightings]]
-    floor = np.diag(np.where(pieces > 1, PIECE_M, FLOOR_M) ** 2)
+    floor = np.diag(np.repeat(np.where(pieces > 1, PIECE_M, FLOOR_M), 2) ** 2)
     cov = A @ faces.cov @ A.T + floor + spread * S @ S.T
     return _Fit(y, B, S, np.linalg.inv(cov), spread)
 

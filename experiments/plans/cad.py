@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import shapely
 from jaxtyping import Float
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.viz.figures.plan_sheet import Sheet, scale_of
 
@@ -77,7 +78,7 @@ def _strokes(space: Any, lines: Iterable[Float[np.ndarray, "2 2"]], layer: str) 
         space.add_line(line[0].tolist(), line[1].tolist(), dxfattribs={"layer": layer})
 
 
-def _hatch(space: Any, shape: shapely.Geometry) -> None:
+def _hatch(space: Any, shape: BaseGeometry) -> None:
     for part in shapely.get_parts(shape):
         if isinstance(part, shapely.Polygon) and not part.is_empty:
             hatch = space.add_hatch(color=256, dxfattribs={"layer": SOLID})

@@ -11,7 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from shapely.geometry.base import BaseGeometry
 
+from chainslam.sim.worlds import WorldError
+from chainslam.sim.worlds.readers.ros_map import read_ros_map
+from chainslam.sim.worlds.solid import solid_of
 from chainslam.slam.estimation.backend import POSE, columns_of
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
@@ -22,8 +26,8 @@ from ..usage import UsageError
 
 END = -1
 """In place of the second wall of a node that is no corner."""
-END_SIGMA_M = 0.03
-"""Standard deviation of an end where no other wall is met: beams stand apart, and the last one ends before the wall."""
+END_SIGMA_M = 0.035
+"""Standard deviation of an end where no other wall is met, in apartments: beams stand apart."""
 BIAS_M = 1e-4
 """Standard deviation, beside the stated one, of where each wall stands: fits of lines are biased by about as much,
 which shows where a wall is known to a few tenths of a millimetre (`make dimensions`)."""
@@ -157,6 +161,15 @@ def read_faces(folder: Path) -> Faces:
             "expected a map with its joint covariance, found one whose estimate was lost: take another run"
         )
     return faces_of(arrays, features["chain"])
+
+
+def read_solid(folder: Path) -> BaseGeometry | None:
+    """Return all that the robot did not see free, from a run's ROS map, in the frame of the map; None without one."""
+    path = folder / "map.yaml"
+    try:
+        return solid_of(read_ros_map(path)) if path.exists() else None
+    except WorldError as error:
+        raise UsageError(f"{error} (in {path})") from error
 
 
 def faces_of(arrays: Mapping[str, Any], chains: Sequence[Mapping[str, Any]]) -> Faces:

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 from shapely.affinity import rotate
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
@@ -85,7 +86,7 @@ def _closings(found: Survey) -> list[Float[np.ndarray, "2 2"]]:
     return [np.array([found.faces.place(gap.first), found.faces.place(gap.second)]) for gap in found.gaps]
 
 
-def _walls(found: Survey) -> tuple[shapely.Geometry, shapely.Geometry]:
+def _walls(found: Survey) -> tuple[BaseGeometry, BaseGeometry]:
     """Return what is solid between two seen faces, and a band behind the other faces, none of it in a room."""
     faces, loose_rows = found.faces, found.furniture | found.clutter
     floor = shapely.union_all([shapely.Polygon(room.outline_world, room.holes_world) for room in found.rooms])
@@ -99,7 +100,7 @@ def _walls(found: Survey) -> tuple[shapely.Geometry, shapely.Geometry]:
     return body, shapely.difference(whole, shapely.union_all([floor, body]))
 
 
-def _between(faces: Faces, pair: Pair) -> shapely.Geometry:
+def _between(faces: Faces, pair: Pair) -> BaseGeometry:
     """Return what lies between two faces, to the end of the longer one, but not far past the end of the other."""
     t = directions(faces.means[pair.first, 0])
     along = np.sort(faces.ends_world[[pair.first, pair.second]] @ t, axis=1)
@@ -123,7 +124,7 @@ def _at(faces: Faces, row: int, t: Float[np.ndarray, "2"], value: float) -> Floa
     return np.asarray(start + (value - start @ t) / (own @ t) * own)
 
 
-def _behind(faces: Faces, row: int) -> shapely.Geometry:
+def _behind(faces: Faces, row: int) -> BaseGeometry:
     ends = faces.ends_world[row]
     back = ends[::-1] + BAND_M * normals(faces.means[row, 0])
     return shapely.make_valid(shapely.Polygon([*ends, *back]))
@@ -195,7 +196,7 @@ def _outside(each: Dimension, turn: float, axis: int, edge: float) -> DimensionL
     return DimensionLine(ends, offset, words_of(each))
 
 
-def _box(at: Float[np.ndarray, "2"], size: Float[np.ndarray, "2"], turn_rad: float) -> shapely.Geometry:
+def _box(at: Float[np.ndarray, "2"], size: Float[np.ndarray, "2"], turn_rad: float) -> BaseGeometry:
     return rotate(shapely.box(*(at - 0.6 * size), *(at + 0.6 * size)), turn_rad, use_radians=True)
 
 
@@ -204,5 +205,5 @@ def _turned(points_world: Float[np.ndarray, "*n 2"], turn: float) -> Float[np.nd
     return points_world @ np.array([[c, s], [-s, c]])
 
 
-def _on_page(shape: shapely.Geometry, turn: float) -> shapely.Geometry:
+def _on_page(shape: BaseGeometry, turn: float) -> BaseGeometry:
     return rotate(shape, turn, origin=(0.0, 0.0), use_radians=True)

@@ -83,7 +83,8 @@ def value_of(faces: Faces, dimension: Dimension) -> Measured:
     """Return what a dimension of one map is by other lines of the same walls, such as the true ones."""
     match dimension.kind:
         case Kind.WIDTH | Kind.OVERALL | Kind.THICKNESS:
-            return across(faces, dimension.kind, *dimension.walls, dimension.at_world)
+            first, second = dimension.walls
+            return across(faces, dimension.kind, first, second, dimension.at_world)
         case Kind.LENGTH | Kind.OPENING:
             return distance(faces.points(dimension.nodes[0]), 0, 1)
         case Kind.AREA:

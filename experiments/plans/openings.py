@@ -1,9 +1,11 @@
 """Doors, windows and passages: gaps in a wall, from one of its ends to where a wall stands again."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 from jaxtyping import Float
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
@@ -19,6 +21,8 @@ LONG_M = 0.25
 """Shorter walls are end faces themselves."""
 ASIDE_M = 0.05
 """The pieces of wall on both sides of an opening are on one line to this."""
+BEHIND_M = 0.15
+"""How far behind a wall floor was seen through a gap."""
 STEEP = float(np.cos(np.deg2rad(20.0)))
 """A wall that bounds an opening sidewise stands at right angles to it, to 20 degrees."""
 
@@ -33,12 +37,15 @@ class Gap:
     """... and where a wall stands again."""
     width_m: float
     is_seen: bool
-    """Whether a wall turns away at one of its ends, as at the side of a door. Otherwise the wall may go on there, and
-    was only not seen."""
+    """Whether a wall turns away at one of its ends, as at the side of a door, or the robot saw through. Otherwise the
+    wall may go on there, and was only not seen."""
 
 
-def gaps(faces: Faces) -> list[Gap]:
-    """Return the gaps of all walls, each side of a wall by itself, the narrowest first and no end twice."""
+def gaps(faces: Faces, solid: BaseGeometry | None = None) -> list[Gap]:
+    """Return the gaps of all walls, each side of a wall by itself, the narrowest first and no end twice.
+
+    `solid` is all that the robot did not see free, in the frame of the map.
+    """
     found = [
         gap for wall in range(len(faces)) for side in (HEAD, TAIL) if (gap := _from(faces, wall, side)) is not None
     ]
@@ -48,8 +55,16 @@ def gaps(faces: Faces) -> list[Gap]:
         if gap.first in taken or gap.second in taken:
             continue
         taken |= {gap.first, gap.second}
-        kept.append(gap)
+        kept.append(gap if gap.is_seen or solid is None else replace(gap, is_seen=_is_through(faces, gap, solid)))
     return kept
+
+
+def _is_through(faces: Faces, gap: Gap, solid: BaseGeometry) -> bool:
+    """Return whether the robot saw floor in a gap, and behind it."""
+    ends = np.array([faces.place(gap.first), faces.place(gap.second)])
+    on = ends[0] + np.array([[0.3], [0.5], [0.7]]) * (ends[1] - ends[0])
+    behind = on + BEHIND_M * normals(faces.means[gap.first.wall, 0])
+    return not shapely.contains_xy(solid, *np.concatenate([on, behind]).T).any()
 
 
 def _from(faces: Faces, wall: int, side: int) -> Gap | None:
@@ -85,7 +100,9 @@ def _goes_on(
     far, aside = to @ ahead, np.abs(to @ normals(faces.means[wall, 0]))
     same = np.cos(faces.means[:, 0] - faces.means[wall, 0]) > np.cos(FACING_RAD)
     rows = np.flatnonzero(same & (aside <= ASIDE_M) & (far >= LEAST_M) & (far <= MOST_M))
-    rows = np.array([row for row in rows if row != wall and _may_begin(faces, row, other_side)], dtype=int)
+    rows = np.array(
+        [row for row in rows.tolist() if row != wall and _may_begin(faces, row, other_side)], dtype=np.int64
+    )
     if not len(rows):
         return None
     row = int(rows[far[rows].argmin()])

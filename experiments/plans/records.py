@@ -1,11 +1,13 @@
 """The dimensions of a map as data: for JSON, for a table, and as GeoJSON in the frame of the map."""
 
+import json
 from itertools import count
 from typing import Any
 
 import numpy as np
 import shapely
 from shapely.affinity import rotate
+from shapely.geometry.base import BaseGeometry
 
 from ..artifacts.files import stamp
 from ..artifacts.maps.geojson import FRAME, LOCAL_METRES
@@ -49,7 +51,7 @@ def direction_record(found: Survey) -> dict[str, Any]:
 
 def dimension_rows(found: Survey) -> list[tuple[str, ...]]:
     """Return the rows of the table of dimensions."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, each in named(found):
         walls = ", ".join(map(str, found.faces.ids[list(each.walls)].tolist()))
         value = f"{words(each.measured, 3)} {each.unit}{'' if each.is_firm else ROUGH}"
@@ -89,8 +91,8 @@ def _line(ends: np.ndarray, layer: str, **properties: Any) -> dict[str, Any]:
     return _feature({"type": "LineString", "coordinates": ends}, layer, **properties)
 
 
-def _shape(shape: shapely.Geometry, turn: float, layer: str) -> dict[str, Any]:
-    return _feature(shapely.geometry.mapping(rotate(shape, -turn, origin=(0.0, 0.0), use_radians=True)), layer)
+def _shape(shape: BaseGeometry, turn: float, layer: str) -> dict[str, Any]:
+    return _feature(json.loads(shapely.to_geojson(rotate(shape, -turn, origin=(0.0, 0.0), use_radians=True))), layer)
 
 
 def _room(found: Survey, number: int) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 import shapely.ops
 from jaxtyping import Float
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.map.chains import HEAD, TAIL
 
@@ -72,7 +73,7 @@ def _edges(faces: Faces, without: set[int]) -> tuple[list[tuple[Node, Node]], li
     return edges, rows
 
 
-def _clear(faces: Faces, gaps: Sequence[Gap], walls: shapely.Geometry) -> list[tuple[Node, Node]]:
+def _clear(faces: Faces, gaps: Sequence[Gap], walls: BaseGeometry) -> list[tuple[Node, Node]]:
     """Return the lines that close gaps, without those that cross a wall or a narrower gap."""
     kept: list[tuple[Node, Node]] = []
     taken = walls
@@ -134,10 +135,10 @@ def _room(faces: Faces, part: shapely.Polygon, rings: Sequence[tuple[Node, ...]]
     nodes = [node for ring in rings for node in ring]
     on = [gap for gap in gaps if gap.first in nodes and gap.second in nodes]
     ends = np.array([label, label])
-    own = {"walls": walls_of(nodes), "is_firm": are_firm(nodes)}
-    size = Dimension(Kind.AREA, label, ends, area_of(faces, rings), nodes=tuple(rings), **own)
+    walls, firm = walls_of(nodes), are_firm(nodes)
+    size = Dimension(Kind.AREA, label, ends, area_of(faces, rings), walls, tuple(rings), is_firm=firm)
     around = perimeter(faces.points(rings[0]), range(len(rings[0])))
-    length = Dimension(Kind.PERIMETER, label, ends, around, nodes=(rings[0],), **own)
+    length = Dimension(Kind.PERIMETER, label, ends, around, walls, (rings[0],), is_firm=firm)
     holes = tuple(shapely.get_coordinates(ring)[:-1] for ring in part.interiors)
     outline = shapely.get_coordinates(part.exterior)[:-1]
     return Room(size, length, outline, holes, sum(gap.is_seen for gap in on), sum(not gap.is_seen for gap in on))

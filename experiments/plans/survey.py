@@ -2,15 +2,18 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from .faces import Faces
-from .measuring import Dimension, Kind, Measured, between_nodes, between_walls, main_direction
+from ..scoring.maps.measurements import Measured
+from .faces import Faces, read_faces, read_solid
+from .measuring import Dimension, Kind, between_nodes, between_walls, main_direction
 from .openings import Gap, gaps
 from .rooms import Room, rooms
 from .sight import FACING_RAD, Pair, facing
@@ -55,10 +58,15 @@ class Survey:
         return [gap for gap in self.gaps if gap.is_seen]
 
 
-def survey(faces: Faces) -> Survey:
-    """Measure a map."""
+def survey_at(folder: Path) -> Survey:
+    """Measure the map in the folder of a run or of a replayed log; raises UsageError for anything else."""
+    return survey(read_faces(folder), read_solid(folder))
+
+
+def survey(faces: Faces, solid: BaseGeometry | None = None) -> Survey:
+    """Measure a map; `solid` is all that the robot did not see free, where that is known."""
     backs = facing(faces, LONG_M, THICKEST_M, FACES_OVERLAP_M, behind=True)
-    found = gaps(faces)
+    found = gaps(faces, solid)
     furniture = _furniture(faces)
     held = {row for pair in backs for row in (pair.first, pair.second)}
     held |= {row for gap in found if gap.is_seen for row in (gap.first.wall, gap.second.wall, gap.second.other)}

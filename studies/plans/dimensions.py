@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from chainslam.experiments.plans.faces import read_faces
+from chainslam.experiments.plans.faces import read_faces, read_solid
 from chainslam.experiments.plans.measuring import Kind
 from chainslam.experiments.plans.survey import survey
 from chainslam.experiments.scoring.maps.measurements import Z_95
@@ -59,7 +59,7 @@ def scores(folder: Path) -> list[Row]:
         true_faces, labels = log["true_faces"], log["true_wall_of_face"]
     face_of = np.array([of[wall] for wall in faces.ids.tolist()], dtype=np.int64)
     truth = with_truth(faces, face_of, true_faces, labels)
-    found, known = survey(faces), face_of >= 0
+    found, known = survey(faces, read_solid(folder)), face_of >= 0
     rows = [
         {"run": folder.name, "kind": str(each.kind), "firm": each.is_firm, "value": each.measured.value,
          "sigma": each.measured.sigma, "true": true, "exists": exists}

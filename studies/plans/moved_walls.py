@@ -60,17 +60,13 @@ def _with(world: World, free: shapely.Polygon, face: int, by_m: float) -> shapel
     reach = by_m + np.sign(by_m) * LEFT_M
     near, inner = 1e-4 * np.sign(by_m) * n, 1e-4 * t
     beyond = shapely.Polygon([a + near + inner, b + near - inner, b - inner + reach * n, a + inner + reach * n])
-    if by_m > 0.0:
-        changed = free.union(strip) if not beyond.intersects(free.buffer(-1e-5)) else None
-    else:
-        changed = free.difference(strip) if free.buffer(1e-5).contains(beyond) else None
-    changed = None if changed is None else shapely.set_precision(changed, 1e-6).simplify(1e-5)
-    is_one = isinstance(changed, shapely.Polygon) and changed.is_valid and len(changed.interiors) == len(free.interiors)
-    return (
-        changed
-        if is_one and changed is not None and changed.contains(shapely.Point(world.start[:2]).buffer(0.3))
-        else None
-    )
+    if beyond.intersects(free.buffer(-1e-5)) if by_m > 0.0 else not free.buffer(1e-5).contains(beyond):
+        return None
+    changed = shapely.set_precision(free.union(strip) if by_m > 0.0 else free.difference(strip), 1e-6).simplify(1e-5)
+    if not isinstance(changed, shapely.Polygon) or not changed.is_valid:
+        return None
+    is_whole = len(changed.interiors) == len(free.interiors)
+    return changed if is_whole and changed.contains(shapely.Point(world.start[:2]).buffer(0.3)) else None
 
 
 def _is_square(

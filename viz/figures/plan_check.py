@@ -47,8 +47,10 @@ def draw_check(
             )
             handles.append(Line2D([], [], color=colour, linewidth=3.0, label=f"{verdict} ({len(lines)})"))
     for at, words in notes:
-        axes.text(*at, literal(words), fontsize=6.5, ha="center", va="center", color=palette.INK, zorder=5,
-                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5})  # fmt: skip
+        axes.text(
+            float(at[0]), float(at[1]), literal(words), fontsize=6.5, ha="center", va="center", color=palette.INK,
+            zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+        )  # fmt: skip
     figure.text(0.02, 1.0 - 0.25 / (height + 1.1), literal(title), fontsize=10, fontweight="bold", color=palette.INK)
     figure.legend(handles=handles, loc="lower left", ncols=6, fontsize=7, frameon=False)
     scale_bar(axes, float((high - low)[0]), 0.02)

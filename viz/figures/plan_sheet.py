@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
+from shapely.geometry.base import BaseGeometry
 
 from .. import palette
 from ..text import literal
@@ -68,9 +69,9 @@ class DimensionLine:
 class Sheet:
     """What is drawn, m, in the frame of the page: x to the right, y up, the main direction of the walls along both."""
 
-    both: shapely.Geometry
+    both: BaseGeometry
     """Walls of which both faces were seen."""
-    one: shapely.Geometry
+    one: BaseGeometry
     """A band behind faces whose back was not seen."""
     faces: tuple[Float[np.ndarray, "2 2"], ...]
     openings: tuple[Float[np.ndarray, "2 2"], ...]
@@ -125,8 +126,10 @@ def draw_sheet(sheet: Sheet, shown: Collection[str]) -> Figure:
     for line in sheet.lines:
         _dimension(axes, line, mm)
     for at, words in sheet.rooms:
-        axes.text(*at, literal(words), ha="center", va="center", fontsize=ROOM_LETTER_MM / POINT_MM, color=palette.INK,
-                  linespacing=1.3)  # fmt: skip
+        axes.text(
+            float(at[0]), float(at[1]), literal(words), ha="center", va="center", linespacing=1.3,
+            fontsize=ROOM_LETTER_MM / POINT_MM, color=palette.INK,
+        )  # fmt: skip
     for name, lines in sheet.loose.items():
         drawn = LineCollection(lines, colors=LOOSE, linewidths=0.6, visible=True)
         drawn.set_gid(LAYER + name)
@@ -158,7 +161,7 @@ def _walls(axes: Axes, sheet: Sheet) -> None:
     )
 
 
-def _area(axes: Axes, shape: shapely.Geometry, colour: str) -> None:
+def _area(axes: Axes, shape: BaseGeometry, colour: str) -> None:
     for part in shapely.get_parts(shape):
         if isinstance(part, shapely.Polygon) and not part.is_empty:
             rings = [shapely.get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
@@ -182,8 +185,9 @@ def _dimension(axes: Axes, told: DimensionLine, mm: float) -> None:
     )
     turn = np.deg2rad(told.turn_deg)
     above = np.array([-np.sin(turn), np.cos(turn)]) * (0.5 + 0.5 * LETTER_MM) * mm
+    x, y = (line.mean(axis=0) + above).tolist()
     axes.text(
-        *(line.mean(axis=0) + above), literal(told.words), rotation=told.turn_deg, rotation_mode="anchor",
+        x, y, literal(told.words), rotation=told.turn_deg, rotation_mode="anchor",
         ha="center", va="center", fontsize=LETTER_MM / POINT_MM, color=THIN,
     )  # fmt: skip
 
@@ -204,9 +208,13 @@ def _foot(figure: Figure, sheet: Sheet, said: str, scale: int, width: float, hei
     up = np.array([-np.sin(sheet.turn_rad), np.cos(sheet.turn_rad)])
     foot = np.array([18.0, 13.0])
     paper.annotate(
-        "", foot + 6.0 * up, foot - 5.0 * up, arrowprops={"arrowstyle": "-|>", "color": palette.INK, "lw": 0.8}
+        "",
+        tuple((foot + 6.0 * up).tolist()),
+        tuple((foot - 5.0 * up).tolist()),
+        arrowprops={"arrowstyle": "-|>", "color": palette.INK, "lw": 0.8},
     )
-    paper.text(*(foot + 8.0 * up), "y", ha="center", va="center", fontsize=6, color=palette.INK)
+    x, y = (foot + 8.0 * up).tolist()
+    paper.text(x, y, "y", ha="center", va="center", fontsize=6, color=palette.INK)
     words = [sheet.title, *sheet.notes]
     block = min(130.0, 0.5 * width)
     tall = 3.0 + 3.2 * len(words)
