@@ -202,7 +202,7 @@ interval-causes: setup
 
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup
-	$(BIN)/python -m studies.counts
+	$(BIN)/python -m studies.code.counts
 
 # The page of all settings, from the docstrings beside them.
 settings: setup

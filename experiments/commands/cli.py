@@ -79,17 +79,17 @@ COMMANDS = {
         "Reproduce the paper's figures: a picture of each, and its numbers next to those of several back ends.",
     ),
     "measure": Entry(
-        "measure",
+        "maps.measure",
         "Measure",
         "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
     ),
     "plan": Entry(
-        "plan",
+        "maps.plan",
         "Plan",
         "Draw a dimensioned plan of a run's or a log's map: SVG, PDF, PNG, DXF or GeoJSON, by the file's ending.",
     ),
     "check": Entry(
-        "check",
+        "maps.check",
         "Check",
         "Compare a map with a drawing of the building: which walls are within tolerance, moved, missing or extra.",
     ),

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from chainslam.experiments.plans.alignment import align
-from chainslam.experiments.plans.built import Finding, Verdict, compare
-from chainslam.experiments.plans.faces import read_faces
 from chainslam.experiments.scenario import load_world
 from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.views.plans.alignment import align
+from chainslam.experiments.views.plans.built import Finding, Verdict, compare
+from chainslam.experiments.views.plans.faces import read_faces
 from chainslam.slam.geometry.lines import directions, normals, through
 
 from ..runner.command import run_study

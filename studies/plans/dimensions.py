@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from chainslam.experiments.plans.faces import read_faces, read_solid
-from chainslam.experiments.plans.measuring import Kind
-from chainslam.experiments.plans.survey import survey
 from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.views.plans.faces import read_faces, read_solid
+from chainslam.experiments.views.plans.measuring import Kind
+from chainslam.experiments.views.plans.survey import survey
 
 from ..runner.command import run_study
 from ..runner.rows import Row

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 from jaxtyping import Float, Int
 
-from chainslam.experiments.plans.faces import Faces, Node
-from chainslam.experiments.plans.measuring import Dimension, Kind, value_of
+from chainslam.experiments.views.plans.faces import Faces, Node
+from chainslam.experiments.views.plans.measuring import Dimension, Kind, value_of
 from chainslam.slam.geometry.lines import directions, normals, project, through
 from chainslam.slam.geometry.poses import wrap
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
-from chainslam.experiments.plans.measuring import Kind
-from chainslam.experiments.plans.survey import survey
+from chainslam.experiments.views.plans.measuring import Kind
+from chainslam.experiments.views.plans.survey import survey
 from chainslam.sim.worlds import World
 from studies.plans.moved_walls import with_moved
 from studies.plans.truth import true_value, with_truth
-from tests.experiments.plans.buildings import drawn_from, edges, mapped, two_rooms
+from tests.experiments.views.plans.buildings import drawn_from, edges, mapped, two_rooms
 
 
 def test_true_dimensions_are_those_of_the_true_walls():

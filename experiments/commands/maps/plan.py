@@ -7,14 +7,14 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..artifacts.files import json_bytes, replacing, write_anywhere
-from ..artifacts.saved import cut_short
-from ..plans.layout import sheet_of
-from ..plans.records import plan_geojson
-from ..plans.survey import Survey, survey_at
-from ..terminal.answers import found
-from ..terminal.console import say
-from ..usage import UsageError
+from ...artifacts.files import json_bytes, replacing, write_anywhere
+from ...artifacts.saved import cut_short
+from ...terminal.answers import found
+from ...terminal.console import say
+from ...usage import UsageError
+from ...views.plans.layout import sheet_of
+from ...views.plans.records import plan_geojson
+from ...views.plans.survey import Survey, survey_at
 
 Layer = Literal["furniture", "clutter", "open-ends"]
 WORDS = "lengths in m, areas in m², with 95 % intervals from the map's joint covariance"
@@ -26,8 +26,8 @@ class Plan:
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
     """Folder of `explore` or `replay`."""
-    out: tuple[Path, ...] = ()
-    """The files to write; `plan.svg` in the folder if none is named."""
+    out: Annotated[tyro.conf.UseAppendAction[tuple[Path, ...]], tyro.conf.arg(metavar="FILE")] = ()
+    """A file to write, may be repeated; `plan.svg` in the folder if none is named."""
     show: tuple[Layer, ...] = ()
     """Layers to draw that are off otherwise: furniture, clutter (short chains that stand alone), open-ends."""
 
@@ -70,7 +70,7 @@ def _sheet(kind: Literal["svg", "pdf", "png"]) -> Callable[[Survey, str, tuple[s
 
 
 def _dxf(measured: Survey, title: str, notes: tuple[str, ...], show: tuple[Layer, ...]) -> bytes:
-    from ..plans.cad import sheet_dxf
+    from ...views.plans.cad import sheet_dxf
 
     return sheet_dxf(sheet_of(measured, title, notes), show)
 

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from chainslam.slam.geometry.lines import directions, normals, through
 from chainslam.slam.geometry.poses import to_world, wrap
 
-from ..usage import UsageError
+from ...usage import UsageError
 from .faces import Faces
 from .measuring import main_direction
 

@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
 
 def test_a_plan_is_written_in_every_format(folder, tmp_path, capsys):
     names = [tmp_path / f"plan.{kind}" for kind in ("svg", "pdf", "png", "dxf", "geojson")]
-    assert main(["plan", str(folder), "--out", *map(str, names)]) == 0
+    assert main(["plan", str(folder), *(word for name in names for word in ("--out", str(name)))]) == 0
     assert "2 rooms" in capsys.readouterr().out
     svg = names[0].read_text()
     assert '<g id="layer-furniture" class="layer" style="display:none">' in svg

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from ..scoring.maps.measurements import Measured
+from ...scoring.maps.measurements import Measured
 from .faces import Faces, read_faces, read_solid
 from .measuring import Dimension, Kind, between_nodes, between_walls, main_direction
 from .openings import Gap, gaps

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from ..scoring.maps.measurements import perimeter
+from ...scoring.maps.measurements import perimeter
 from .faces import Faces, Node
 from .measuring import Dimension, Kind, are_firm, area_of, walls_of
 from .openings import Gap

@@ -9,8 +9,8 @@ import shapely
 from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
-from ..artifacts.files import stamp
-from ..artifacts.maps.geojson import FRAME, LOCAL_METRES
+from ...artifacts.files import stamp
+from ...artifacts.maps.geojson import FRAME, LOCAL_METRES
 from .layout import loose, sheet_of, words
 from .measuring import Dimension, Kind
 from .survey import Survey

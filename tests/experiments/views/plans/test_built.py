@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from chainslam.experiments.plans.alignment import align, saw_through
-from chainslam.experiments.plans.built import Verdict, compare
 from chainslam.experiments.usage import UsageError
+from chainslam.experiments.views.plans.alignment import align, saw_through
+from chainslam.experiments.views.plans.built import Verdict, compare
 from chainslam.slam.geometry.poses import inverse
 
 from .buildings import drawn_from, edges, mapped, two_rooms

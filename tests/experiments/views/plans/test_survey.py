@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chainslam.experiments.plans.faces import END, Node
-from chainslam.experiments.plans.measuring import Kind, value_of
-from chainslam.experiments.plans.openings import gaps
-from chainslam.experiments.plans.survey import survey
+from chainslam.experiments.views.plans.faces import END, Node
+from chainslam.experiments.views.plans.measuring import Kind, value_of
+from chainslam.experiments.views.plans.openings import gaps
+from chainslam.experiments.views.plans.survey import survey
 
 from .buildings import SIGMAS, drawn_from, mapped, two_rooms
 

@@ -9,15 +9,15 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from ..artifacts.maps.mapped import MappedCorners, read_corners
-from ..artifacts.saved import read_config
-from ..plans.faces import END_SIGMA_M
-from ..plans.records import HEAD, ROUGH, dimension_record, dimension_rows, direction_record, named
-from ..plans.survey import survey_at
-from ..scoring.maps.measurements import Measured
-from ..terminal.answers import found
-from ..terminal.console import plain_console
-from ..usage import UsageError
+from ...artifacts.maps.mapped import MappedCorners, read_corners
+from ...artifacts.saved import read_config
+from ...scoring.maps.measurements import Measured
+from ...terminal.answers import found
+from ...terminal.console import plain_console
+from ...usage import UsageError
+from ...views.plans.faces import END_SIGMA_M
+from ...views.plans.records import HEAD, ROUGH, dimension_record, dimension_rows, direction_record, named
+from ...views.plans.survey import survey_at
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from chainslam.slam.estimation.backend import POSE, columns_of
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from ..artifacts.maps.map_files import read_features, read_map
-from ..scoring.maps.measurements import PARALLEL, CornerPoints, corner_jacobian, corner_points
-from ..usage import UsageError
+from ...artifacts.maps.map_files import read_features, read_map
+from ...scoring.maps.measurements import PARALLEL, CornerPoints, corner_jacobian, corner_points
+from ...usage import UsageError
 
 END = -1
 """In place of the second wall of a node that is no corner."""

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from chainslam.viz.figures.plan_sheet import Sheet, scale_of
 
-from ..artifacts.maps.dxf import DASHED, DIMENSIONS, LETTERS, NOTES, VERSION, WALLS, without_time
+from ...artifacts.maps.dxf import DASHED, DIMENSIONS, LETTERS, NOTES, VERSION, WALLS, without_time
 
 SOLID, OPENINGS, ROOMS = "WALLS-SOLID", "OPENINGS", "ROOMS"
 LAYERS = {WALLS: (7, 35), SOLID: (8, 13), OPENINGS: (9, 13), ROOMS: (7, 13), DIMENSIONS: (5, 13), NOTES: (8, 13)}

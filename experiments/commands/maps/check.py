@@ -12,16 +12,16 @@ from rich.table import Table
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 from chainslam.slam.geometry.poses import to_world
 
-from ..artifacts.files import replacing, write_anywhere
-from ..artifacts.saved import read_config
-from ..plans.alignment import align, saw_through
-from ..plans.built import Comparison, Finding, Verdict, compare
-from ..plans.faces import Faces, read_faces, read_solid
-from ..scenario import STRATEGY_OF_REPLAYS, load_world
-from ..scoring.maps.measurements import Z_95
-from ..terminal.answers import found
-from ..terminal.console import plain_console, say
-from ..usage import UsageError
+from ...artifacts.files import replacing, write_anywhere
+from ...artifacts.saved import read_config
+from ...scenario import STRATEGY_OF_REPLAYS, load_world
+from ...scoring.maps.measurements import Z_95
+from ...terminal.answers import found
+from ...terminal.console import plain_console, say
+from ...usage import UsageError
+from ...views.plans.alignment import align, saw_through
+from ...views.plans.built import Comparison, Finding, Verdict, compare
+from ...views.plans.faces import Faces, read_faces, read_solid
 
 PICTURES = ("svg", "pdf", "png")
 TOLD = (Verdict.MOVED, Verdict.MISSING, Verdict.EXTRA, Verdict.UNCLEAR)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions, normals
 
-from ..scoring.maps.measurements import Measured, area, distance, perimeter
+from ...scoring.maps.measurements import Measured, area, distance, perimeter
 from .faces import Faces, Node
 from .sight import Pair
 

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
-from chainslam.experiments.plans.faces import Faces
+from chainslam.experiments.views.plans.faces import Faces
 from chainslam.slam.geometry.lines import normals, through
 
 SIGMAS = np.array([1e-3, 2e-3])

@@ -16,7 +16,7 @@ from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions
 from chainslam.slam.geometry.numerics import TINY
 
-from ..usage import UsageError
+from ...usage import UsageError
 from .alignment import SHORT_M, Sighting, look, off_design, offsets
 from .faces import Faces
 

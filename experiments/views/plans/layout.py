@@ -12,7 +12,7 @@ from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
 from chainslam.viz.figures.plan_sheet import ROOM_LETTER_MM, DimensionLine, Sheet, letters_m, scale_of
 
-from ..scoring.maps.measurements import Measured
+from ...scoring.maps.measurements import Measured
 from .faces import Faces
 from .measuring import Dimension, Kind
 from .sight import Pair
