@@ -86,7 +86,7 @@ def table(rows: Sequence[Row]) -> Table:
         "by plan (95 %)",
         "no such corner",
         "mean z²",
-        "error mm: median, p95",
+        "error mm: mean, median, p95",
         "stated mm",
     ):
         shown.add_column(column, justify="left" if column == "dimension" else "right")
