@@ -183,6 +183,12 @@ dimensions: setup
 	$(BIN)/python -m studies.plans.dimensions --plans $(PLANS) --runs results/plans
 	$(BIN)/python -m studies.plans.as_built --plans $(PLANS) --runs results/plans
 
+.PHONY: sessions
+
+# Does a second session find its place in the map of the first, and is the map of both consistent? 40 apartments.
+sessions: setup
+	$(BIN)/python -m studies.plans.sessions --plans $(PLANS) --runs results/plans --out results/sessions.jsonl
+
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out $(ROWS)/intervals.jsonl
