@@ -70,9 +70,10 @@ class Dimension:
     @property
     def beside_world(self) -> Float[np.ndarray, "2"]:
         """Middle of its text; the text of a length is on the free side of the wall."""
+        if self.is_area:  # which may be as good as none
+            return self.at_world
         along = self.along_world / float(np.hypot(*self.along_world))
-        beside = 0.0 if self.is_area else 0.9 * self.letters_m
-        return self.at_world + beside * np.array([-along[1], along[0]])
+        return self.at_world + 0.9 * self.letters_m * np.array([-along[1], along[0]])
 
     @property
     def clockwise_deg(self) -> float:
