@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from chainslam.experiments.library.comparing import Comparison, compare, load
     from chainslam.experiments.library.running import explore, replay
     from chainslam.experiments.library.runs import Map, Run
+    from chainslam.experiments.scoring.keys import Steps, Summary
     from chainslam.experiments.usage import UsageError
     from chainslam.explore.step import Step
     from chainslam.explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
@@ -33,6 +34,7 @@ _PLACES = {
     "chainslam.experiments.library.running": ("explore", "replay"),
     "chainslam.experiments.library.comparing": ("Comparison", "compare", "load"),
     "chainslam.experiments.library.runs": ("Map", "Run"),
+    "chainslam.experiments.scoring.keys": ("Steps", "Summary"),
     "chainslam.experiments.usage": ("UsageError",),
     "chainslam.explore.step": ("Step",),
     "chainslam.explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
@@ -60,9 +62,9 @@ __version__ = version("chainslam")
 __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
-    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Strategy",
-    "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__",
-    "check_backend", "compare", "explore", "load", "replay",
+    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
+    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UsageError", "WheelSpec", "World",
+    "__version__", "check_backend", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 
 
