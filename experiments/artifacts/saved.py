@@ -20,7 +20,7 @@ from chainslam.explore.step import Step
 from chainslam.sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
-from ..scoring.keys import RunKeys, Summary
+from ..scoring.keys import Summary
 from ..usage import UsageError
 from .files import CONFIG
 from .reading import check_format, plain_json, read_json, read_plain, told
@@ -29,12 +29,11 @@ from .running_log import Kept, read_running
 from .schema import fit
 
 REMEDY = "keep a run's files together, or repeat the run"
+ALWAYS = ("status", "reason", "steps")
 Saved = defstruct(
     "Saved",
-    [
-        (key, kind) if key in RunKeys.__annotations__ else (key, kind, None)
-        for key, kind in get_type_hints(Summary).items()
-    ],
+    [(key, kind) if key in ALWAYS else (key, kind, None) for key, kind in get_type_hints(Summary).items()],
+    kw_only=True,
 )
 """`Summary` as it is read: a key that another version did not write is not missed."""
 

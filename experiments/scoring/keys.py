@@ -61,9 +61,10 @@ class Refined(TypedDict):
     closures: int
 
 
-class RunKeys(TypedDict):
-    """Which run it was and how it ended."""
+class Summary(TypedDict):
+    """The keys of `summary.json`; None where there is nothing to measure."""
 
+    format: int
     world: str
     backend: str
     strategy: str
@@ -74,12 +75,6 @@ class RunKeys(TypedDict):
     reason: str
     outcome: str
     steps: int
-
-
-class Summary(RunKeys):
-    """The keys of `summary.json`; None where there is nothing to measure."""
-
-    format: int
     path_length_m: float | None
     path_length_true_m: float | None
     drive_time_s: float | None
