@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from chainslam.experiments.library.comparing import Comparison, compare, load
     from chainslam.experiments.library.running import explore, replay
     from chainslam.experiments.library.runs import Map, Run
+    from chainslam.experiments.scoring.keys import Steps, Summary
     from chainslam.experiments.usage import UsageError
     from chainslam.explore.step import Step
     from chainslam.explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
@@ -35,6 +36,7 @@ _PLACES = {
     "chainslam.experiments.library.audit.auditing": ("Audit", "audit"),
     "chainslam.experiments.library.comparing": ("Comparison", "compare", "load"),
     "chainslam.experiments.library.runs": ("Map", "Run"),
+    "chainslam.experiments.scoring.keys": ("Steps", "Summary"),
     "chainslam.experiments.usage": ("UsageError",),
     "chainslam.explore.step": ("Step",),
     "chainslam.explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
@@ -62,9 +64,9 @@ __version__ = version("chainslam")
 __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Audit", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
-    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Strategy",
-    "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__",
-    "audit", "check_backend", "compare", "explore", "load", "replay",
+    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
+    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UsageError", "WheelSpec", "World",
+    "__version__", "audit", "check_backend", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from chainslam.viz.floor_plan import Dimension, floor_plan
 
 from ..scenario import OFFLINE, TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
+from ..scoring.keys import Steps
 from ..scoring.records import Log
 from ..scoring.summary import odometry_path, pose_nees, pose_nees_from_start
 from ..trial import TrialResult
@@ -45,17 +46,6 @@ RUN_FILES = (
 """All files of a run, and those that `view` and `report` add to its folder."""
 REPLAY = "replay"
 """Key in `config.json` of the options of a replay; null for an exploration."""
-STEP_COLUMNS = (
-    *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
-    "pose_nees_from_start",
-    *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
-    *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
-    *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
-    *("odometry_error_m", "collisions", "nis", "nis_dof", "nis_window", "nis_in_band", "unstated_motion", "lost"),
-    *("wheel_noise_factor", "behaviour", "route_walls", "reason", "step_ms"),
-)
-"""Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
-with the poses beside it, all that `pose_nees` is made of."""
 
 
 def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | None = None) -> list[str]:
@@ -268,4 +258,4 @@ def steps_csv(log: Log) -> bytes:
         log.reasons,
         1e3 * log.seconds,
     ]
-    return csv_bytes(STEP_COLUMNS, zip(*columns, strict=True))
+    return csv_bytes(tuple(Steps.__annotations__), zip(*columns, strict=True))

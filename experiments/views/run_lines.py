@@ -127,7 +127,7 @@ def notes_of(summary: Row) -> list[str]:
         notes.append(
             f"few straight walls: {percent(summary['curved_share'])} % of the first returns are on curved ones"
         )
-    if (factor := summary.get("wheel_noise_factor", 1.0)) != 1.0:
+    if (factor := summary.get("wheel_noise_factor") or 1.0) != 1.0:
         notes.append(f"the noise of the wheels is {number(factor)} times as large as stated")
     way_back = (summary.get("certificate") or {}).get("reachable_way")
     if way_back is not None and way_back <= MOST_LOCKED:
