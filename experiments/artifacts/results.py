@@ -180,7 +180,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
         "odometry": wheels.odometry[: len(log)],
         "odometry_cov": wheels.odometry_cov[: len(log)],
         "touched": log.touched,
-        **({"carried": log.carried} if log.carried.any() else {}),
+        **({} if log.carried is None else {"carried": log.carried}),
         "start_pose": result.scenario.start_estimate,
         "start_cov": result.scenario.start_cov,
     }
