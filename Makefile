@@ -207,6 +207,19 @@ paper: setup
 study: setup
 	$(BIN)/python -m studies.whole --trials $(or $(TRIALS),20) --out results/study
 
+.PHONY: dimensions
+
+# Do the intervals of a plan's dimensions hold the true ones, and are walls found that stand elsewhere than drawn? 40 apartments.
+dimensions: setup
+	$(BIN)/python -m studies.plans.dimensions --plans $(PLANS) --runs results/plans
+	$(BIN)/python -m studies.plans.as_built --plans $(PLANS) --runs results/plans
+
+.PHONY: sessions
+
+# Does a second session find its place in the map of the first, and is the map of both consistent? 40 apartments.
+sessions: setup
+	$(BIN)/python -m studies.plans.sessions --plans $(PLANS) --runs results/plans --out results/sessions.jsonl
+
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out $(ROWS)/intervals.jsonl
@@ -226,7 +239,7 @@ interval-causes: setup
 
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup
-	$(BIN)/python -m studies.counts
+	$(BIN)/python -m studies.code.counts
 
 # The page of all settings, from the docstrings beside them.
 settings: setup

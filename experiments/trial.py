@@ -19,7 +19,7 @@ from chainslam.sim.worlds import World
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.evaluation.from_start import FromStart, Start, as_it_is, from_start
-from chainslam.slam.geometry.compiled import link_kernels
+from chainslam.slam.geometry.compiled import prepare_kernels
 from chainslam.slam.mapper import Mapper
 
 from .scenario import KNOWN, Scenario, TrialConfig, build, heard_by, make_backend, sigmas_of
@@ -129,9 +129,9 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
 def _prepare_process() -> None:
     """Do once per process what would otherwise count as the time of a step.
 
-    Link the kernels, and exclude all modules from garbage collection, which took a tenth of a second.
+    Import the compiler, and exclude all modules from garbage collection, which took a tenth of a second.
     """
-    link_kernels()
+    prepare_kernels()
     gc.freeze()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from chainslam.slam.evaluation.consistency import pose_errors
 from chainslam.viz.floor_plan import Dimension, floor_plan
 
-from ..scenario import TrialConfig
+from ..scenario import OFFLINE, TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
 from ..scoring.keys import Steps
 from ..scoring.records import Log
@@ -30,7 +30,7 @@ from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
 from .maps.visibility import VISIBILITY, visibility_record
 from .settings import own
-from .trajectories import smoothed_path, trajectory, tum, wheels_alone
+from .trajectories import estimated_path, smoothed_path, trajectory, tum, wheels_alone
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
@@ -88,19 +88,21 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     shown = log if recorded is None or smoothed is None else replace(log, estimated_world=smoothed.poses_world)
     drawn = cache(lambda: map_geojson(last, result.joint, certificate, shown))
     told = cache(lambda: _dimensions(result, drawn()["features"]))
-    title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
+    name = result.scenario.config.backend
+    title = f"{result.scenario.world.name}, mapped {'' if name == OFFLINE else 'by '}{name}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
         MAP: lambda: npz_bytes(map_arrays(result)),
         "map.geojson": lambda: json_bytes(drawn()),
         "steps.csv": lambda: steps_csv(log),
-        "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
+        "trajectory_estimated.tum": lambda: tum(*estimated_path(result, log)),
         "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _pictures().picture_of(result),
-        VISIBILITY: lambda: json_bytes(visibility_record(last, log)),
-        "visibility.png": lambda: _pictures().graph_png(result),
     }
+    if result.scenario.config.backend != OFFLINE:  # Nobody followed walls from scan to scan.
+        files[VISIBILITY] = lambda: json_bytes(visibility_record(last, log))
+        files["visibility.png"] = lambda: _pictures().graph_png(result)
     floor = last.free_space
     if recorded is not None and not floor.evidence.size:  # A recorded drive has no planner, hence no planned routes.
         floor = drawn_floor(recorded.recording, shown.estimated_world, result.scenario.config.mission.free_space)
@@ -178,6 +180,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
         "odometry": wheels.odometry[: len(log)],
         "odometry_cov": wheels.odometry_cov[: len(log)],
         "touched": log.touched,
+        **({"carried": log.carried} if log.carried.any() else {}),
         "start_pose": result.scenario.start_estimate,
         "start_cov": result.scenario.start_cov,
     }

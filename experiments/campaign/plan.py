@@ -84,7 +84,7 @@ class Trial:
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
 
-DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start")
+DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start", "map")
 """Settings that the campaign itself decides, or that would invalidate its statistics."""
 
 SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps"), ("--first-seed", "first_seed"))

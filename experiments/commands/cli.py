@@ -79,9 +79,24 @@ COMMANDS = {
         "Reproduce the paper's figures: a picture of each, and its numbers next to those of several back ends.",
     ),
     "measure": Entry(
-        "measure",
+        "maps.measure",
         "Measure",
         "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
+    ),
+    "audit": Entry(
+        "audit",
+        "Audit",
+        "Check the covariances of trajectories against the truth: consistent, overconfident, or too cautious.",
+    ),
+    "plan": Entry(
+        "maps.plan",
+        "Plan",
+        "Draw a dimensioned plan of a run's or a log's map: SVG, PDF, PNG, DXF or GeoJSON, by the file's ending.",
+    ),
+    "check": Entry(
+        "maps.check",
+        "Check",
+        "Compare a map with a drawing of the building: which walls are within tolerance, moved, missing or extra.",
     ),
     "view": Entry(
         "view",

@@ -61,6 +61,19 @@ class Refined(TypedDict):
     closures: int
 
 
+class Session(TypedDict):
+    """Where a later session found itself in the map of an earlier run."""
+
+    map: str
+    first_step: int
+    """First step of the later session; 0 if its robot's place was not found."""
+    placed_at_step: int | None
+    places_world: list[list[float]]
+    """The pose at that step, m m rad; or the poses that fit equally well."""
+    pose_anees: NotRequired[float]
+    """Of the later session's steps alone."""
+
+
 class Summary(TypedDict):
     """The keys of `summary.json`; None where there is nothing to measure."""
 
@@ -128,6 +141,8 @@ class Summary(TypedDict):
     step_ms: Spread | None
     planning_ms: Spread | None
     certificate: dict[str, Any] | None
+    session: NotRequired[Session]
+    """Only of a run with `--map`."""
     second_looks: NotRequired[Refined]
     """Only of a real robot's log with offline refinement."""
     relations: NotRequired[dict[str, Any]]

@@ -53,6 +53,8 @@ class Log:
     heard_cov: Float[np.ndarray, "s 3 3"]
     touched: Bool[np.ndarray, " s"]
     """Whether the body touched something before each step."""
+    carried: Bool[np.ndarray, " s"]
+    """Whether each step is the first of a later session, to which the robot was carried."""
     estimated_world: Float[np.ndarray, "s 3"]
     """Estimate available at that step."""
     estimated_cov: Float[np.ndarray, "s 3 3"]
@@ -162,6 +164,7 @@ class Recorder:
                 "heard": step.odometry.motion,
                 "heard_cov": step.odometry.cov,
                 "touched": step.odometry.touched,
+                "carried": step.odometry.carried,
                 "estimated_world": belief.pose_world,
                 "estimated_cov": belief.pose_cov,
                 "from_start_world": from_start_world,

@@ -28,11 +28,20 @@ def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"])
     return nees(innovations, covs)
 
 
-def verdict_on_noise(nis: float, in_band: float) -> str:
-    """Return in words what a NIS, and the share of steps whose last scans lie in its band, say of the stated noise."""
+def noise_model(nis: float, in_band: float) -> str:
+    """Return what a NIS, and the share of steps whose last scans lie in its band, say of the noise model, in a word."""
     if in_band >= 0.5:
-        return "as stated"
-    return "smaller than stated" if nis < 1.0 else "larger than stated"
+        return CONSISTENT
+    return "conservative" if nis < 1.0 else "overconfident"
+
+
+CONSISTENT = "consistent"
+NOISE_MODELS = {
+    CONSISTENT: "innovations as stated: the noise model is consistent",
+    "conservative": "innovations smaller than stated: the noise model is conservative",
+    "overconfident": "innovations larger than stated: the noise model is overconfident",
+}
+"""What each word of `noise_model` means."""
 
 
 def chi2_band(dof: int, confidence: float = 0.95, runs: int = 1) -> tuple[float, float]:

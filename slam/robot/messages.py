@@ -203,6 +203,8 @@ class Odometry:
     """Whether scan matching confirmed the motion, so that no unmodelled one is looked for."""
     wheels: "Odometry | None" = None
     """What the wheels reported, if the motion is that of scan matching."""
+    carried: bool = False
+    """Whether the robot was carried there: between two sessions it is, and that is no path."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for numbers that are not finite."""
