@@ -46,6 +46,37 @@ plans: setup
 kills: setup
 	$(BIN)/python -m studies.kills
 
+.PHONY: lowest pythons sizes
+
+INSTALLED := results/installed
+UV := $(INSTALLED)/uv/bin/uv
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
+FOR_TESTS := 'pytest>=8' 'hypothesis>=6.100' 'pandas>=2.2' beartype==0.20 'resvg-py>=0.5'
+SMOKE := -o addopts='--import-mode=importlib -p no:cacheprovider' -o filterwarnings=ignore --quiet tests/library/test_interface.py \
+    tests/sim/logs tests/sim/worlds tests/slam/backends tests/experiments/commands/test_parsing.py
+
+$(UV):
+	$(PYTHON) -m venv $(INSTALLED)/uv && $(INSTALLED)/uv/bin/pip install --quiet --disable-pip-version-check uv
+
+# Does it run with the lowest versions that pyproject.toml allows?
+lowest: $(UV)
+	$(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/lowest
+	$(UV) pip install --quiet --python $(INSTALLED)/lowest --resolution lowest-direct --only-binary :all: -e '.[all]' $(FOR_TESTS)
+	$(INSTALLED)/lowest/bin/python -m pytest $(SMOKE)
+
+# Does it run with each Python that is found here?
+pythons: $(UV)
+	for python in $(PYTHONS); do $$python --version 2>/dev/null || { echo "$$python: none here"; continue; }; \
+	    $(UV) venv --quiet --clear --python $$python $(INSTALLED)/$$python && \
+	    $(UV) pip install --quiet --python $(INSTALLED)/$$python --only-binary :all: -e '.[all]' $(FOR_TESTS) && \
+	    $(INSTALLED)/$$python/bin/python -m pytest $(SMOKE) || exit; done
+
+# What an installation takes on disk, without extras and with each, MB.
+sizes: $(UV)
+	for extra in none campaign ros view all; do $(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/size && \
+	    $(UV) pip install --quiet --python $(INSTALLED)/size --compile-bytecode --link-mode copy -e ".[$$(echo $$extra | sed s/none//)]" && \
+	    echo $$extra: $$(du -sm $(INSTALLED)/size | cut -f1) || exit; done
+
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	$(BIN)/mypy

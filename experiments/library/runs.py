@@ -24,7 +24,7 @@ from ..artifacts.reading import told
 from ..artifacts.results import SUMMARY
 from ..artifacts.saved import read_summary
 from ..artifacts.schema import UnfitError
-from ..scoring.keys import Steps, Summary
+from ..scoring.keys import Steps, Summary, Words
 from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 REMEDY = "name a folder that explore or replay left"
 BROKEN = "another table, or one that was cut short"
-WORDS = ("behaviour", "reason")
-"""Columns of `steps.csv` that are text, even where all are empty."""
 Picture = Literal["map", "visibility", "paths", "nees", "model", "traversals"]
 
 
@@ -88,7 +86,8 @@ class Run:
         """An array for each column of `steps.csv`, with one entry for each step; `pandas.DataFrame` takes them all."""
         path = self.folder / "steps.csv"
         with told(path, REMEDY):
-            return cast(Steps, {name: _array(cells, name in WORDS) for name, cells in _columns(path).items()})
+            kinds, columns = Steps.__annotations__, _columns(path)
+            return cast(Steps, {name: _array(cells, kinds.get(name) == Words) for name, cells in columns.items()})
 
     @cached_property
     def map(self) -> Map:
