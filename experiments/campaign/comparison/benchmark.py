@@ -157,7 +157,7 @@ def _rank(row: Row) -> tuple[bool, float, float, str]:
     scores = [part[name]["mean"] if part[name] else 0.0 for name in ("pose_anees", "map_anees")]
     off = max(abs(math.log(score)) if score > 0.0 else math.inf for score in scores)
     error = part["path_error_m"]["mean"] if part["path_error_m"] else math.inf
-    return part["scored"] < part["trials"], round(off / SAME) if off < math.inf else off, error, row["estimator"]
+    return part["scored"] < part["trials"], float(np.round(off / SAME)), error, row["estimator"]
 
 
 def _cells(row: Row) -> list[str]:
