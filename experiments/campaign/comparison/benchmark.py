@@ -147,7 +147,7 @@ def table(rows: Sequence[Row]) -> list[list[str]]:
     """Return the table of some rows, the names of its columns first; intervals are over worlds."""
     head = [
         *("estimator", "chainslam", "pose ANEES", "map ANEES", "path error, cm", "false matches", "scored"),
-        *("closed loop: pose ANEES", "path error, cm", "false matches", "complete", "step, ms"),
+        *(f"closed: {name}" for name in ("pose ANEES", "path error, cm", "false matches", "complete", "step, ms")),
     ]
     return [head, *(_cells(row) for row in ranked(rows))]
 

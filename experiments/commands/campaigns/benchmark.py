@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...artifacts.files import write
 from ...campaign.comparison.benchmark import CURRENT, QUICK, read_all, rows_of, table
@@ -63,5 +64,6 @@ class Benchmark:
         return 0
 
 
-def _show(rows: list[dict[str, object]]) -> None:
-    print(f"{rows[0]['benchmark']}, recorded drives first, 95 % intervals over worlds\n\n{markdown(table(rows))}")
+def _show(rows: list[dict[str, Any]]) -> None:
+    print(f"{rows[0]['benchmark']}: recorded drives, then closed loop; 95 % intervals over worlds\n")
+    print(markdown(table(rows)))

@@ -38,12 +38,13 @@ def test_a_version_keeps_its_worlds_and_settings():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A benchmark of one world, one seed and five steps, by an estimator of chainslam and one of somebody else."""
+    """A benchmark of one world, one seed and five steps, by an estimator of chainslam and two of somebody else."""
     out = tmp_path_factory.mktemp("benchmark")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(BACKENDS, "theirs", replace(BACKENDS["block-ekf"], version="1.2"))
+        patch.setitem(BACKENDS, "broken", BackendEntry(lambda *start: 1 / 0, "fails"))
         patch.setattr(benchmark, "QUICK", TINY)
-        words = ["benchmark", "--quick", "--jobs", "1", "--backend", "full-ekf", "theirs", "--out", str(out)]
+        words = ["benchmark", "--quick", "--jobs", "1", "--backend", "full-ekf", "theirs", "broken", "--out", str(out)]
         assert main(words) == 0
         before = (out / "rows.jsonl").read_bytes()
         assert main(words) == 0
@@ -53,15 +54,20 @@ def folder(tmp_path_factory):
 
 def test_each_estimator_has_a_row_that_says_what_it_may_be_used_for(folder):
     rows = [json.loads(line) for line in (folder / "rows.jsonl").read_text().splitlines()]
-    assert [(row["estimator"], row["estimator_version"]) for row in rows] == [("full-ekf", None), ("theirs", "1.2")]
+    names = [(row["estimator"], row["estimator_version"]) for row in rows]
+    assert names == [("full-ekf", None), ("theirs", "1.2"), ("broken", None)]
     pooled = json.loads((folder / "comparison.json").read_text())["pooled"]
-    means = {(row["backend"], row["arm"]): row["pose_anees_from_start"]["mean"] for row in pooled}
-    for row in rows:
+    means = {(row["backend"], row["arm"]): (row["pose_anees_from_start"] or {}).get("mean") for row in pooled}
+    for part in (rows[2]["recorded"], rows[2]["closed"]):
+        assert (part["scored"], part["pose_anees"], part["step_ms"]) == (0, None, None)
+        assert [(each["world"], each["seed"]) for each in part["failures"]] == [("random:7", 1)]
+        assert "division by zero" in part["failures"][0]["reason"]
+    for row in rows[:2]:
         assert "--quick" in row["not_citable"]
         assert len(row["scans_sha256"]) == 64
         for part, arm in (("recorded", "replay-own"), ("closed", "closed")):
             assert row[part]["pose_anees"] == {"mean": means[row["estimator"], arm], "low": None, "high": None}
-            assert (row[part]["trials"], row[part]["complete"], row[part]["scored"]) == (1, row[part]["complete"], 1)
+            assert (row[part]["trials"], row[part]["scored"]) == (1, 1)
             assert row[part]["step_ms"] > 0
             assert row[part]["failures"] == []
         assert row["closed"]["complete"] == 0
@@ -74,8 +80,9 @@ def test_rows_of_several_files_are_one_table(folder, tmp_path, capsys):
     assert main(["benchmark", "--table", str(rows), str(more)]) == 0
     said = capsys.readouterr().out
     assert said.startswith("tiny")
-    assert said.count("| `") == 4
+    assert said.count("| `") == 6
     assert "`theirs` 1.2 (not citable)" in said
+    assert all("broken" in line for line in said.splitlines()[-2:])
 
 
 @pytest.mark.parametrize(
@@ -97,6 +104,25 @@ def test_a_benchmark_needs_estimators_or_rows(words, tmp_path, monkeypatch, caps
     assert main(["benchmark", *words]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("_unchecked")
+def test_a_try_tells_the_papers_filter_from_a_consistent_one(tmp_path, capsys):
+    words = ["benchmark", "--quick", "--backend", "block-ekf", "invariant-ekf", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    rows = {
+        row["estimator"]: row for row in map(json.loads, (tmp_path / "out" / "rows.jsonl").read_text().splitlines())
+    }
+    for part in (part for row in rows.values() for part in (row["recorded"], row["closed"])):
+        assert (part["complete"], part["scored"], part["failures"]) == (4, 4, [])
+    assert (
+        rows["block-ekf"]["recorded"]["map_anees"]["mean"]
+        > 3.0
+        > rows["invariant-ekf"]["recorded"]["map_anees"]["mean"]
+    )
+    said = capsys.readouterr().out
+    assert said.index("| `invariant-ekf`") < said.index("| `block-ekf`")
 
 
 def row(name, pose, error, scored=30, map_anees=1.0):
