@@ -59,7 +59,7 @@ fuzz: setup
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
 
-# Five back ends on the benchmark; its rows are added to those of the site. Hours; begun again, it goes on where it was.
+# Five back ends on the benchmark; its rows are added to the stored ones. Hours; begun again, it goes on where it was.
 leaderboard: setup
 	nice $(BIN)/chainslam benchmark --backend block-ekf full-ekf invariant-ekf graph intersection-ekf --out results/leaderboard
 	$(BIN)/python -m studies.runner.leaderboard results/leaderboard/rows.jsonl

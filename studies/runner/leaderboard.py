@@ -1,6 +1,6 @@
-"""Rows of `chainslam benchmark`, added to those of the site's table.
+"""Rows of `chainslam benchmark`, added to the stored ones.
 
-.venv/bin/python -m studies.runner.leaderboard results/leaderboard/rows.jsonl     # and then `make results`
+.venv/bin/python -m studies.runner.leaderboard results/leaderboard/rows.jsonl
 """
 
 from dataclasses import dataclass
@@ -11,15 +11,14 @@ import tyro
 
 from chainslam.experiments.campaign.comparison.benchmark import read_all
 
-from .rows import Row, append, last
+from .rows import append
 
 ROWS = Path("studies/results/rows/leaderboard.jsonl")
-NAMES = ("benchmark", "estimator", "estimator_version")
 
 
 @dataclass(frozen=True)
 class Leaderboard:
-    """Add rows to the stored ones; of each estimator and version the last row counts."""
+    """Add rows to the stored ones."""
 
     rows: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FILE")]
     """Files of rows."""
@@ -31,11 +30,6 @@ class Leaderboard:
         for row in rows:
             if row["not_citable"] is not None:
                 print(f"left out: {row['estimator']}, {row['not_citable']}")
-
-
-def stored() -> list[Row]:
-    """Return the rows of the site's table."""
-    return last(ROWS, NAMES)
 
 
 if __name__ == "__main__":
