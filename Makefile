@@ -6,7 +6,7 @@ ROWS := studies/results/rows
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
+.PHONY: setup fuzz leaderboard demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
 # What tests, checks and pages need, too; users of the program need .venv/made only.
 setup: .venv/tools
@@ -89,6 +89,11 @@ fuzz: setup
 
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
+
+# Five back ends on the benchmark; its rows are added to the stored ones. Hours; begun again, it goes on where it was.
+leaderboard: setup
+	nice $(BIN)/chainslam benchmark --backend block-ekf full-ekf invariant-ekf graph intersection-ekf --out results/leaderboard
+	$(BIN)/python -m studies.runner.leaderboard results/leaderboard/rows.jsonl
 
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl

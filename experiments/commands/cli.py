@@ -69,9 +69,14 @@ COMMANDS = {
         "Replay a log through one or several back ends, all with identical scans.",
     ),
     "compare": Entry(
-        "compare",
+        "campaigns.compare",
         "Compare",
         "Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them statistically.",
+    ),
+    "benchmark": Entry(
+        "campaigns.benchmark",
+        "Benchmark",
+        "Score estimators on worlds and seeds fixed by version, one row of figures each that can be cited.",
     ),
     "reproduce": Entry(
         "reproduce",

@@ -17,8 +17,8 @@ from chainslam.experiments.artifacts.settings import (
     record_of,
     trial_of,
 )
+from chainslam.experiments.commands.campaigns.compare import Compare
 from chainslam.experiments.commands.cli import main
-from chainslam.experiments.commands.compare import Compare
 from chainslam.experiments.commands.explore import Explore
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.experiments.usage import UsageError

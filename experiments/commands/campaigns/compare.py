@@ -12,15 +12,15 @@ from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
-from ..artifacts.settings import drawing_settings, parse_settings
-from ..campaign.cluster import ClusterError, on_dask
-from ..campaign.comparison.tables import write_tables
-from ..campaign.contrast import contrast, read_contrast
-from ..campaign.merge import merge
-from ..campaign.pages.contrast_page import lines_of_contrast
-from ..campaign.pages.film import record_campaign
-from ..campaign.pages.lines import deciding_arm, lines_of
-from ..campaign.plan import (
+from ...artifacts.settings import drawing_settings, parse_settings
+from ...campaign.cluster import ClusterError, on_dask
+from ...campaign.comparison.tables import write_tables
+from ...campaign.contrast import contrast, read_contrast
+from ...campaign.merge import merge
+from ...campaign.pages.contrast_page import lines_of_contrast
+from ...campaign.pages.film import record_campaign
+from ...campaign.pages.lines import deciding_arm, lines_of
+from ...campaign.plan import (
     RECORDING,
     Campaign,
     check_campaign,
@@ -28,16 +28,16 @@ from ..campaign.plan import (
     drawing_of,
     trials,
 )
-from ..campaign.runner import missing, on_cores, run_campaign
-from ..campaign.store import opened
-from ..library.asked import CampaignName, asked_campaign
-from ..library.echo import campaign_line, echo_world
-from ..replays.replay import Association
-from ..scenario import P0, load_world
-from ..terminal.answers import found
-from ..terminal.console import say, written
-from ..terminal.interrupts import INTERRUPTED
-from ..usage import UsageError
+from ...campaign.runner import missing, on_cores, run_campaign
+from ...campaign.store import opened
+from ...library.asked import CampaignName, asked_campaign
+from ...library.echo import campaign_line, echo_world
+from ...replays.replay import Association
+from ...scenario import P0, load_world
+from ...terminal.answers import found
+from ...terminal.console import say, written
+from ...terminal.interrupts import INTERRUPTED
+from ...usage import UsageError
 
 FAILED = 1
 JOBS_A_CORE = 8
