@@ -121,8 +121,8 @@ class _Plan:
 
     def dimension(self, told: Dimension) -> None:
         """Write a length beside its wall, or an area in its room, as in the floor plan."""
-        if told.letters_m is not None:
-            self._text(told.words, told.beside_world, CAPITALS * told.letters_m, -told.clockwise_deg, DIMENSIONS)
+        if told.shown:
+            self._text(told.shown, told.beside_world, CAPITALS * told.letters_m, -told.clockwise_deg, DIMENSIONS)
 
     def note(self, words: str, corner_world: Float[np.ndarray, "2"]) -> None:
         """Write a line of text that starts at a point."""

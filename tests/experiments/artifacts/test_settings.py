@@ -53,6 +53,7 @@ NAMED = {
     "mission.free_space.fence": FENCE,
     "robot.outline_m": [[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]],
     "backend_options.own": {"MyConfig": {"gain": 0.5}},
+    "map": "results/first",
     "drawing.level": "1",
     "drawing.threshold": 0.5,
     "robot.faults.people.standing": [1.0, 2.0],
