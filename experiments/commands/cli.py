@@ -66,7 +66,7 @@ COMMANDS = {
     "replay": Entry(
         "replay",
         "Replay",
-        "Replay a log through one or several back ends, all with identical scans.",
+        "Map a log, or replay it through one or several back ends, all with identical scans.",
     ),
     "compare": Entry(
         "campaigns.compare",
