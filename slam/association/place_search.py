@@ -107,12 +107,11 @@ def place_on(
     poses = np.column_stack([moved, angles[found[:, 1].astype(np.int64)]])
     best = int(np.argmax(found[:, 0]))
     others = np.flatnonzero(apart(poses, poses[best], c))
-    second = others[np.argmax(found[others, 0])] if len(others) else None
+    second = int(others[np.argmax(found[others, 0])]) if len(others) else None
+    rival, rival_pose = (0.0, None) if second is None else (float(found[second, 0]), poses[second])
     fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.cell_m, 4)
     pose, _ = refine(fine, points, poses[best], 0.5 * c.step_rad, 0.1 * c.cell_m)
-    if second is None:
-        return Place(pose, float(found[best, 0]), 0.0)
-    return Place(pose, float(found[best, 0]), float(found[second, 0]), poses[second])
+    return Place(pose, float(found[best, 0]), rival, rival_pose)
 
 
 def place_of(

@@ -84,7 +84,7 @@ PLACES = (
            "False", "poses are solved for only where a closure moves them"),
     Switch("loop_search.turned_back", SEARCH, "if «between»:",
            "False", "a closure over a slip first turns all that came after it"),
-    Switch("place_search.refined", MATCH, "return Place(«pose», float(found[best, 0]), rival)",
+    Switch("place_search.refined", MATCH, "return Place(«pose», float(found[best, 0]), rival, rival_pose)",
            "poses[best]", "a place is refined below the cells of its search"),
     Switch("place_search.apart_turn", MATCH, "| «(np.abs(wrap(off[:, 2])) > config.apart_rad)»",
            NO, "a place turned otherwise is another"),
