@@ -15,6 +15,8 @@ from . import own_look
 from .map_axes import prepare, scale_bar
 
 MARGIN_M = 0.8
+EDGE_IN, BAR_IN = 0.25, 0.45
+"""Around the drawing, and from it to its scale bar, below the numbers of the axis."""
 COLOURS = {
     "within": "#009E73", "unclear": "#56B4E9", "moved": "#D55E00", "missing": "#C8102E", "not seen": "#B8B8B8",
     "extra": "#7B4FA3",
@@ -34,9 +36,10 @@ def draw_check(
     low, high = low - MARGIN_M, high + MARGIN_M
     inch = 9.0 / float((high - low).max())
     width, height = ((high - low) * inch).tolist()
-    figure = Figure(figsize=(max(width, 5.0), height + 1.1), dpi=150, facecolor=palette.PAGE)
+    wide, tall = max(width + 2.0 * EDGE_IN, 5.0), height + 1.3
+    figure = Figure(figsize=(wide, tall), dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.7 / (height + 1.1), 1.0, height / (height + 1.1)))
+    axes = figure.add_axes((0.5 * (1.0 - width / wide), 0.9 / tall, width / wide, height / tall))
     prepare(axes, low, high)
     axes.add_collection(LineCollection(walls, colors=palette.INK, linewidths=0.5, zorder=4), autolim=False)
     handles = []
@@ -51,7 +54,7 @@ def draw_check(
             float(at[0]), float(at[1]), literal(words), fontsize=6.5, ha="center", va="center", color=palette.INK,
             zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
         )  # fmt: skip
-    figure.text(0.02, 1.0 - 0.25 / (height + 1.1), literal(title), fontsize=10, fontweight="bold", color=palette.INK)
+    figure.text(0.02, 1.0 - 0.25 / tall, literal(title), fontsize=10, fontweight="bold", color=palette.INK)
     figure.legend(handles=handles, loc="lower left", ncols=6, fontsize=7, frameon=False)
-    scale_bar(axes, float((high - low)[0]), 0.02)
+    scale_bar(axes, float((high - low)[0]), BAR_IN / height)
     return figure

@@ -6,16 +6,18 @@ A dimension says between which walls and corners it is taken, and no more: of th
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import wrap
 
 from ...scoring.maps.measurements import Measured, area, distance, perimeter
 from .faces import Faces, Node
-from .sight import Pair
+from .sight import FACING_RAD, Pair
 
 
 class Kind(StrEnum):
@@ -125,11 +127,29 @@ def area_of(faces: Faces, rings: Sequence[Sequence[Node]]) -> Measured:
     )
 
 
+def commonest(
+    alpha: Float[np.ndarray, " n"], lengths_m: Float[np.ndarray, " n"]
+) -> tuple[float, Float[np.ndarray, " n"]]:
+    """Return the direction modulo 90 degrees that the greatest length of lines is parallel to, as their mean by length,
+    and the weight of each line in it: walls that stand askew have none.
+    """
+    if not len(alpha):
+        return 0.0, np.zeros(0)
+    near = np.abs(_quarter(alpha[:, None] - alpha[None, :])) <= FACING_RAD
+    seed = int(np.argmax(near @ lengths_m))
+    share = np.where(near[seed], lengths_m, 0.0)
+    off = float(share @ _quarter(alpha - alpha[seed])) / max(float(share.sum()), 1e-12)
+    return float(_quarter(alpha[seed] + off)), share
+
+
+def _quarter(rad: np.ndarray | float) -> Any:
+    """Return angles modulo 90 degrees, from -45 to 45."""
+    return wrap(4.0 * np.asarray(rad)) / 4.0
+
+
 def main_direction(faces: Faces) -> Measured:
     """Return the direction (rad, from -45 to 45 degrees) of most of the walls modulo 90 degrees, by their lengths."""
-    turned = np.exp(4j * faces.means[:, 0])
-    phi = float(np.angle(np.sum(faces.lengths_m * turned))) / 4.0 if len(faces) else 0.0
-    share = faces.lengths_m * np.cos(4.0 * (faces.means[:, 0] - phi))
+    phi, share = commonest(faces.means[:, 0], faces.lengths_m)
     gradient = np.zeros(POSE + 2 * len(faces))
     gradient[POSE::2] = share / max(float(share.sum()), 1e-12)
     return Measured(phi, float(np.sqrt(max(gradient @ faces.cov @ gradient, 0.0))))

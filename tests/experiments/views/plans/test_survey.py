@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chainslam.experiments.views.plans.faces import END, Node
-from chainslam.experiments.views.plans.measuring import Kind, value_of
+from chainslam.experiments.views.plans.measuring import Kind, commonest, value_of
 from chainslam.experiments.views.plans.openings import gaps
 from chainslam.experiments.views.plans.survey import survey
 
@@ -90,3 +90,12 @@ def test_a_gap_between_ends_is_an_opening_once_the_robot_saw_through_it():
     solid = shapely.box(-1, -1, 9, 4).difference(floor)
     doors = [gap for gap in gaps(loose, solid) if gap.is_seen]
     assert {round(gap.width_m, 6) for gap in doors} == {0.9}
+
+
+def test_walls_that_stand_askew_do_not_turn_the_main_direction():
+    alpha = np.deg2rad([10.0, 100.5, 190.2, -79.9, 24.0, 204.0, 40.0])
+    lengths = np.array([4.0, 3.0, 4.0, 3.0, 2.0, 2.0, 5.0])
+    phi, share = commonest(alpha, lengths)
+    assert np.rad2deg(phi) == pytest.approx(10.0 + (3.0 * 0.5 + 4.0 * 0.2 + 3.0 * 0.1) / 14.0)
+    np.testing.assert_array_equal(share, [4.0, 3.0, 4.0, 3.0, 0.0, 0.0, 0.0])
+    assert commonest(np.zeros(0), np.zeros(0))[0] == 0.0
