@@ -92,7 +92,8 @@ def floor_plan(
 ) -> bytes:
     """Return the SVG file; its y axis points down, so its world is the map's moved to the view's lower left corner."""
     bands = [_band(chain, index, walls, certificate) for index, chain in enumerate(chains)]
-    corners = [path_world[:, :2], *(np.reshape(shapely.bounds(band), (2, 2)) for band in bands)]
+    driven = np.isfinite(path_world[:, 0])
+    corners = [path_world[driven, :2], *(np.reshape(shapely.bounds(band), (2, 2)) for band in bands)]
     x0, y0 = np.floor(np.min(np.concatenate(corners), axis=0) - MARGIN_M)
     x1, y1 = np.ceil(np.max(np.concatenate(corners), axis=0) + MARGIN_M)
     width, height = float(x1 - x0), float(y1 - y0)
@@ -107,7 +108,8 @@ def floor_plan(
     ).text = f"1:{SCALE}, drawn in metres; the lower left corner is ({x0:g}, {y0:g}) of the map, whose y points up"
     plan = _Plan(page, np.array([x0, y1]))
     _grid(plan, width, height)
-    plan.line(path_world[:, :2], stroke=WAY, stroke_width="0.03")
+    for leg in np.split(path_world[driven, :2], np.flatnonzero(~driven) - np.arange(np.count_nonzero(~driven))):
+        plan.line(leg, stroke=WAY, stroke_width="0.03")
     closed = 0
     for chain, band in zip(chains, bands, strict=True):
         colour = palette.CLOSED[closed % len(palette.CLOSED)] if chain.is_closed else palette.OPEN

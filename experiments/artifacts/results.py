@@ -14,6 +14,7 @@ import numpy as np
 
 from chainslam.slam.evaluation.consistency import pose_errors
 from chainslam.viz.floor_plan import Dimension, floor_plan
+from chainslam.viz.shapes import with_gaps
 
 from ..scenario import OFFLINE, TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
@@ -96,7 +97,9 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "map.geojson": lambda: json_bytes(drawn()),
         "steps.csv": lambda: steps_csv(log),
         "trajectory_estimated.tum": lambda: tum(*estimated_path(result, log)),
-        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
+        "map.svg": lambda: floor_plan(
+            last.map, last.chains, certificate, with_gaps(shown.estimated_world, log.carried), title, told()
+        ),
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _pictures().picture_of(result),
     }
