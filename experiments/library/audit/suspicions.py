@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from chainslam.slam.evaluation.consistency import anees, nees, whitened
+
 from ...usage import UsageError
 from ...views.numbers import number
-from .draws import score, whitened
 from .stated import Stated
 
 DEGREES = float(np.rad2deg(1.0)) ** 2
@@ -165,6 +166,5 @@ def _is_constant(covs: Float[np.ndarray, "n 3 3"]) -> bool:
 def _grows(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> bool:
     """Return whether the errors of the last third are far larger than those of the first, and than stated."""
     third = max(len(errors) // 3, 1)
-    nees = np.sum(whitened(errors, covs) ** 2, axis=1)
-    first, last = score(whitened(errors, covs)[:third]), float(np.mean(nees[-third:])) / 3.0
-    return last > NEAR * max(first.anees, 1e-300) and last > NEAR
+    first, last = (anees(nees(errors[part], covs[part]), 3) for part in (slice(third), slice(-third, None)))
+    return last > NEAR * max(first, 1e-300) and last > NEAR

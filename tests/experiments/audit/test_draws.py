@@ -13,8 +13,8 @@ from chainslam.experiments.library.audit.draws import (
     interval,
     pooled_dof,
     score,
-    whitened,
 )
+from chainslam.slam.evaluation.consistency import whitened
 
 
 def lasting(n, phi, d=3, seed=0):

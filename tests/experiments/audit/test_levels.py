@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from chainslam.experiments.campaign.comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT
-from chainslam.experiments.library.audit.draws import score, whitened
+from chainslam.experiments.library.audit.draws import score
 from chainslam.experiments.library.audit.errors import errors
 from chainslam.experiments.library.audit.verdicts import TOO_FEW, compare, judge, pool
+from chainslam.slam.evaluation.consistency import whitened
 
 from .drives import drives
 from .test_draws import lasting
