@@ -12,7 +12,7 @@ from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
 from ...usage import UsageError
 from ...views.numbers import number
-from .stated import Stated
+from .stated import Stated, symmetric
 
 DEGREES = float(np.rad2deg(1.0)) ** 2
 """The ratio of variances in degrees and in radians."""
@@ -104,12 +104,7 @@ def other_orders(stated: Stated) -> dict[str, Float[np.ndarray, "n 3 3"]]:
         return {"roll pitch yaw x y z, as GTSAM has it": turned[:, (0, 1, 5)][:, :, (0, 1, 5)]}
     upper = np.triu_indices(3)
     cells = stated.covs[:, upper[0], upper[1]]
-    found = {}
-    for words, order in ORDERS_OF_6.items():
-        covs = np.zeros_like(stated.covs)
-        covs[:, upper[0], upper[1]] = covs[:, upper[1], upper[0]] = cells[:, order]
-        found[words] = covs
-    return found
+    return {words: symmetric(cells[:, order], 3) for words, order in ORDERS_OF_6.items()}
 
 
 def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -> str:
