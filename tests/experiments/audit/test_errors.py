@@ -9,12 +9,11 @@ from scipy.linalg import expm, logm
 from chainslam.experiments.library.audit.errors import (
     errors,
     motion_at_start,
-    motion_of_all,
-    moved,
     moved_covs,
     since_start,
     to_frame,
 )
+from chainslam.experiments.scoring.trajectories import alignment_of_paths, moved
 from chainslam.slam.evaluation.consistency import nees
 
 FRAMES = ("additive", "body", "world")
@@ -90,7 +89,7 @@ def test_paths_are_brought_onto_each_other():
     rng = np.random.default_rng(3)
     true = rng.uniform(-3.0, 3.0, (20, 3))
     estimated = moved(true, np.array([1.0, 2.0, 0.5]))
-    for motion in (motion_at_start(estimated, true), motion_of_all(estimated, true)):
+    for motion in (motion_at_start(estimated, true), alignment_of_paths(estimated, true)):
         assert moved(estimated, motion) == pytest.approx(true, abs=1e-9)
 
 
