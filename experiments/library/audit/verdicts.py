@@ -64,7 +64,7 @@ class Pooled:
     verdict: Verdict
 
 
-def pool(scores: Sequence[Score], is_bound: bool = False) -> Pooled:
+def pool(scores: Sequence[Score]) -> Pooled:
     """Return the mean ANEES of independent runs and its verdict.
 
     From ten runs on the interval is the studentised one over runs; of fewer, by chi-square with the degrees of freedom
@@ -77,7 +77,7 @@ def pool(scores: Sequence[Score], is_bound: bool = False) -> Pooled:
         low, high = interval(mean, dof)
     else:
         low, high, dof = max(found[0], 0.0), found[1], float("inf")
-    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof, is_bound))
+    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof))
 
 
 @dataclass(frozen=True)
