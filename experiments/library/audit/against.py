@@ -45,7 +45,7 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
         before = np.maximum(after - 1, 0)
         known = (known_s[before] <= asked) & (asked <= known_s[after]) & (known_s[after] - known_s[before] <= GAP_S)
         poses, words = interpolated(known_s, truth.poses_world, asked), "interpolated"
-        if np.count_nonzero(near) > np.count_nonzero(known):
+        if np.count_nonzero(near) > 2 * np.count_nonzero(known):
             return paired(stated, truth, SAME_TIME_S)
     if not np.any(known):
         raise UsageError(_no_common_time(stated, truth, nearest_s))
