@@ -16,11 +16,14 @@ from ..geometry.lines import normals
 from ..geometry.poses import J, rotation, to_robot, turned, wrap
 
 
+def whitened(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, "n d"]:
+    """Return L^-1 e, P = L L', of each error; raises numpy.linalg.LinAlgError where P is not positive definite."""
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(covs), errors[..., None])[..., 0])
+
+
 def nees(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, " n"]:
     """Return e' P^-1 e for each error (n, d); raises numpy.linalg.LinAlgError where P is not positive definite."""
-    roots = np.linalg.cholesky(covs)
-    whitened = np.linalg.solve(roots, errors[..., None])[..., 0]
-    return np.asarray(np.sum(whitened**2, axis=-1))
+    return np.asarray(np.sum(whitened(errors, covs) ** 2, axis=-1))
 
 
 def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, " n"]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ...scoring.without_truth.relations import SAME_TIME_S, interpolated
+from ...scoring.without_truth.relations import SAME_TIME_S, interpolated, nearest_rows
 from ...usage import UsageError
 from .stated import Stated
 
@@ -33,9 +33,7 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
     10 ms. `nearest_s` takes the nearest within it.
     """
     asked, known_s = stated.time_s, truth.time_s
-    after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
-    before = np.maximum(after - 1, 0)
-    rows = np.where(np.abs(known_s[before] - asked) <= np.abs(known_s[after] - asked), before, after)
+    rows, near = nearest_rows(known_s, asked)
     off = np.abs(known_s[rows] - asked)
     inside = np.count_nonzero((known_s >= asked[0] - SAME_S) & (known_s <= asked[-1] + SAME_S))
     if nearest_s is not None:
@@ -43,9 +41,11 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
     elif np.count_nonzero(off <= SAME_S) > 0.5 * inside:
         known, poses, words = off <= SAME_S, truth.poses_world[rows], ""
     else:
+        after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
+        before = np.maximum(after - 1, 0)
         known = (known_s[before] <= asked) & (asked <= known_s[after]) & (known_s[after] - known_s[before] <= GAP_S)
         poses, words = interpolated(known_s, truth.poses_world, asked), "interpolated"
-        if np.count_nonzero(off <= SAME_TIME_S) > np.count_nonzero(known):
+        if np.count_nonzero(near) > 2 * np.count_nonzero(known):
             return paired(stated, truth, SAME_TIME_S)
     if not np.any(known):
         raise UsageError(_no_common_time(stated, truth, nearest_s))

@@ -6,15 +6,15 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from chainslam.slam.evaluation.consistency import anees
+from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
-from ...scoring.trajectories import rms
+from ...scoring.trajectories import alignment_of_paths, moved, rms
 from ...scoring.without_truth.relation_noise import relation_covs, sigmas_of_relations
 from ...scoring.without_truth.relations import Relations, between, nearest_rows
 from ...usage import UsageError
 from .against import paired
-from .draws import LEVELS, Score, score, whitened
-from .errors import errors, motion_at_start, motion_of_all, moved, moved_covs, since_start, to_frame
+from .draws import LEVELS, Score, score
+from .errors import errors, motion_at_start, moved_covs, since_start, to_frame
 from .stated import Frame, Stated
 from .suspicions import check, definite, hints, order_hint
 from .verdicts import Verdict, judge
@@ -81,7 +81,7 @@ class Audited:
     @property
     def nees(self) -> Float[np.ndarray, " n"]:
         """The NEES of each."""
-        return np.asarray(np.sum(whitened(self.errors, self.covs) ** 2, axis=1))
+        return nees(self.errors, self.covs)
 
     @property
     def verdict(self) -> Verdict:
@@ -138,7 +138,7 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
             )
         both = (stated.poses_world[at.known], at.poses_world[at.known])
         start = int(np.count_nonzero(at.known[:start]))
-        motion = motion_of_all(*both) if align == "all" else motion_at_start(*(path[start:] for path in both))
+        motion = alignment_of_paths(*both) if align == "all" else motion_at_start(*(path[start:] for path in both))
         poses, covs = moved(poses, motion), moved_covs(covs, motion, frame)
     if options.reference_sigma is not None:
         covs = covs + _of_reference(poses, options.reference_sigma, frame)
@@ -232,7 +232,7 @@ def _from_start(
     stated = 0.5 * (stated + stated.swapaxes(1, 2)) + KNOWN_START
     if not np.all(definite(stated)):
         return None
-    return anees(np.sum(whitened(left, stated) ** 2, axis=1), left.shape[1])
+    return anees(nees(left, stated), left.shape[1])
 
 
 def _lags(

@@ -41,11 +41,6 @@ class Score:
     """Share of errors inside the regions of 50, 90, 95 and 99 %."""
 
 
-def whitened(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, "n d"]:
-    """Return L^-1 e of each error; raises numpy.linalg.LinAlgError where P is not positive definite."""
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(covs), errors[..., None])[..., 0])
-
-
 def score(white: Float[np.ndarray, "n d"]) -> Score:
     """Return the score of a series of whitened errors in the order of their times; n is at least 1."""
     count, d = white.shape

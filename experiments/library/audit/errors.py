@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from chainslam.slam.evaluation.consistency import pose_covariances, pose_errors
-from chainslam.slam.geometry.poses import J, rotation, turned, wrap
+from chainslam.slam.geometry.poses import J, rotation, wrap
 
-from ...scoring.trajectories import alignment_of_paths
+from ...scoring.trajectories import moved
 from ...scoring.without_truth.relation_noise import body_covs
 from ...scoring.without_truth.relations import between
 from .stated import Frame
@@ -48,12 +48,6 @@ def to_frame(estimated: Poses, covs: Covs, given: Frame, wanted: Frame) -> Covs:
     return body_covs(estimated, plain) if wanted == "body" else np.asarray(plain)
 
 
-def moved(poses: Poses, motion: Float[np.ndarray, "3"]) -> Poses:
-    """Return poses after a rigid motion of the world."""
-    angles = np.full(len(poses), motion[2])
-    return np.column_stack([turned(poses[:, :2], angles) + motion[:2], wrap(poses[:, 2] + motion[2])])
-
-
 def moved_covs(covs: Covs, motion: Float[np.ndarray, "3"], frame: Frame) -> Covs:
     """Return covariances after a rigid motion of the world."""
     if frame == "body":
@@ -69,11 +63,6 @@ def motion_at_start(estimated: Poses, true: Poses) -> Float[np.ndarray, "3"]:
     """Return the rigid motion of the world that brings the first estimated pose to the true one."""
     turn = float(wrap(true[0, 2] - estimated[0, 2]))
     return np.append(true[0, :2] - rotation(turn) @ estimated[0, :2], turn)
-
-
-def motion_of_all(estimated: Poses, true: Poses) -> Float[np.ndarray, "3"]:
-    """Return the rigid motion of the world that brings the estimated positions nearest to the true ones."""
-    return alignment_of_paths(estimated, true)
 
 
 def since_start(

@@ -20,7 +20,7 @@ from chainslam.slam.geometry.poses import J, turned, wrap
 from ...scoring.without_truth.relations import between
 from ...usage import UsageError
 from ...views.numbers import number
-from .stated import MOST_BYTES, Stated
+from .stated import MOST_BYTES, Stated, symmetric
 
 VERTEX, EDGE, FIX = "VERTEX_SE2", "EDGE_SE2", "FIX"
 COLUMNS = {VERTEX: 4, EDGE: 11}
@@ -113,13 +113,10 @@ def graph_at(path: Path) -> Graph:
     if len(np.unique(ids)) < len(ids) or not np.all(np.isin(ends, ids)):
         raise UsageError(f"{expected} with edges between vertices of ids of their own, found others: correct it")
     held = int(np.searchsorted(ids, fixed[0])) if fixed and fixed[0] in ids else 0
-    upper = np.triu_indices(3)
-    information = np.zeros((len(edges), 3, 3))
-    information[:, upper[0], upper[1]] = information[:, upper[1], upper[0]] = edges[:, 5:]
     notes = tuple(f"{count} lines {kind} are left out" for kind, count in others.items())
     poses = np.column_stack([vertices[:, 1:3], wrap(vertices[:, 3])])
     motions = np.column_stack([edges[:, 2:4], wrap(edges[:, 4])])
-    return Graph(ids, poses, np.searchsorted(ids, ends), motions, information, held, notes)
+    return Graph(ids, poses, np.searchsorted(ids, ends), motions, symmetric(edges[:, 5:], 3), held, notes)
 
 
 def marginals(graph: Graph, name: str) -> tuple[Callable[[Int[np.ndarray, " c"]], np.ndarray], float]:

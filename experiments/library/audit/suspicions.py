@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from chainslam.slam.evaluation.consistency import anees, nees, whitened
+
 from ...usage import UsageError
 from ...views.numbers import number
-from .draws import score, whitened
-from .stated import Stated
+from .stated import Stated, symmetric
 
 DEGREES = float(np.rad2deg(1.0)) ** 2
 """The ratio of variances in degrees and in radians."""
@@ -103,12 +104,7 @@ def other_orders(stated: Stated) -> dict[str, Float[np.ndarray, "n 3 3"]]:
         return {"roll pitch yaw x y z, as GTSAM has it": turned[:, (0, 1, 5)][:, :, (0, 1, 5)]}
     upper = np.triu_indices(3)
     cells = stated.covs[:, upper[0], upper[1]]
-    found = {}
-    for words, order in ORDERS_OF_6.items():
-        covs = np.zeros_like(stated.covs)
-        covs[:, upper[0], upper[1]] = covs[:, upper[1], upper[0]] = cells[:, order]
-        found[words] = covs
-    return found
+    return {words: symmetric(cells[:, order], 3) for words, order in ORDERS_OF_6.items()}
 
 
 def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -> str:
@@ -165,6 +161,5 @@ def _is_constant(covs: Float[np.ndarray, "n 3 3"]) -> bool:
 def _grows(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> bool:
     """Return whether the errors of the last third are far larger than those of the first, and than stated."""
     third = max(len(errors) // 3, 1)
-    nees = np.sum(whitened(errors, covs) ** 2, axis=1)
-    first, last = score(whitened(errors, covs)[:third]), float(np.mean(nees[-third:])) / 3.0
-    return last > NEAR * max(first.anees, 1e-300) and last > NEAR
+    first, last = (anees(nees(errors[part], covs[part]), 3) for part in (slice(third), slice(-third, None)))
+    return last > NEAR * max(first, 1e-300) and last > NEAR

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...campaign.comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT, WITHIN
-from ...scoring.statistics import FEW_RUNS, estimate
+from ...scoring.statistics import FEW_RUNS, estimate, mean_interval
 from ...views.numbers import number
 from .draws import Score, interval, pooled_dof
 
@@ -64,7 +64,7 @@ class Pooled:
     verdict: Verdict
 
 
-def pool(scores: Sequence[Score], is_bound: bool = False) -> Pooled:
+def pool(scores: Sequence[Score]) -> Pooled:
     """Return the mean ANEES of independent runs and its verdict.
 
     From ten runs on the interval is the studentised one over runs; of fewer, by chi-square with the degrees of freedom
@@ -72,12 +72,12 @@ def pool(scores: Sequence[Score], is_bound: bool = False) -> Pooled:
     """
     values = [each.anees for each in scores]
     mean, dof = float(np.mean(values)), pooled_dof(scores)
-    found = estimate({("", k): value for k, value in enumerate(values)}) if len(values) >= FEW_RUNS else None
-    if found is None or found.low is None or found.high is None:
+    found = mean_interval(np.array(values)) if len(values) >= FEW_RUNS else None
+    if found is None:
         low, high = interval(mean, dof)
     else:
-        low, high, dof = max(found.low, 0.0), found.high, float("inf")
-    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof, is_bound))
+        low, high, dof = max(found[0], 0.0), found[1], float("inf")
+    return Pooled(len(scores), mean, low, high, judge(mean, low, high, dof))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,9 @@ import chainslam
 from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.verdicts import TOO_FEW
+from chainslam.experiments.scoring.without_truth.relation_noise import adjoint_of_inverse
+from chainslam.experiments.scoring.without_truth.relations import between
+from chainslam.slam.evaluation.consistency import nees
 
 from .drives import Drive, drives
 from .written import tum, written
@@ -118,6 +121,22 @@ def test_relations_tell_overconfidence_and_nothing_else_while_the_correlation_of
     assert [each.verdict.words for each in found.trajectories] == [TOO_FEW, OVERCONFIDENT]
     assert all(each.is_bound for each in found.trajectories)
     assert "at least" in repr(found)
+
+
+def test_relative_poses_have_twice_the_covariances_of_both(tmp_path):
+    drive = RUNS[0]
+    estimated, true = written(tmp_path, drive)
+    first, second, *_ = chainslam.audit(estimated, truth=true, error="body").trajectories[0].lags
+    assert (first.steps, second.steps) == (1, 10)
+    assert first.is_bound
+    for lag in (first, second):
+        k = lag.steps
+        motions = between(drive.estimated[:-k], drive.estimated[k:])
+        off = between(between(drive.true[:-k], drive.true[k:]), motions)
+        A = adjoint_of_inverse(motions)
+        bound = 2.0 * (A @ drive.covs[:-k] @ A.swapaxes(1, 2) + drive.covs[k:])
+        assert lag.score.anees == pytest.approx(np.mean(nees(off, bound)) / 3.0)
+        assert lag.error_m == pytest.approx(np.sqrt(np.mean(np.sum(off[:, :2] ** 2, axis=1))))
 
 
 def test_position_errors_are_those_of_evo(tmp_path):

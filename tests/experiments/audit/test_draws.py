@@ -13,8 +13,8 @@ from chainslam.experiments.library.audit.draws import (
     interval,
     pooled_dof,
     score,
-    whitened,
 )
+from chainslam.slam.evaluation.consistency import whitened
 
 
 def lasting(n, phi, d=3, seed=0):
@@ -68,3 +68,24 @@ def test_runs_together_have_the_degrees_of_freedom_of_all():
 def test_the_level_is_five_per_cent_however_long_errors_last(phi):
     found = [score(lasting(200, phi, seed=k)) for k in range(400)]
     assert 0.02 <= np.mean([each.low > 1.0 or each.high < 1.0 for each in found]) <= 0.09
+
+
+def test_the_degrees_of_freedom_are_the_sum_in_their_definition():
+    w = lasting(40, 0.9, d=1, seed=3)
+    rho, total = autocorrelation(w[:, 0]), 1.0
+    for k in range(1, 40):
+        if rho[k] <= 0.0:
+            break
+        total += 2.0 * (1.0 - k / 40) * rho[k] ** 2
+    found = score(w)
+    assert found.dof == found.draws == pytest.approx(40.0 / total)
+    assert score(lasting(40, 0.9)).draws == pytest.approx(effective_dof(lasting(40, 0.9)) / 3.0)
+
+
+def test_the_regions_are_those_of_50_90_95_and_99_per_cent():
+    nees = np.array([[chi2.ppf(p, 1)] for p in np.linspace(0.0025, 0.9975, 200)])
+    assert score(np.sqrt(nees)).covered == pytest.approx((0.5, 0.9, 0.95, 0.99))
+
+
+def test_less_than_a_degree_of_freedom_may_bound_nothing():
+    assert interval(1.0, 1e-3)[1] == np.inf

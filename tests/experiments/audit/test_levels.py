@@ -1,12 +1,16 @@
 """Verdicts on simulated drives of a true EKF, and of one that is told another noise of its scanner."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chainslam.experiments.campaign.comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT
-from chainslam.experiments.library.audit.draws import score, whitened
+from chainslam.experiments.library.audit.draws import interval, score
 from chainslam.experiments.library.audit.errors import errors
 from chainslam.experiments.library.audit.verdicts import TOO_FEW, compare, judge, pool
+from chainslam.experiments.scoring.statistics import mean_interval
+from chainslam.slam.evaluation.consistency import whitened
 
 from .drives import drives
 from .test_draws import lasting
@@ -93,3 +97,38 @@ def test_a_pair_of_too_few_independent_errors_is_not_told_apart():
     assert found.interval is None
     assert found.ratio == pytest.approx(4.0)
     assert "too few data" in found.told()
+
+
+@pytest.mark.parametrize(
+    ("interval_of", "dof", "words"),
+    [((1.05, 1.22), 99.0, OVERCONFIDENT), ((1.05, 1.20), 99.0, CONSISTENT), ((0.84, 0.95), 99.0, CONSISTENT),
+     ((0.81, 0.95), 99.0, CAUTIOUS), ((0.1, 0.9), 10.0, CAUTIOUS), ((0.1, 0.9), 9.9, TOO_FEW),
+     ((0.67, 1.49), 99.0, CONSISTENT), ((0.66, 1.49), 99.0, TOO_FEW), ((0.67, 1.51), 99.0, TOO_FEW)],
+)  # fmt: skip
+def test_a_verdict_changes_where_its_bounds_say(interval_of, dof, words):
+    assert judge(np.mean(interval_of), *interval_of, dof).words == words
+
+
+def test_the_factor_of_a_cautious_estimate_is_stated_sigma_over_error():
+    found = judge(0.25, 0.16, 0.64)
+    assert found.factor == pytest.approx(2.0)
+    assert found.factor_interval == pytest.approx((1.25, 2.5))
+
+
+def test_from_ten_runs_on_the_interval_is_that_over_runs_and_needs_no_degrees_of_freedom():
+    one = score(lasting(300, 0.0))
+    runs = [replace(one, anees=0.1 + 0.01 * k, dof=0.5) for k in range(10)]
+    found, fewer = pool(runs), pool(runs[:9])
+    assert (found.low, found.high) == mean_interval(np.array([each.anees for each in runs]))
+    assert found.verdict.words == CAUTIOUS
+    assert (fewer.low, fewer.high) == interval(fewer.anees, 4.5)
+    assert fewer.verdict.words == TOO_FEW
+
+
+def test_a_pair_is_cut_into_stretches_of_four_lasting_errors_and_either_may_be_the_better():
+    series = np.sum(lasting(400, 0.0) ** 2, axis=1)
+    assert compare(("a", "b"), series, series, draws=120.0).blocks == 30
+    assert compare(("a", "b"), series, series, draws=1e6).blocks == 100
+    assert "no clear difference" in compare(("a", "b"), series, series, draws=120.0).told()
+    for factor in (0.5, 2.0):
+        assert "no clear difference" not in compare(("a", "b"), factor * series, series, draws=120.0).told()

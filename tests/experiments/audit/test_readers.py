@@ -119,3 +119,33 @@ def test_the_truth_is_interpolated_or_the_nearest_and_says_so(tmp_path):
     gaps = tum(tmp_path / "g.tum", DRIVE.time_s[::20] + 0.03, DRIVE.true[::20])
     with pytest.raises(UsageError, match="--nearest SECONDS"):
         audit(estimated, truth=gaps)
+
+
+LONG = drives(1, 400, seed=3)[0]
+T = LONG.time_s
+
+
+@pytest.mark.parametrize(
+    ("known_s", "note"),
+    [
+        (T + 5e-4, ""),
+        (T + 5e-3, "interpolated; 1 of 400 poses have no time in it"),
+        (np.sort(np.r_[T, T[:300] + 0.03]), ""),
+        (np.sort(np.r_[T[::4], T + 0.03]), "interpolated"),
+        (T[::8] + 0.03, "interpolated; 8 of 400 poses have no time in it"),
+        (T[::20] + 5e-3, "nearest within 0.01 s; 380 of 400 poses have no time in it"),
+    ],
+    ids=["within 1 ms", "within 5 ms", "most at the same", "few at the same", "gaps of 0.8 s", "gaps of 2 s"],
+)
+def test_the_truth_is_taken_at_the_same_times_or_between_or_near(known_s, note, tmp_path):
+    estimated, _ = written(tmp_path, LONG)
+    rows = np.clip(np.searchsorted(T, known_s - 0.04), 0, len(T) - 1)
+    true = tum(tmp_path / "t.tum", known_s, LONG.true[rows])
+    found = audit(estimated, truth=true).trajectories[0]
+    assert found.notes == ((f"t.tum is {note}",) if note else ())
+
+
+def test_times_of_the_trajectory_in_another_unit_are_told(tmp_path):
+    path = tum(tmp_path / "ns.tum", 1e9 * (DRIVE.time_s + 1e-3), DRIVE.estimated, DRIVE.covs)
+    with pytest.raises(UsageError, match=r"the times of ns\.tum are in nanoseconds"):
+        audit(path, truth=tum(tmp_path / "true.tum", DRIVE.time_s, DRIVE.true))

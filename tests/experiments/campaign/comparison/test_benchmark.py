@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chainslam import BACKENDS, BackendEntry
-from chainslam.experiments.campaign.comparison.benchmark import CURRENT, QUICK, ranked
+from chainslam.experiments.campaign.comparison.benchmark import CURRENT, QUICK, _fault, ranked
 from chainslam.experiments.commands.campaigns import benchmark
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.views.numbers import markdown
@@ -143,6 +143,21 @@ def test_the_most_consistent_stand_first_then_the_more_precise_and_last_what_los
     ]
     names = [each["estimator"] for each in ranked(rows)]
     assert names == ["better", "good", "cautious", "over", "bad map", "none", "lost"]
+
+
+def test_estimators_within_ten_per_cent_are_ordered_by_their_errors():
+    rows = [row("near", 1.04, 0.03), row("far", 1.06, 0.01), row("same", 0.97, 0.02), row("under", 0.94, 0.005)]
+    assert [each["estimator"] for each in ranked(rows)] == ["same", "near", "under", "far"]
+
+
+@pytest.mark.parametrize(
+    ("fixed", "said", "commit", "words"),
+    [(CURRENT, {}, "abc", None), (CURRENT, {}, None, None), (QUICK, {}, "abc", "--quick"),
+     (CURRENT, {"resumed_with": {}}, "abc", "different versions"), (CURRENT, {}, "abc+", "changed sources")],
+)  # fmt: skip
+def test_a_row_can_be_cited_unless_something_is_against_it(fixed, said, commit, words):
+    found = _fault(fixed, said, commit)
+    assert found is None if words is None else words in str(found)
 
 
 def test_a_table_is_markdown():
