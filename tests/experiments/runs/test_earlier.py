@@ -1,7 +1,4 @@
-"""A saved map is used again: where a robot believes itself to be in it, and how two sessions are joined.
-
-Maps, searches and robots are stood in for.
-"""
+"""A saved map is used again: where a robot believes itself to be in it, and how two sessions are joined."""
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
