@@ -288,7 +288,8 @@ def test_a_saved_map_is_that_of_the_same_scanner_and_has_firm_walls(monkeypatch,
     found = earlier.read_earlier(tmp_path, config)
     np.testing.assert_array_equal(found.last_world, HERE)
     assert np.abs(found.surface_world[:, 1]).max() < 1e-9, "the first wall alone, on the x axis"
-    assert found.surface_world[:, 0].min() < 0.06 < 5.94 < found.surface_world[:, 0].max()
+    xs = np.sort([0.0, *found.surface_world[:, 0], 6.0])
+    assert np.diff(xs).max() <= 0.5 * SEARCH.cell_m + 1e-9
     for name, value in (("beams", 90), ("fov_rad", 3.0), ("range_max_m", 3.5)):
         lidar = replace(config.robot.lidar, **{name: value})
         with pytest.raises(UsageError, match="the same scanner"):
