@@ -161,5 +161,5 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
         lost.move(odometry)
         recent.see(scan)
         recent.move(odometry)
-        path_length += 0.0 if odometry.carried else float(np.hypot(odometry.motion[0], odometry.motion[1]))
+        path_length += odometry.path_m
         index += 1

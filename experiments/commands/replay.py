@@ -176,10 +176,10 @@ class Replay:
             if isinstance(source, OwnLog):
                 return source.go(name, recording.watch(name, source.true_pose, watch))
             mapped = source.mapped(name, recording.watch(name, None, watch, source.wheels_pose))
-        with share_of("refining offline") as told, first_interrupt_waits() as stop_if_asked:
+        with share_of("refining offline") as show_share, first_interrupt_waits() as stop_if_asked:
 
             def refining(share: float) -> None:
-                told(share)
+                show_share(share)
                 stop_if_asked()
 
             return source.looked_over(mapped, refining)

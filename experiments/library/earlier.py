@@ -85,8 +85,7 @@ class PlaceSought:
     def see(self, step: Step) -> bool:
         """Take in one step; return whether the place is found."""
         self.scans += 1
-        if step.index:
-            self._leap.move(step.odometry)
+        self._leap.move(step.odometry)
         if step.localisation.is_lost or step.path_length_m < self._sought_m + EVERY_M:
             return False
         self._sought_m, walls = step.path_length_m, step.map
@@ -130,12 +129,8 @@ def joined(first: Recording, then: Recording, carried: Odometry) -> Recording:
     begin = len(first)
     odometry, covs = np.vstack([first.odometry, then.odometry]), np.concatenate([first.odometry_cov, then.odometry_cov])
     odometry[begin], covs[begin] = carried.motion, carried.cov
-    flags = np.zeros(len(odometry), dtype=bool)
+    flags = np.concatenate([np.zeros(len(r), dtype=bool) if r.carried is None else r.carried for r in (first, then)])
     flags[begin] = True
-    if first.carried is not None:
-        flags[:begin] = first.carried
-    if then.carried is not None:
-        flags[begin:] |= then.carried
     shift_s = first.time_s[-1] - min(0.0, then.time_s[0])
     return replace(
         first,

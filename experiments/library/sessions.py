@@ -16,12 +16,12 @@ from jaxtyping import Float, Int
 from chainslam.explore.mission import explore_mission
 from chainslam.explore.outcome import Outcome
 from chainslam.explore.step import Step
-from chainslam.sim.logs.recorded_robot import RecordedRobot, Recording, recording_of
+from chainslam.sim.logs.recorded_robot import RecordedRobot, Recording
 from chainslam.sim.robot import TrueRecord
 from chainslam.slam.mapper import Mapper
 from chainslam.slam.robot import MotionCommand, Odometry, Scan
 
-from ..artifacts.results import log_arrays
+from ..replays.recordings import recorded
 from ..replays.replay import RecordedRun, replay
 from ..replays.sources import OwnLog
 from ..scenario import Scenario, TrialConfig, heard_by, make_backend
@@ -163,14 +163,10 @@ def begin_later(folder: Path, scenario: Scenario, watch: Watch) -> Begun:
 def later_session(earlier: Earlier, begun: TrialResult, place_world: Float[np.ndarray, "3"]) -> Scenario:
     """Return the scenario of both sessions as one, once the later one's robot is known to be at a place."""
     assert begun.log is not None
-    scenario, log = begun.scenario, begun.log
-    carried = earlier.carried_to(place_world, log.estimated_world)
-    played = joined(
-        earlier.run.recording,
-        recording_of({key: np.asarray(value) for key, value in log_arrays(begun, log).items()}),
-        carried,
-    )
+    scenario = begun.scenario
+    carried = earlier.carried_to(place_world, begun.log.estimated_world)
     run, config = earlier.run, scenario.config
+    played = joined(run.recording, recorded(begun).recording, carried)
     start, cov = run.start_pose, run.start_cov
     return replace(
         scenario,

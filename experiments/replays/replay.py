@@ -148,7 +148,7 @@ class ReplayedRobot(RecordedRobot):
     def drive(self, command: MotionCommand) -> Odometry:
         """Go to the next scan."""
         odometry = super().drive(command)
-        self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
+        self._record.path_length_m += odometry.path_m
         self._record.collisions += odometry.touched
         return odometry
 

@@ -67,15 +67,15 @@ def share_of(title: str) -> Iterator[Callable[[float], None]]:
 
 def in_lines(title: str) -> Callable[[float], None]:
     """Return what tells in lines on standard error which share is done, unless that is a terminal."""
-    began = told = time.monotonic()
+    began = last = time.monotonic()
     silent = is_quiet() or plain_console(stderr=True).is_terminal
 
     def tell(share: float) -> None:
-        nonlocal told
+        nonlocal last
         now = time.monotonic()
-        if silent or now - told < EVERY_S or not 0.0 < share <= 1.0:
+        if silent or now - last < EVERY_S or not 0.0 < share <= 1.0:
             return
-        told = now
+        last = now
         left = duration((now - began) * (1.0 - share) / share)
         say(f"chainslam: {title}: {100.0 * share:.0f} % after {duration(now - began)}, {left} left", stderr=True)
 

@@ -123,8 +123,7 @@ class RecordedRobot:
 
     def sense(self) -> Scan:
         """Return the scan at the present position of the recording."""
-        r = self._recording
-        return r.scan(self._at)
+        return self._recording.scan(self._at)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Go to the next scan, whatever the command; raises EOFError at the end of the recording."""

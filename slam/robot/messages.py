@@ -217,6 +217,11 @@ class Odometry:
         return self if self.wheels is None else self.wheels
 
     @property
+    def path_m(self) -> float:
+        """Length of the path, m; none where the robot was carried."""
+        return 0.0 if self.carried else float(np.hypot(self.motion[0], self.motion[1]))
+
+    @property
     def states_its_error(self) -> bool:
         """Whether a motion has any uncertainty; a rest may have none."""
         return bool(np.any(self.cov.diagonal() > 0.0)) or not np.any(self.motion)
