@@ -6,6 +6,7 @@ A dimension says between which walls and corners it is taken, and no more: of th
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import count
 
 import numpy as np
 from jaxtyping import Float
@@ -106,23 +107,8 @@ def across(faces: Faces, kind: Kind, first: int, second: int, at_world: Float[np
 
 def area_of(faces: Faces, rings: Sequence[Sequence[Node]]) -> Measured:
     """Return the area inside the first ring less those of the others, which lie in it."""
-    nodes = [node for ring in rings for node in ring]
-    points = faces.points(nodes)
-    if len(rings) == 1:
-        return area(points, range(len(nodes)))
-    total, gradients, begin = 0.0, [], 0
-    for k, ring in enumerate(rings):
-        at = points.positions_world[begin : begin + len(ring)]
-        before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
-        signed = 0.5 * float(np.sum(at[:, 0] * after[:, 1] - at[:, 1] * after[:, 0]))
-        sign = np.sign(signed) * (1.0 if k == 0 else -1.0)
-        total += sign * signed
-        gradients.append(sign * 0.5 * np.stack([after[:, 1] - before[:, 1], before[:, 0] - after[:, 0]], axis=-1))
-        begin += len(ring)
-    gradient = np.concatenate(gradients)
-    return Measured(
-        total, float(np.sqrt(max(np.einsum("ri,rsij,sj->", gradient, points.cov.swapaxes(1, 2), gradient), 0.0)))
-    )
+    points, numbers = faces.points([node for ring in rings for node in ring]), count()
+    return area(points, *([next(numbers) for _ in ring] for ring in rings))
 
 
 def main_direction(faces: Faces) -> Measured:
