@@ -13,7 +13,7 @@ from rich.table import Table
 from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.views.plans.faces import read_faces, read_solid
-from chainslam.experiments.views.plans.measuring import Kind
+from chainslam.experiments.views.plans.measuring import Kind, direction_of
 from chainslam.experiments.views.plans.survey import survey
 
 from ..runner.command import run_study
@@ -65,8 +65,7 @@ def scores(folder: Path) -> list[Row]:
          "sigma": each.measured.sigma, "true": true, "exists": exists}
         for each in found.dimensions for true, exists in (true_value(each, truth, faces, face_of, true_faces),)
     ]  # fmt: skip
-    turned = np.exp(4j * truth.means[known, 0])
-    phi = float(np.angle(np.sum(faces.lengths_m[known] * turned))) / 4.0
+    phi = direction_of(truth.means[known, 0], faces.lengths_m[known])
     direction = {"value": found.direction.value, "sigma": found.direction.sigma, "true": phi, "exists": True}
     return [*rows, {"run": folder.name, "kind": DIRECTION, "firm": True, **direction}]
 

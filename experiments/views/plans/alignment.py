@@ -13,7 +13,7 @@ from chainslam.slam.geometry.poses import to_robot, to_world, wrap
 
 from ...usage import UsageError
 from .faces import Faces
-from .measuring import main_direction
+from .measuring import direction_of, main_direction
 
 SHORT_M = 0.3
 """Shorter walls and faces are not compared: their direction is not known well enough to tell which is which."""
@@ -184,7 +184,7 @@ def _on(
 def _candidates(faces: Faces, design: Float[np.ndarray, "f 2 2"]) -> list[Float[np.ndarray, "3"]]:
     """Return poses at which many walls lie on faces: four turns, and shifts by vote along both main directions."""
     lines, lengths = through(design), np.hypot(*(design[:, 1] - design[:, 0]).T)
-    phi = float(np.angle(np.sum(lengths * np.exp(4j * lines[:, 0]))) / 4.0)
+    phi = direction_of(lines[:, 0], lengths)
     found = []
     for quarter in range(4):
         turn = phi - main_direction(faces).value + 0.5 * np.pi * quarter

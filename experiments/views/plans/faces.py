@@ -6,6 +6,7 @@ Everything that a plan measures is a function of these lines. The same function 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -78,14 +79,21 @@ class Faces:
         feet = self.anchors + self.means[:, 1:] * normals(self.means[:, 0])
         return feet[:, None] + self.extents[..., None] * directions(self.means[:, 0])[:, None]
 
+    @property
+    def neighbours(self) -> list[tuple[int, int]]:
+        """Each wall of a chain and the next, around a closed one."""
+        return [
+            pair for chain, closed in zip(self.chains, self.closed, strict=True)
+            for pair in pairwise((*chain, *chain[:1]) if closed else chain)
+        ]  # fmt: skip
+
     @cached_property
     def corners(self) -> dict[tuple[int, int], Node]:
         """The corner at each end (wall, side) that has one."""
         found = {}
-        for chain, closed in zip(self.chains, self.closed, strict=True):
-            for before, after in zip(chain, (*chain[1:], chain[0]) if closed else chain[1:], strict=False):
-                if before != after and self._meet(before, after):
-                    found[before, HEAD] = found[after, TAIL] = Node(before, after)
+        for before, after in self.neighbours:
+            if before != after and self._meet(before, after):
+                found[before, HEAD] = found[after, TAIL] = Node(before, after)
         return found
 
     def _meet(self, before: int, after: int) -> bool:

@@ -66,8 +66,9 @@ class Dimension:
 def between_walls(faces: Faces, kind: Kind, pair: Pair) -> Dimension:
     """Return the distance between two parallel walls, or the thickness of the wall whose two faces they are."""
     measured = across(faces, kind, pair.first, pair.second, pair.at_world)
-    feet = [pair.at_world + _off(faces, row, pair.at_world) * normals(faces.means[row, 0]) for row in _rows(pair)]
-    return Dimension(kind, pair.at_world, np.array(feet), measured, _rows(pair), overlap_m=pair.overlap_m)
+    rows = pair.first, pair.second
+    feet = [pair.at_world + _off(faces, row, pair.at_world) * normals(faces.means[row, 0]) for row in rows]
+    return Dimension(kind, pair.at_world, np.array(feet), measured, rows, overlap_m=pair.overlap_m)
 
 
 def between_nodes(faces: Faces, kind: Kind, first: Node, second: Node) -> Dimension:
@@ -113,12 +114,16 @@ def area_of(faces: Faces, rings: Sequence[Sequence[Node]]) -> Measured:
 
 def main_direction(faces: Faces) -> Measured:
     """Return the direction (rad, from -45 to 45 degrees) of most of the walls modulo 90 degrees, by their lengths."""
-    turned = np.exp(4j * faces.means[:, 0])
-    phi = float(np.angle(np.sum(faces.lengths_m * turned))) / 4.0 if len(faces) else 0.0
+    phi = direction_of(faces.means[:, 0], faces.lengths_m)
     share = faces.lengths_m * np.cos(4.0 * (faces.means[:, 0] - phi))
     gradient = np.zeros(POSE + 2 * len(faces))
     gradient[POSE::2] = share / max(float(share.sum()), 1e-12)
     return Measured(phi, float(np.sqrt(max(gradient @ faces.cov @ gradient, 0.0))))
+
+
+def direction_of(alpha: Float[np.ndarray, " n"], lengths_m: Float[np.ndarray, " n"]) -> float:
+    """Return the direction (rad, from -45 to 45 degrees) of most of some lines modulo 90 degrees, by their lengths."""
+    return float(np.angle(np.sum(lengths_m * np.exp(4j * alpha)))) / 4.0
 
 
 def walls_of(nodes: Sequence[Node]) -> tuple[int, ...]:
@@ -135,7 +140,3 @@ def _off(faces: Faces, row: int, at_world: Float[np.ndarray, "2"]) -> float:
     """Return how far in front of a wall a point is, m."""
     alpha, r = faces.lines_world[row]
     return float(r - normals(alpha) @ at_world)
-
-
-def _rows(pair: Pair) -> tuple[int, int]:
-    return pair.first, pair.second
