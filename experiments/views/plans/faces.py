@@ -21,7 +21,7 @@ from chainslam.slam.estimation.backend import POSE, columns_of
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from ...artifacts.maps.map_files import read_features, read_map
+from ...artifacts.maps.map_files import read_joint
 from ...scoring.maps.measurements import PARALLEL, CornerPoints, corner_jacobian, corner_points
 from ...usage import UsageError
 
@@ -162,12 +162,7 @@ def crossing(lines: Float[np.ndarray, "2 2"]) -> Float[np.ndarray, "2"]:
 
 def read_faces(folder: Path) -> Faces:
     """Read the map of a run or of a replayed log; raises UsageError for anything else, and for a lost covariance."""
-    arrays = read_map(folder)
-    features = read_features(folder, arrays["ids"])
-    if not np.all(np.isfinite(arrays["cov"])):
-        raise UsageError(
-            "expected a map with its joint covariance, found one whose estimate was lost: take another run"
-        )
+    arrays, features = read_joint(folder)
     return faces_of(arrays, features["chain"])
 
 
