@@ -129,9 +129,9 @@ def table(rows: Sequence[Checked], tolerance: float) -> Table:
 
 
 def _add(shown: Table, name: str, group: Sequence[Checked]) -> None:
-    known = [(row.finding.shift_m, row.finding.sigma_m, row.true_m) for row in group if row.finding.shift_m is not None]
-    off = np.array([abs(shift - true) for shift, _, true in known if shift is not None])
-    sigmas = np.array([sigma for _, sigma, _ in known if sigma is not None])
+    known = [(row.finding.shift, row.true_m) for row in group]
+    off = np.array([abs(shift.value - true) for shift, true in known if shift is not None])
+    sigmas = np.array([shift.sigma for shift, _ in known if shift is not None])
     holds = f"{np.mean(off <= Z_95 * sigmas):.3f}" if len(off) else "-"
     called = sum(row.finding.verdict is Verdict.MOVED for row in group)
     shown.add_row(name, str(len(group)), str(called), holds, f"{1e3 * np.median(off):.2f}" if len(off) else "-")

@@ -65,7 +65,8 @@ def scores(folder: Path) -> list[Row]:
          "sigma": each.measured.sigma, "true": true, "exists": exists}
         for each in found.dimensions for true, exists in (true_value(each, truth, faces, face_of, true_faces),)
     ]  # fmt: skip
-    phi, _ = commonest(truth.means[known, 0], faces.lengths_m[known])
+    same = known & (commonest(faces.means[:, 0], faces.lengths_m)[1] > 0.0)  # the truth of the walls that were meant
+    phi, _ = commonest(truth.means[same, 0], faces.lengths_m[same])
     direction = {"value": found.direction.value, "sigma": found.direction.sigma, "true": phi, "exists": True}
     return [*rows, {"run": folder.name, "kind": DIRECTION, "firm": True, **direction}]
 

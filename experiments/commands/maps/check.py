@@ -123,9 +123,7 @@ def _order(each: Finding) -> int:
 
 def _shift(each: Finding) -> str:
     """Return a shift with half its 95 % interval, mm; nothing where it is unknown."""
-    if each.shift_m is None or each.sigma_m is None:
-        return ""
-    return f"{1e3 * each.shift_m:.1f} ± {1e3 * Z_95 * each.sigma_m:.1f}"
+    return "" if each.shift is None else f"{1e3 * each.shift.value:.1f} ± {1e3 * Z_95 * each.shift.sigma:.1f}"
 
 
 def _line(each: Finding, compared: Comparison, faces: Faces, design: np.ndarray) -> np.ndarray:
@@ -144,10 +142,9 @@ def _record(compared: Comparison, faces: Faces, design: np.ndarray) -> dict[str,
                 "wall": None if each.verdict is Verdict.EXTRA else each.face,
                 "ends_m": _line(each, compared, faces, design),
                 "verdict": str(each.verdict),
-                "shift_m": each.shift_m,
-                "sigma_m": each.sigma_m,
-                "interval_m": None if each.shift_m is None or each.sigma_m is None
-                else [each.shift_m - Z_95 * each.sigma_m, each.shift_m + Z_95 * each.sigma_m],
+                "shift_m": None if each.shift is None else each.shift.value,
+                "sigma_m": None if each.shift is None else each.shift.sigma,
+                "interval_m": None if each.shift is None else list(each.shift.interval),
                 "mapped_share": each.seen,
                 "map_walls": faces.ids[list(each.walls)],
             }
@@ -165,7 +162,7 @@ def _picture(compared: Comparison, faces: Faces, design: np.ndarray, title: str,
     for each in compared.findings:
         line = _line(each, compared, faces, design)
         by.setdefault(str(each.verdict), []).append(line)
-        if each.verdict is Verdict.MOVED and each.shift_m is not None and each.sigma_m is not None:
-            notes.append((line.mean(axis=0), f"{1e3 * each.shift_m:.0f} ± {1e3 * Z_95 * each.sigma_m:.0f} mm"))
+        if each.verdict is Verdict.MOVED and each.shift is not None:
+            notes.append((line.mean(axis=0), f"{1e3 * each.shift.value:.0f} ± {1e3 * Z_95 * each.shift.sigma:.0f} mm"))
     walls = to_world(faces.ends_world.reshape(-1, 2), compared.pose).reshape(-1, 2, 2)
     return saved(draw_check(by, notes, list(walls), title), kind)

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import directions, normals, through
-from chainslam.slam.geometry.poses import to_world, wrap
+from chainslam.slam.geometry.poses import to_robot, to_world, wrap
 
 from ...usage import UsageError
 from .faces import Faces
@@ -70,14 +70,8 @@ def look(faces: Faces, design: Float[np.ndarray, "f 2 2"], pose: Float[np.ndarra
             ends_of = design[face, 0] + np.array([[low[face]], [high[face]]]) * t[face]
             n, own = normals(lines[face, 0]), normals(alpha[wall])
             points = ends_of + (((ends[wall, 0] - ends_of) @ own) / (n @ own))[:, None] * n
-            found.append(Sighting(wall, face, _back(points, pose), (float(low[face]), float(high[face]))))
+            found.append(Sighting(wall, face, to_robot(points, pose), (float(low[face]), float(high[face]))))
     return found
-
-
-def _back(points: Float[np.ndarray, "*n 2"], pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 2"]:
-    """Return points of the drawing in the frame of the map."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.asarray((points - pose[:2]) @ np.array([[c, -s], [s, c]]))
 
 
 def offsets(
@@ -163,7 +157,7 @@ def saw_through(
     """Return behind which faces most is floor that the robot saw; `solid` is all else, in the frame of the map."""
     share = np.linspace(0.1, 0.9, 9)[:, None, None]
     behind = design[:, 0] + share * (design[:, 1] - design[:, 0]) + BEHIND_M * normals(through(design)[:, 0])
-    points = _back(behind.reshape(-1, 2), pose)
+    points = to_robot(behind.reshape(-1, 2), pose)
     shapely.prepare(solid)
     return np.asarray(~shapely.contains_xy(solid, *points.T).reshape(9, -1)).mean(axis=0) > 0.5
 

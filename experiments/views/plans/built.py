@@ -16,6 +16,7 @@ from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions
 from chainslam.slam.geometry.numerics import TINY
 
+from ...scoring.maps.measurements import Measured
 from ...usage import UsageError
 from .alignment import SHORT_M, Sighting, look, off_design, offsets
 from .faces import Faces
@@ -58,9 +59,8 @@ class Finding:
     """Row among the faces of the drawing; of an extra wall its row in the map."""
     walls: tuple[int, ...]
     """Rows of the walls that lie on it."""
-    shift_m: float | None = None
+    shift: Measured | None = None
     """How far it stands from where it is drawn, m, away from the floor that it bounds."""
-    sigma_m: float | None = None
     seen: float = 0.0
     """Share of its length that was mapped."""
 
@@ -143,9 +143,10 @@ def compare(
         if not known or (share < COVERED and is_free[face]):
             findings.append(Finding(Verdict.MISSING if is_free[face] else Verdict.UNSEEN, face, walls, seen=share))
             continue
-        within = abs(values[at]) + NORMAL.inv_cdf(0.975) * sigmas[at] <= tolerance_m
+        shift = Measured(float(values[at]), float(sigmas[at]))
+        within = max(map(abs, shift.interval)) <= tolerance_m
         verdict = Verdict.MOVED if at in moved else Verdict.WITHIN if within else Verdict.UNCLEAR
-        findings.append(Finding(verdict, face, walls, float(values[at]), float(sigmas[at]), share))
+        findings.append(Finding(verdict, face, walls, shift, share))
     on = {each.wall for each in sightings}
     extra = [row for row in off_design(faces, design, pose + theta) if row not in on]
     findings += [Finding(Verdict.EXTRA, row, (row,)) for row in extra]

@@ -6,6 +6,7 @@ Everything that a plan measures is a function of these lines. The same function 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from chainslam.slam.estimation.backend import POSE, columns_of
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.chains import HEAD, TAIL
 
-from ...artifacts.maps.map_files import read_features, read_map
+from ...artifacts.maps.map_files import read_joint
 from ...scoring.maps.measurements import PARALLEL, CornerPoints, corner_jacobian, corner_points
 from ...usage import UsageError
 
@@ -78,14 +79,21 @@ class Faces:
         feet = self.anchors + self.means[:, 1:] * normals(self.means[:, 0])
         return feet[:, None] + self.extents[..., None] * directions(self.means[:, 0])[:, None]
 
+    @property
+    def neighbours(self) -> list[tuple[int, int]]:
+        """Each wall of a chain and the next, around a closed one."""
+        return [
+            pair for chain, closed in zip(self.chains, self.closed, strict=True)
+            for pair in pairwise((*chain, *chain[:1]) if closed else chain)
+        ]  # fmt: skip
+
     @cached_property
     def corners(self) -> dict[tuple[int, int], Node]:
         """The corner at each end (wall, side) that has one."""
         found = {}
-        for chain, closed in zip(self.chains, self.closed, strict=True):
-            for before, after in zip(chain, (*chain[1:], chain[0]) if closed else chain[1:], strict=False):
-                if before != after and self._meet(before, after):
-                    found[before, HEAD] = found[after, TAIL] = Node(before, after)
+        for before, after in self.neighbours:
+            if before != after and self._meet(before, after):
+                found[before, HEAD] = found[after, TAIL] = Node(before, after)
         return found
 
     def _meet(self, before: int, after: int) -> bool:
@@ -154,12 +162,7 @@ def crossing(lines: Float[np.ndarray, "2 2"]) -> Float[np.ndarray, "2"]:
 
 def read_faces(folder: Path) -> Faces:
     """Read the map of a run or of a replayed log; raises UsageError for anything else, and for a lost covariance."""
-    arrays = read_map(folder)
-    features = read_features(folder, arrays["ids"])
-    if not np.all(np.isfinite(arrays["cov"])):
-        raise UsageError(
-            "expected a map with its joint covariance, found one whose estimate was lost: take another run"
-        )
+    arrays, features = read_joint(folder)
     return faces_of(arrays, features["chain"])
 
 

@@ -9,6 +9,7 @@ from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import directions, normals
+from chainslam.slam.geometry.poses import rotation
 from chainslam.slam.map.chains import HEAD, TAIL
 from chainslam.viz.figures.plan_sheet import ROOM_LETTER_MM, DimensionLine, Sheet, letters_m, scale_of
 
@@ -201,8 +202,7 @@ def _box(at: Float[np.ndarray, "2"], size: Float[np.ndarray, "2"], turn_rad: flo
 
 
 def _turned(points_world: Float[np.ndarray, "*n 2"], turn: float) -> Float[np.ndarray, "*n 2"]:
-    c, s = np.cos(turn), np.sin(turn)
-    return points_world @ np.array([[c, s], [-s, c]])
+    return points_world @ rotation(turn).T
 
 
 def _on_page(shape: BaseGeometry, turn: float) -> BaseGeometry:

@@ -6,6 +6,7 @@ A dimension says between which walls and corners it is taken, and no more: of th
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -67,8 +68,9 @@ class Dimension:
 def between_walls(faces: Faces, kind: Kind, pair: Pair) -> Dimension:
     """Return the distance between two parallel walls, or the thickness of the wall whose two faces they are."""
     measured = across(faces, kind, pair.first, pair.second, pair.at_world)
-    feet = [pair.at_world + _off(faces, row, pair.at_world) * normals(faces.means[row, 0]) for row in _rows(pair)]
-    return Dimension(kind, pair.at_world, np.array(feet), measured, _rows(pair), overlap_m=pair.overlap_m)
+    rows = pair.first, pair.second
+    feet = [pair.at_world + _off(faces, row, pair.at_world) * normals(faces.means[row, 0]) for row in rows]
+    return Dimension(kind, pair.at_world, np.array(feet), measured, rows, overlap_m=pair.overlap_m)
 
 
 def between_nodes(faces: Faces, kind: Kind, first: Node, second: Node) -> Dimension:
@@ -108,23 +110,8 @@ def across(faces: Faces, kind: Kind, first: int, second: int, at_world: Float[np
 
 def area_of(faces: Faces, rings: Sequence[Sequence[Node]]) -> Measured:
     """Return the area inside the first ring less those of the others, which lie in it."""
-    nodes = [node for ring in rings for node in ring]
-    points = faces.points(nodes)
-    if len(rings) == 1:
-        return area(points, range(len(nodes)))
-    total, gradients, begin = 0.0, [], 0
-    for k, ring in enumerate(rings):
-        at = points.positions_world[begin : begin + len(ring)]
-        before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
-        signed = 0.5 * float(np.sum(at[:, 0] * after[:, 1] - at[:, 1] * after[:, 0]))
-        sign = np.sign(signed) * (1.0 if k == 0 else -1.0)
-        total += sign * signed
-        gradients.append(sign * 0.5 * np.stack([after[:, 1] - before[:, 1], before[:, 0] - after[:, 0]], axis=-1))
-        begin += len(ring)
-    gradient = np.concatenate(gradients)
-    return Measured(
-        total, float(np.sqrt(max(np.einsum("ri,rsij,sj->", gradient, points.cov.swapaxes(1, 2), gradient), 0.0)))
-    )
+    points, numbers = faces.points([node for ring in rings for node in ring]), count()
+    return area(points, *([next(numbers) for _ in ring] for ring in rings))
 
 
 def commonest(
@@ -169,7 +156,3 @@ def _off(faces: Faces, row: int, at_world: Float[np.ndarray, "2"]) -> float:
     """Return how far in front of a wall a point is, m."""
     alpha, r = faces.lines_world[row]
     return float(r - normals(alpha) @ at_world)
-
-
-def _rows(pair: Pair) -> tuple[int, int]:
-    return pair.first, pair.second

@@ -61,16 +61,13 @@ def rooms(faces: Faces, gaps: Sequence[Gap], without: set[int]) -> list[Room]:
 
 def _edges(faces: Faces, without: set[int]) -> tuple[list[tuple[Node, Node]], list[int]]:
     """Return the walls between their nodes, and what joins neighbours without a corner; and the rows of the walls."""
-    edges, rows = [], []
-    for chain, closed in zip(faces.chains, faces.closed, strict=True):
-        for wall in chain:
-            if wall not in without:
-                edges.append((faces.node(wall, TAIL), faces.node(wall, HEAD)))
-                rows.append(wall)
-        for before, after in zip(chain, (*chain[1:], chain[0]) if closed else chain[1:], strict=False):
-            if not {before, after} & without and (before, HEAD) not in faces.corners:
-                edges.append((faces.node(before, HEAD), faces.node(after, TAIL)))
-    return edges, rows
+    rows = [wall for chain in faces.chains for wall in chain if wall not in without]
+    walls = [(faces.node(wall, TAIL), faces.node(wall, HEAD)) for wall in rows]
+    joints = [
+        (faces.node(before, HEAD), faces.node(after, TAIL)) for before, after in faces.neighbours
+        if not {before, after} & without and (before, HEAD) not in faces.corners
+    ]  # fmt: skip
+    return [*walls, *joints], rows
 
 
 def _clear(faces: Faces, gaps: Sequence[Gap], walls: BaseGeometry) -> list[tuple[Node, Node]]:
@@ -102,16 +99,12 @@ def _key(at: Float[np.ndarray, "2"]) -> tuple[int, int]:
 def _nodes(ring: shapely.LinearRing, named: dict[tuple[int, int], Node]) -> tuple[Node, ...] | None:
     """Return the nodes of a ring; None if lines cross where no corner is known."""
     found = []
-    for x, y in _key_all(ring):
+    for x, y in map(_key, shapely.get_coordinates(ring)[:-1]):
         node = next((named[near] for near in _around(x, y) if near in named), None)
         if node is None:
             return None
         found.append(node)
     return tuple(found)
-
-
-def _key_all(ring: shapely.LinearRing) -> list[tuple[int, int]]:
-    return [_key(at) for at in shapely.get_coordinates(ring)[:-1]]
 
 
 def _around(x: int, y: int) -> list[tuple[int, int]]:

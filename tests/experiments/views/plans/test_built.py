@@ -41,7 +41,7 @@ def test_walls_that_stand_elsewhere_are_found_with_an_interval(by_m):
         means = faces.means.copy()
         means[face, 1] += by_m
         found = moved(verdicts(replace(faces, means=means)))
-        hits += face in found and abs(found[face].shift_m - by_m) <= 2.6 * found[face].sigma_m
+        hits += face in found and abs(found[face].shift.value - by_m) <= 2.6 * found[face].shift.sigma
     assert hits >= len(long) - 1
 
 
