@@ -6,7 +6,7 @@ ROWS := studies/results/rows
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup fuzz demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
+.PHONY: setup fuzz leaderboard demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
 
 # What tests, checks and pages need, too; users of the program need .venv/made only.
 setup: .venv/tools
@@ -46,6 +46,37 @@ plans: setup
 kills: setup
 	$(BIN)/python -m studies.kills
 
+.PHONY: lowest pythons sizes
+
+INSTALLED := results/installed
+UV := $(INSTALLED)/uv/bin/uv
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
+FOR_TESTS := 'pytest>=8' 'hypothesis>=6.100' 'pandas>=2.2' beartype==0.20 'resvg-py>=0.5'
+SMOKE := -o addopts='--import-mode=importlib -p no:cacheprovider' -o filterwarnings=ignore --quiet tests/library/test_interface.py \
+    tests/sim/logs tests/sim/worlds tests/slam/backends tests/experiments/commands/test_parsing.py
+
+$(UV):
+	$(PYTHON) -m venv $(INSTALLED)/uv && $(INSTALLED)/uv/bin/pip install --quiet --disable-pip-version-check uv
+
+# Does it run with the lowest versions that pyproject.toml allows?
+lowest: $(UV)
+	$(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/lowest
+	$(UV) pip install --quiet --python $(INSTALLED)/lowest --resolution lowest-direct --only-binary :all: -e '.[all]' $(FOR_TESTS)
+	$(INSTALLED)/lowest/bin/python -m pytest $(SMOKE)
+
+# Does it run with each Python that is found here?
+pythons: $(UV)
+	for python in $(PYTHONS); do $$python --version 2>/dev/null || { echo "$$python: none here"; continue; }; \
+	    $(UV) venv --quiet --clear --python $$python $(INSTALLED)/$$python && \
+	    $(UV) pip install --quiet --python $(INSTALLED)/$$python --only-binary :all: -e '.[all]' $(FOR_TESTS) && \
+	    $(INSTALLED)/$$python/bin/python -m pytest $(SMOKE) || exit; done
+
+# What an installation takes on disk, without extras and with each, MB.
+sizes: $(UV)
+	for extra in none campaign ros view all; do $(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/size && \
+	    $(UV) pip install --quiet --python $(INSTALLED)/size --compile-bytecode --link-mode copy -e ".[$$(echo $$extra | sed s/none//)]" && \
+	    echo $$extra: $$(du -sm $(INSTALLED)/size | cut -f1) || exit; done
+
 check: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -58,6 +89,11 @@ fuzz: setup
 
 bench: setup
 	$(BIN)/python -m pytest benchmarks --benchmark-only
+
+# Five back ends on the benchmark; its rows are added to the stored ones. Hours; begun again, it goes on where it was.
+leaderboard: setup
+	nice $(BIN)/chainslam benchmark --backend block-ekf full-ekf invariant-ekf graph intersection-ekf --out results/leaderboard
+	$(BIN)/python -m studies.runner.leaderboard results/leaderboard/rows.jsonl
 
 random: setup
 	$(BIN)/python -m studies.exploration.random_buildings --buildings 1000 --out results/random.jsonl
@@ -176,6 +212,19 @@ paper: setup
 study: setup
 	$(BIN)/python -m studies.whole --trials $(or $(TRIALS),20) --out results/study
 
+.PHONY: dimensions
+
+# Do the intervals of a plan's dimensions hold the true ones, and are walls found that stand elsewhere than drawn? 40 apartments.
+dimensions: setup
+	$(BIN)/python -m studies.plans.dimensions --plans $(PLANS) --runs results/plans
+	$(BIN)/python -m studies.plans.as_built --plans $(PLANS) --runs results/plans
+
+.PHONY: sessions
+
+# Does a second session find its place in the map of the first, and is the map of both consistent? 40 apartments.
+sessions: setup
+	$(BIN)/python -m studies.plans.sessions --plans $(PLANS) --runs results/plans --out results/sessions.jsonl
+
 # Of 100 runs, how many of the 95 % intervals between corners hold the truth, run by run?
 intervals: setup
 	$(BIN)/python -m studies.consistency.intervals --seeds 100 --out $(ROWS)/intervals.jsonl
@@ -195,7 +244,7 @@ interval-causes: setup
 
 # How large the code is where size hurts: numbers that one may tune, entries of a folder, imports.
 counts: setup
-	$(BIN)/python -m studies.counts
+	$(BIN)/python -m studies.code.counts
 
 # The page of all settings, from the docstrings beside them.
 settings: setup

@@ -15,9 +15,11 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from chainslam.experiments.library.audit.auditing import Audit, audit
     from chainslam.experiments.library.comparing import Comparison, compare, load
     from chainslam.experiments.library.running import explore, replay
     from chainslam.experiments.library.runs import Map, Run
+    from chainslam.experiments.scoring.keys import Steps, Summary
     from chainslam.experiments.usage import UsageError
     from chainslam.explore.step import Step
     from chainslam.explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
@@ -31,8 +33,10 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "chainslam.experiments.library.running": ("explore", "replay"),
+    "chainslam.experiments.library.audit.auditing": ("Audit", "audit"),
     "chainslam.experiments.library.comparing": ("Comparison", "compare", "load"),
     "chainslam.experiments.library.runs": ("Map", "Run"),
+    "chainslam.experiments.scoring.keys": ("Steps", "Summary"),
     "chainslam.experiments.usage": ("UsageError",),
     "chainslam.explore.step": ("Step",),
     "chainslam.explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
@@ -58,11 +62,11 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __version__ = version("chainslam")
 __all__ = [
-    "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
+    "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Audit", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
-    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Strategy",
-    "StrategyEntry", "StreamingRobot", "TimedScan", "Twist", "UsageError", "WheelSpec", "World", "__version__",
-    "check_backend", "compare", "explore", "load", "replay",
+    "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
+    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UsageError", "WheelSpec", "World",
+    "__version__", "audit", "check_backend", "compare", "explore", "load", "replay",
 ]  # fmt: skip
 
 

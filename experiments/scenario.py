@@ -46,6 +46,8 @@ DRIVER = "graph" if HAS_GTSAM else "invariant-ekf"
 """The back end that explores unless another is named: it loses the fewest maps of schools (`make schools`)."""
 STRATEGY_OF_REPLAYS = "none"
 """Nobody decides where a recorded robot goes."""
+OFFLINE = "offline"
+"""In the place of a back end: a recorded drive is mapped by offline refinement alone."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,8 @@ class TrialConfig:
     """The run is stopped once the odometry has counted this path length."""
     time_limit_s: Period | None = None
     """The run is stopped after this time on the robot's own clock."""
+    map: str | None = None
+    """Results folder of an earlier run in the same building: the robot finds its place in that map and continues it."""
     odometry: OdometrySource = "wheels"
     """Source of the motion between two scans: wheel odometry, or scan matching that starts from it."""
     robot: RobotConfig = field(default_factory=RobotConfig)
@@ -156,7 +160,8 @@ def strategy_of(words: str) -> Strategy:
 def check(config: TrialConfig) -> None:
     """Raise UsageError for numbers out of range and names that are in no registry, before anything is computed."""
     check_settings(config)
-    choose("back end", config.backend, BACKENDS, OR_OWN)
+    if (config.backend, config.strategy) != (OFFLINE, STRATEGY_OF_REPLAYS):
+        choose("back end", config.backend, BACKENDS, OR_OWN)
     _check_own(config.backend_options)
     if config.strategy != STRATEGY_OF_REPLAYS:
         strategy_of(config.strategy)
@@ -244,10 +249,12 @@ def fenced(world: World, config: TrialConfig) -> World:
 def make_backend(config: TrialConfig, start_world: Float[np.ndarray, "3"], cov: Float[np.ndarray, "3 3"]) -> Backend:
     """Return the back end of a trial for a body that is believed to start at a pose: it follows the scanner.
 
-    It knows of errors of ranges where they are to be calibrated.
+    It knows of errors of ranges where they are to be calibrated. Offline there is only a path, which any back end
+    without walls adds up.
     """
     start, start_cov = start_of_scanner(start_world, cov, config.robot.scanner)
-    backend = BACKENDS[config.backend].make(start.copy(), start_cov.copy(), config.backend_options)
+    name = TrialConfig.backend if config.backend == OFFLINE else config.backend
+    backend = BACKENDS[name].make(start.copy(), start_cov.copy(), config.backend_options)
     return CalibratedBackend(backend) if config.robot.lidar.calibrate else backend
 
 

@@ -19,11 +19,12 @@ from chainslam.sim.worlds import World
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.evaluation.from_start import FromStart, Start, as_it_is, from_start
-from chainslam.slam.geometry.compiled import link_kernels
+from chainslam.slam.geometry.compiled import prepare_kernels
 from chainslam.slam.mapper import Mapper
 
 from .scenario import KNOWN, Scenario, TrialConfig, build, heard_by, make_backend, sigmas_of
 from .scoring.association import Votes
+from .scoring.keys import Summary
 from .scoring.records import Log, Recorder
 from .scoring.summary import Ending, run_keys, summarise
 from .scoring.truth import truth_of
@@ -128,26 +129,17 @@ def ride(scenario: Scenario, recorder: Recorder, watch: Callable[[Step], None], 
 def _prepare_process() -> None:
     """Do once per process what would otherwise count as the time of a step.
 
-    Link the kernels, and exclude all modules from garbage collection, which took a tenth of a second.
+    Import the compiler, and exclude all modules from garbage collection, which took a tenth of a second.
     """
-    link_kernels()
+    prepare_kernels()
     gc.freeze()
 
 
 def bare_summary(scenario: Scenario, ending: Ending) -> dict[str, Any]:
     """Return the summary of a run without a step: null for everything that was not measured."""
-    keys = (
-        "path_length_m drive_time_s open_ends contours_closed contours_reachable lines coverage coverage_curve swept"
-        " pose_rmse_m heading_rmse_rad pose_anees pose_nees_in_band pose_anees_from_start map_anees duplicate_lines"
-        " false_matches"
-        " false_matches_few_beams merges"
-        " nis nis_in_band unstated_motions lost_steps wheel_noise_factor"
-        " range_bias_m range_bias_sigma_m range_scale range_scale_sigma own_beams curved_share"
-        " false_merges return_to_start certificate step_ms planning_ms"
-    )
     return {
+        **dict.fromkeys(key for key in Summary.__annotations__ if key in Summary.__required_keys__ and key != "format"),
         **run_keys(scenario, ending),
         "steps": 0,
         "collisions": scenario.robot.record.collisions,
-        **dict.fromkeys(keys.split()),
     }

@@ -18,6 +18,7 @@ from .planning.driving_field import DrivingField
 from .planning.passable import PathConfig
 from .step import Step
 from .survey.frontiers import frontiers
+from .survey.narrow_gaps import NarrowGap, narrow_gaps
 from .survey.unmapped_obstacles import unmapped_obstacles
 
 WALL_FRINGE_M = 0.1
@@ -80,6 +81,8 @@ class Certificate:
     """None where nobody kept the free space (a recorded robot)."""
     obstacles: tuple[LeftObstacle, ...] | None
     """None as `frontiers`."""
+    narrow_gaps: tuple[NarrowGap, ...] | None
+    """Gaps too narrow for the body, behind which floor was seen; None as `frontiers`."""
     floor_m2: float
     """Area inside the closed rooms, without their islands; 0 where no room is closed."""
     unseen_m2: float | None
@@ -106,6 +109,7 @@ def certify(
         left_open(step, outcome),
         left_frontiers(step, paths, sweep) if kept else None,
         left_obstacles(step, sweep) if kept else None,
+        narrow_gaps(step.free_space, step.pose_world[:2], paths) if kept else None,
         float(floor.area),
         unseen_area(step.free_space, floor.buffer(-WALL_FRINGE_M)) if kept and not floor.is_empty else None,
         reachable_way(step, paths, way_world) if kept else None,

@@ -22,6 +22,7 @@ from .goals.decider import Driver
 from .goals.explorer import Explorer
 from .goals.explorer_config import ExplorerConfig
 from .goals.homing import Homing, HomingConfig
+from .goals.later_session import LaterSession
 from .goals.lost import Lost, LostConfig
 from .goals.replay_driver import ReplayDriver
 from .goals.retreat import Retreat, RetreatConfig
@@ -47,7 +48,7 @@ class MissionConfig:
 
 
 def explore_mission(
-    robot: Robot, mapper: Mapper, strategy: Strategy, config: MissionConfig = MissionConfig()
+    robot: Robot, mapper: Mapper, strategy: Strategy, config: MissionConfig = MissionConfig(), recorded: int = 0
 ) -> Iterator[Step]:
     """Drive `robot` until every chain is closed or no open end can be reached, and yield each step.
 
@@ -55,17 +56,21 @@ def explore_mission(
     ends a mission early.
     What the robot states of itself stands in the settings: `slam.robot.fitted(MissionConfig(), robot_spec)`; the same
     for the mapper's. Raises ValueError where they are of two robots.
+    Where the first `recorded` scans come from earlier sessions, whatever the commands, exploration begins after them.
     """
     if mapper.config.robot != config.robot:
         raise ValueError(
             "expected a mapper and a mission of one robot, found those of two: `fitted` both to what it states"
         )
-    start = mapper.belief.pose_world[:2].copy()
-    following = config.explorer.following
-    explorer = Explorer(strategy, start, config.explorer)
-    inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
     floor = FloorMemory(FreeSpace(config.free_space), config.floor_memory)
-    driver = Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
+
+    def explorer() -> Driver:
+        start, following = mapper.belief.pose_world[:2].copy(), config.explorer.following
+        explorer = Explorer(strategy, start, config.explorer)
+        inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
+        return Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
+
+    driver = LaterSession(explorer, recorded) if recorded else explorer()
     return _mission(robot, mapper, driver, floor)
 
 
@@ -156,5 +161,5 @@ def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | 
         lost.move(odometry)
         recent.see(scan)
         recent.move(odometry)
-        path_length += float(np.hypot(odometry.motion[0], odometry.motion[1]))
+        path_length += odometry.path_m
         index += 1

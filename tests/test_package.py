@@ -97,11 +97,16 @@ def test_editors_see_the_types_of_what_is_installed_for_development(sources, tmp
     (tmp_path / "use.py").write_text(
         "import chainslam\nfrom chainslam.slam.robot import Scan\n"
         "reveal_type(chainslam.explore)\nreveal_type(Scan.within)\n"
+        "run = chainslam.explore('paper-fig4')\n"
+        "reveal_type(run.summary['pose_anees'])\nreveal_type(run.steps['pose_nees'])\n"
     )
     python = ("--python-executable", tmp_path / "venv" / "bin" / "python")
     said = run(sys.executable, "-m", "mypy", "--cache-dir", tmp_path, *python, "use.py", cwd=tmp_path, PYTHONPATH="")
     assert "-> chainslam.experiments.library.runs.Run" in said
-    assert "Any" not in said.splitlines()[1]
+    _, scan, score, column, _ = said.splitlines()
+    assert "Any" not in scan
+    assert score.endswith('"float | None"')
+    assert "numpy.dtype[numpy.float64]" in column
 
 
 def test_a_package_of_a_stranger_is_compared_with_ours_and_its_results_are_reported_without_it(sources, tmp_path):

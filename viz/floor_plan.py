@@ -28,9 +28,13 @@ WAY, END, BAR = "#B9C3D6", "#FFB77A", "#B8B8B8"
 WORDS = "#444444"
 LETTERS_M = 0.22
 """Height of the letters on the plan; a shorter side has smaller ones, down to `SMALLEST_M`, else none."""
-SMALLEST_M = 0.06
-SHARE = 0.115
-"""Height of letters of which fifteen fit along a side of length one."""
+SMALLEST_M = 0.12
+"""Smaller letters cannot be read in print: where the interval would need them, it is left to the tooltip."""
+ACROSS = 1.5
+"""Letters of height one that fit along a side of length one."""
+BARS_M = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+BAR_SHARE = 0.25
+"""Largest share of the width that the scale bar takes."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +52,28 @@ class Dimension:
     is_area: bool = False
 
     @property
-    def letters_m(self) -> float | None:
-        """Height of its letters; None without room for any."""
-        letters = min(LETTERS_M, SHARE * float(np.hypot(*self.along_world)))
-        return None if letters < SMALLEST_M else letters
+    def shown(self) -> str:
+        """The words for which there is room; nothing without room for any."""
+        if self._fitting_m(len(self.words)) >= SMALLEST_M:
+            return self.words
+        value = self.words.partition(" ±")[0] + (" m²" if self.is_area else "")
+        return value if self._fitting_m(len(value) + 2) >= SMALLEST_M else ""
+
+    @property
+    def letters_m(self) -> float:
+        """Height of its letters."""
+        return float(np.clip(self._fitting_m(len(self.words)), SMALLEST_M, LETTERS_M))
+
+    def _fitting_m(self, letters: int) -> float:
+        return ACROSS * float(np.hypot(*self.along_world)) / max(letters, 1)
 
     @property
     def beside_world(self) -> Float[np.ndarray, "2"]:
         """Middle of its text; the text of a length is on the free side of the wall."""
+        if self.is_area:  # which may be as good as none
+            return self.at_world
         along = self.along_world / float(np.hypot(*self.along_world))
-        beside = 0.0 if self.is_area else 0.9 * (self.letters_m or 0.0)
-        return self.at_world + beside * np.array([-along[1], along[0]])
+        return self.at_world + 0.9 * self.letters_m * np.array([-along[1], along[0]])
 
     @property
     def clockwise_deg(self) -> float:
@@ -77,7 +92,8 @@ def floor_plan(
 ) -> bytes:
     """Return the SVG file; its y axis points down, so its world is the map's moved to the view's lower left corner."""
     bands = [_band(chain, index, walls, certificate) for index, chain in enumerate(chains)]
-    corners = [path_world[:, :2], *(np.reshape(shapely.bounds(band), (2, 2)) for band in bands)]
+    driven = np.isfinite(path_world[:, 0])
+    corners = [path_world[driven, :2], *(np.reshape(shapely.bounds(band), (2, 2)) for band in bands)]
     x0, y0 = np.floor(np.min(np.concatenate(corners), axis=0) - MARGIN_M)
     x1, y1 = np.ceil(np.max(np.concatenate(corners), axis=0) + MARGIN_M)
     width, height = float(x1 - x0), float(y1 - y0)
@@ -92,7 +108,8 @@ def floor_plan(
     ).text = f"1:{SCALE}, drawn in metres; the lower left corner is ({x0:g}, {y0:g}) of the map, whose y points up"
     plan = _Plan(page, np.array([x0, y1]))
     _grid(plan, width, height)
-    plan.line(path_world[:, :2], stroke=WAY, stroke_width="0.03")
+    for leg in np.split(path_world[driven, :2], np.flatnonzero(~driven) - np.arange(np.count_nonzero(~driven))):
+        plan.line(leg, stroke=WAY, stroke_width="0.03")
     closed = 0
     for chain, band in zip(chains, bands, strict=True):
         colour = palette.CLOSED[closed % len(palette.CLOSED)] if chain.is_closed else palette.OPEN
@@ -105,6 +122,7 @@ def floor_plan(
         plan.dimension(dimension)
     start = plan.circle(path_world[0, :2], 0.12, id="start", fill="none", stroke=BAR, stroke_width="0.03")
     start.set("data-heading-deg", f"{np.rad2deg(path_world[0, 2]):.3f}")
+    plan.scale_bar(next((metres for metres in BARS_M if metres <= BAR_SHARE * width), 1.0), width, height)
     plan.footer(
         [f"{title}; grid 1 m", *(["lengths in m, areas in m², with 95 % intervals"] if dimensions else [])], height
     )
@@ -167,18 +185,30 @@ class _Plan:
 
     def dimension(self, told: Dimension) -> None:
         """Write a length beside its wall, on the free side and upright, or an area in the middle of its room."""
-        letters = told.letters_m
-        if letters is None:
+        if not told.shown:
             return
         x, y = self._on_page(told.beside_world[None])[0]
         placed = f"translate({x:.3f} {y:.3f}) rotate({told.clockwise_deg:.2f})"
         text = self._add(
             "text", transform=placed, fill=WORDS, text_anchor="middle",
-            dominant_baseline="central", font_size=f"{letters:.3f}", font_family="sans-serif",
+            dominant_baseline="central", font_size=f"{told.letters_m:.3f}", font_family="sans-serif",
             font_weight="bold" if told.is_area else "normal",
         )  # fmt: skip
-        text.text = told.words
+        text.text = told.shown
         SubElement(text, "title").text = told.hint
+
+    def scale_bar(self, length_m: float, width_m: float, height_m: float) -> None:
+        """Draw a bar of four parts above the footer, at the right edge of the page, its length beside it."""
+        left, top, part = width_m - 0.2 - length_m, height_m - 0.72, length_m / 4.0
+        for k in range(4):
+            x, fill = left + k * part, BAR if k % 2 == 0 else palette.PAGE
+            box = f"M{x:g},{top:g} h{part:g} v0.07 h{-part:g} Z"
+            self._add("path", d=box, fill=fill, stroke=BAR, stroke_width="0.01")
+        label = self._add(
+            "text", x=f"{left - 0.1:g}", y=f"{top + 0.035:g}", fill="#6A6A6A", font_size="0.2", text_anchor="end",
+            dominant_baseline="central", font_family="sans-serif",
+        )  # fmt: skip
+        label.text = f"{length_m:g} m"
 
     def footer(self, lines: Sequence[str], height_m: float) -> None:
         """Write lines of text at the lower edge of the page, the first at the top."""

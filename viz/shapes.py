@@ -12,6 +12,11 @@ VAGUE_RAD = float(np.deg2rad(1.0))
 """Walls with a less certain direction (short, or seen from far away) are drawn pale, since their ellipses are huge."""
 
 
+def with_gaps(path_world: Float[np.ndarray, "s d"], carried: Bool[np.ndarray, " s"] | None) -> Float[np.ndarray, "m d"]:
+    """Return a path with a row of NaN before each step to which the robot was carried: there nothing was driven."""
+    return path_world if carried is None else np.insert(path_world, np.flatnonzero(carried), np.nan, axis=0)
+
+
 def ellipses(
     centres: Float[np.ndarray, "n 2"], covs: Float[np.ndarray, "n 2 2"], times: float, vertices: int = VERTICES
 ) -> Float[np.ndarray, "n v 2"]:

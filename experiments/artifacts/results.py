@@ -14,9 +14,11 @@ import numpy as np
 
 from chainslam.slam.evaluation.consistency import pose_errors
 from chainslam.viz.floor_plan import Dimension, floor_plan
+from chainslam.viz.shapes import with_gaps
 
-from ..scenario import TrialConfig
+from ..scenario import OFFLINE, TrialConfig
 from ..scoring.innovations import nis_in_band, windowed_nis
+from ..scoring.keys import Steps
 from ..scoring.records import Log
 from ..scoring.summary import odometry_path, pose_nees, pose_nees_from_start
 from ..trial import TrialResult
@@ -29,7 +31,7 @@ from .maps.mapped import corners_of
 from .maps.occupancy import occupancy_files
 from .maps.visibility import VISIBILITY, visibility_record
 from .settings import own
-from .trajectories import smoothed_path, trajectory, tum, wheels_alone
+from .trajectories import estimated_path, smoothed_path, trajectory, tum, wheels_alone
 
 PACKAGES = ("chainslam", "numpy", "scipy", "shapely", "networkx", "matplotlib")
 LOG, SUMMARY, MAP = "log.npz", "summary.json", "map.npz"
@@ -45,17 +47,6 @@ RUN_FILES = (
 """All files of a run, and those that `view` and `report` add to its folder."""
 REPLAY = "replay"
 """Key in `config.json` of the options of a replay; null for an exploration."""
-STEP_COLUMNS = (
-    *("step", "time_s", "path_length_m", "pose_nees", "pose_trace", "open_ends", "lines", "lines_tentative"),
-    "pose_nees_from_start",
-    *("closed_chains", "set_aside", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "true_heading_rad"),
-    *("error_x_m", "error_y_m", "error_heading_rad", "sigma_x_m", "sigma_y_m", "sigma_heading_rad"),
-    *("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"),
-    *("odometry_error_m", "collisions", "nis", "nis_dof", "nis_window", "nis_in_band", "unstated_motion", "lost"),
-    *("wheel_noise_factor", "behaviour", "route_walls", "reason", "step_ms"),
-)
-"""Of `steps.csv`. `cov_*` is the covariance of the estimated pose (x m, y m, heading t rad), plain errors, world frame:
-with the poses beside it, all that `pose_nees` is made of."""
 
 
 def write_results(result: TrialResult, folder: Path, config: dict[str, Any] | None = None) -> list[str]:
@@ -98,19 +89,23 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
     shown = log if recorded is None or smoothed is None else replace(log, estimated_world=smoothed.poses_world)
     drawn = cache(lambda: map_geojson(last, result.joint, certificate, shown))
     told = cache(lambda: _dimensions(result, drawn()["features"]))
-    title = f"{result.scenario.world.name}, mapped by {result.scenario.config.backend}"
+    name = result.scenario.config.backend
+    title = f"{result.scenario.world.name}, mapped {'' if name == OFFLINE else 'by '}{name}"
     files |= {
         LOG: lambda: npz_bytes(log_arrays(result, log)),
         MAP: lambda: npz_bytes(map_arrays(result)),
         "map.geojson": lambda: json_bytes(drawn()),
         "steps.csv": lambda: steps_csv(log),
-        "trajectory_estimated.tum": lambda: trajectory(result, log, log.estimated_world),
-        "map.svg": lambda: floor_plan(last.map, last.chains, certificate, shown.estimated_world, title, told()),
+        "trajectory_estimated.tum": lambda: tum(*estimated_path(result, log)),
+        "map.svg": lambda: floor_plan(
+            last.map, last.chains, certificate, with_gaps(shown.estimated_world, log.carried), title, told()
+        ),
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _pictures().picture_of(result),
-        VISIBILITY: lambda: json_bytes(visibility_record(last, log)),
-        "visibility.png": lambda: _pictures().graph_png(result),
     }
+    if result.scenario.config.backend != OFFLINE:  # Nobody followed walls from scan to scan.
+        files[VISIBILITY] = lambda: json_bytes(visibility_record(last, log))
+        files["visibility.png"] = lambda: _pictures().graph_png(result)
     floor = last.free_space
     if recorded is not None and not floor.evidence.size:  # A recorded drive has no planner, hence no planned routes.
         floor = drawn_floor(recorded.recording, shown.estimated_world, result.scenario.config.mission.free_space)
@@ -188,6 +183,7 @@ def _sensed(result: TrialResult, log: Log) -> dict[str, Any]:
         "odometry": wheels.odometry[: len(log)],
         "odometry_cov": wheels.odometry_cov[: len(log)],
         "touched": log.touched,
+        **({} if log.carried is None else {"carried": log.carried}),
         "start_pose": result.scenario.start_estimate,
         "start_cov": result.scenario.start_cov,
     }
@@ -265,4 +261,4 @@ def steps_csv(log: Log) -> bytes:
         log.reasons,
         1e3 * log.seconds,
     ]
-    return csv_bytes(STEP_COLUMNS, zip(*columns, strict=True))
+    return csv_bytes(tuple(Steps.__annotations__), zip(*columns, strict=True))

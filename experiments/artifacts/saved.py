@@ -8,7 +8,7 @@ no `log.npz`, or an older one, but its running log (`running_log.py`).
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 from jaxtyping import Float
@@ -20,36 +20,22 @@ from chainslam.explore.step import Step
 from chainslam.sim.logs.recorded_robot import RecordingError, read_log, recording_of
 
 from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..scoring.keys import Summary
 from ..usage import UsageError
 from .files import CONFIG
 from .reading import check_format, plain_json, read_json, read_plain, told
 from .results import LOG, RUNNING
 from .running_log import Kept, read_running
-from .schema import fit, many
+from .schema import fit
 
 REMEDY = "keep a run's files together, or repeat the run"
-NUMBERS = (
-    *("path_length_m", "drive_time_s", "coverage", "coverage_own_frame", "swept", "pose_rmse_m", "heading_rmse_rad"),
-    *("odometry_rmse_m", "odometry_max_m", "pose_anees", "pose_nees_in_band", "map_anees"),
-    *("pose_anees_from_start", "nis", "nis_in_band"),
+ALWAYS = ("status", "reason", "steps")
+Saved = defstruct(
+    "Saved",
+    [(key, kind) if key in ALWAYS else (key, kind, None) for key, kind in get_type_hints(Summary).items()],
+    kw_only=True,
 )
-COUNTS = (
-    *("open_ends", "lines", "contours_closed", "contours_reachable", "false_matches", "duplicate_lines", "collisions"),
-    "map_began_step",
-)
-Curve = defstruct("Curve", [("path_length_m", list[float]), ("coverage", list[float])])
-Aside = defstruct("Aside", [("wall", int), ("side", int), ("position_m", tuple[float, float]), ("why", str)])
-Summary = defstruct(
-    "Summary",
-    [
-        *(("status", str), ("reason", str), ("steps", int)),
-        *((name, float | None, None) for name in NUMBERS),
-        *((name, int | None, None) for name in COUNTS),
-        ("coverage_curve", Curve | None, None),
-        ("set_aside", many(Aside) | None, None),
-    ],
-)
-"""The keys that pages and pictures take from a `summary.json`."""
+"""`Summary` as it is read: a key that another version did not write is not missed."""
 
 
 Known = defstruct("Known", [("outcome", str)])
@@ -187,4 +173,4 @@ def cut_short(folder: Path) -> str:
 
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a run's `summary.json`; raises UsageError."""
-    return read_json(folder / "summary.json", Summary, REMEDY)
+    return read_json(folder / "summary.json", Saved, REMEDY)

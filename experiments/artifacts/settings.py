@@ -25,7 +25,7 @@ REMEDY = "name a run's config.json, or a JSON object with some of its keys"
 NAVIGATION = "mission.explorer.following.navigation"
 FOLLOWING = "mission.explorer.following.method"
 KEYS = {
-    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start")},
+    **{name: name for name in ("world", "backend", "strategy", "seed", "p0", "errorless", "max_steps", "start", "map")},
     "odometry": "odometry",
     "max_path": "max_path_m",
     "time_limit": "time_limit_s",

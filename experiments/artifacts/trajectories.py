@@ -6,6 +6,7 @@ from jaxtyping import Float
 from chainslam.sim.logs.keyframes import RecordedLog
 from chainslam.slam.geometry.poses import wrap
 
+from ..scenario import OFFLINE
 from ..scoring.records import Log
 from ..scoring.summary import odometry_poses
 from ..scoring.without_truth.smoothing import Smoothed
@@ -26,6 +27,12 @@ def path_of(
         return log.time_s, poses_world
     scans = recorded.poses_of_scans(poses_world)
     return recorded.scan_time_s[: len(scans)], scans
+
+
+def estimated_path(result: TrialResult, log: Log) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
+    """Return the same for the estimated path; without a back end that is the smoothed one."""
+    smoothed = result.smoothed if result.scenario.config.backend == OFFLINE else None
+    return path_of(result, log, log.estimated_world) if smoothed is None else smoothed_path(result, log, smoothed)
 
 
 def smoothed_path(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chainslam.explore.strategies import STRATEGIES
-from chainslam.sim.worlds import WORLDS, DrawingOptions
+from chainslam.sim.worlds import WORLDS, DrawingOptions, is_own
 from chainslam.slam.backends import BACKENDS
 
 from ..artifacts.presets import METHODS, backend_of, mapping_of
@@ -84,7 +84,7 @@ class Trial:
         return folder / self.backend / self.arm / f"{self.seed:05d}"
 
 
-DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start")
+DECIDED = ("world", "backend", "strategy", "seed", "errorless", "start", "map")
 """Settings that the campaign itself decides, or that would invalidate its statistics."""
 
 SETTINGS = (("--driver", "driver"), ("--p0", "p0"), ("--max-steps", "max_steps"), ("--first-seed", "first_seed"))
@@ -166,8 +166,8 @@ def gate_of(campaign: Campaign) -> float:
 
 
 def world_key(world: str) -> str:
-    """Return the name of a world in tables and folders: a bundled name, or a file's name without its suffix."""
-    return world if world in WORLDS else Path(world).stem
+    """Return the name of a world in tables and folders: its own name, or a file's name without its suffix."""
+    return world if is_own(world) else Path(world).stem
 
 
 def check_campaign(campaign: Campaign) -> None:
@@ -214,7 +214,7 @@ def check_parts(campaign: Campaign) -> None:
 
 def world_digests(campaign: Campaign) -> dict[str, str]:
     """Return the SHA-256 of each world that is a file: the same name with other walls is another campaign."""
-    files = [Path(world) for world in campaign.worlds if world not in WORLDS]
+    files = [Path(world) for world in campaign.worlds if not is_own(world)]
     return {path.stem: sha256(path.read_bytes()).hexdigest() for path in files}
 
 

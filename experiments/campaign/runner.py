@@ -1,6 +1,6 @@
 """Runs the missing trials of a campaign on local cores or on a cluster, with identical results."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import monotonic
 
@@ -23,6 +23,7 @@ class Tally:
     """The cost of a campaign's trials, without those that were finished before."""
 
     trials: int
+    """Recordings for replays among them."""
     wall_s: float
     cpu_s: float
     """Summed over all processes."""
@@ -37,14 +38,17 @@ class Tally:
         )
 
 
+def missing(store: Store) -> list[Trial]:
+    """Return every trial without a result, and the recordings that its replays need, in the order of performing."""
+    drives = [job.trial for job in _drives(store)]
+    return drives + _rest(store, drives)
+
+
 def run_campaign(store: Store, executor: Executor) -> Tally:
     """Perform every trial without a result, recordings first; finished trials are kept whatever happens."""
     began, count, cpu_s = monotonic(), 0, 0.0
     drives = _drives(store)
-    driven = {job.trial for job in drives}
-    rest = [t for t in trials(store.campaign) if not store.has(t) and t not in driven]
-    # Replays of one recording are consecutive, so that a process reads it only once.
-    rest.sort(key=lambda t: (store.campaign.worlds.index(t.world), t.strategy, t.seed))
+    rest = _rest(store, [job.trial for job in drives])
     total = len(drives) + len(rest)
     with bar_of("trials", float(total), MofNCompleteColumn()) as (bar, task):
         for jobs in (iter(drives), (_job(store, trial) for trial in rest)):
@@ -53,6 +57,15 @@ def run_campaign(store: Store, executor: Executor) -> Tally:
                 count, cpu_s = count + 1, cpu_s + done.cpu_s
                 bar.advance(task)
     return Tally(count, monotonic() - began, cpu_s)
+
+
+def _rest(store: Store, driven: Sequence[Trial]) -> list[Trial]:
+    """Return the missing trials that are not driven as recordings."""
+    done = set(driven)
+    rest = [t for t in trials(store.campaign) if not store.has(t) and t not in done]
+    # Replays of one recording are consecutive, so that a process reads it only once.
+    rest.sort(key=lambda t: (store.campaign.worlds.index(t.world), t.strategy, t.seed))
+    return rest
 
 
 def _drives(store: Store) -> list[Job]:

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,6 +26,9 @@ from .work import Done, unpack
 REMEDY = "name the folder of a campaign, as written by `compare --out`"
 MERGED = "merged"
 """Key in the config of a merged folder that holds the merged campaigns."""
+SEEDS = frozenset({"trials", "first_seed"})
+EXTENDABLE = SEEDS | {"worlds", "backends", "strategies", "arms", "worlds_sha256"}
+"""Campaigns that differ in nothing else can be merged."""
 Worlds = defstruct("Worlds", [("worlds_sha256", dict[str, str])])
 Merged = defstruct(
     "Merged", [(MERGED, list[dict[str, Any]]), ("from_", list[dict[str, Any]])], rename={"from_": "from"}
@@ -146,6 +149,16 @@ def read_config(folder: Path) -> Settled:
     return Settled(campaigns, said["worlds_sha256"], made["versions"], made["commit"], said)
 
 
+def _way_out(different: Sequence[str], held: Sequence[Campaign]) -> str:
+    """Return how to run a campaign that differs from the one in a folder."""
+    if not set(different) <= EXTENDABLE:
+        return "name another --out"
+    more = ""
+    if set(different) <= SEEDS:
+        more = f" (more seeds: with --first-seed {max(campaign.seeds.stop for campaign in held)})"
+    return f"run it with another --out{more}, and combine both folders with --merge"
+
+
 def _settle(folder: Path, campaign: Campaign) -> None:
     """Write the config, or compare it with the existing one."""
     path = folder / CONFIG
@@ -167,7 +180,8 @@ def _settle(folder: Path, campaign: Campaign) -> None:
     different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
     if different:
         raise UsageError(
-            f"expected the settings of the campaign in {folder}, found other {', '.join(different)}: name another --out"
+            f"expected the settings of the campaign in {folder}, found other {', '.join(different)}:"
+            f" {_way_out(different, held.campaigns if held else ())}"
         )
     if {key: before.get(key) for key in made_with} != plain(made_with):
         print(

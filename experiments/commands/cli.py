@@ -66,12 +66,17 @@ COMMANDS = {
     "replay": Entry(
         "replay",
         "Replay",
-        "Replay a log through one or several back ends, all with identical scans.",
+        "Map a log, or replay it through one or several back ends, all with identical scans.",
     ),
     "compare": Entry(
-        "compare",
+        "campaigns.compare",
         "Compare",
         "Run many trials of worlds x back ends x strategies, closed loop and replayed, and compare them statistically.",
+    ),
+    "benchmark": Entry(
+        "campaigns.benchmark",
+        "Benchmark",
+        "Score estimators on worlds and seeds fixed by version, one row of figures each that can be cited.",
     ),
     "reproduce": Entry(
         "reproduce",
@@ -79,9 +84,24 @@ COMMANDS = {
         "Reproduce the paper's figures: a picture of each, and its numbers next to those of several back ends.",
     ),
     "measure": Entry(
-        "measure",
+        "maps.measure",
         "Measure",
         "Measure the distance between two corners of a run's map with its 95 % interval; without corners, list all.",
+    ),
+    "audit": Entry(
+        "audit",
+        "Audit",
+        "Check the covariances of trajectories against the truth: consistent, overconfident, or too cautious.",
+    ),
+    "plan": Entry(
+        "maps.plan",
+        "Plan",
+        "Draw a dimensioned plan of a run's or a log's map: SVG, PDF, PNG, DXF or GeoJSON, by the file's ending.",
+    ),
+    "check": Entry(
+        "maps.check",
+        "Check",
+        "Compare a map with a drawing of the building: which walls are within tolerance, moved, missing or extra.",
     ),
     "view": Entry(
         "view",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chainslam.explore.outcome import Outcome
 from chainslam.explore.step import Step
 
 from ..library.driving import Watch
@@ -112,4 +113,4 @@ def _watched(title: str, steps: float, go: Callable[[Watch], Run]) -> Run:
 
 def _status(run: Run) -> int:
     """Return the exit status for a run; 0 if it ended by itself or at a limit."""
-    return EXIT_STATUS.get(run.summary["outcome"], 0)
+    return EXIT_STATUS.get(Outcome(run.summary["outcome"]), 0)

@@ -24,6 +24,7 @@ from ..artifacts.settings import (
 )
 from ..library.asked import SETTLED, asked_trial, continued, refuse_settled
 from ..library.driving import Finished, Watch, begin, go_on
+from ..library.echo import echo_world, expected_steps, run_line
 from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, Scenario, TrialConfig, check, load_world
 from ..terminal.answers import found
 from ..terminal.console import say, written
@@ -33,7 +34,6 @@ from ..trial import TrialResult
 from ..usage import UsageError
 from ..views.run_lines import lines_of, notes_of
 from ..views.timelines import TimelineOutput
-from .echo import echo_world, expected_steps, run_line
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,9 @@ class Explore:
     fence: Annotated[str | None, tyro.conf.arg(metavar="BOX|FILE")] = None
     """Stay within a box, X0,Y0,X1,Y1 in metres of the world, or within the polygon of a GeoJSON file. What lies
     beyond is not explored, which ends a run outdoors or in an unbounded world."""
+    map: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Go on with the map of an earlier run in the same building, of this results folder: the robot begins lost, finds
+    its place in that map, and maps what is missing. The results are those of both sessions together."""
     drawing: tyro.conf.OmitArgPrefixes[DrawingOptions] = AS_DRAWN
     """How the world's file is read."""
     out: Path | None = None
@@ -160,8 +163,11 @@ class Explore:
     def _watched(self, recordings: list[TimelineOutput], scenario: Scenario) -> Iterator[Watch]:
         """Announce a run, show its progress and record it; the recording is appended to a list."""
         trial, world = scenario.config, scenario.world
-        echo_world(world)
-        say(run_line(world, trial))
+        if recordings:  # A later session found its place: both are recorded as one.
+            recordings.pop().drop()
+        else:
+            echo_world(world)
+            say(run_line(world, trial))
         if not HAS_GTSAM and trial.backend == DRIVER and not self._is_given("backend"):
             say(f"note: the package gtsam is not installed; {DRIVER} is used instead of graph")
         noise = "errorless" if trial.errorless else f"seed {trial.seed}"

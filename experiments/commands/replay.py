@@ -2,7 +2,7 @@
 
 import sys
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -16,16 +16,18 @@ from ..artifacts.results import write_results
 from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..artifacts.settings import parse_settings
 from ..library.asked import asked_source
+from ..library.earlier import scored
+from ..library.sessions import placed_log
 from ..replays.measured import check_references, held_against
 from ..replays.real_log import RealOptions
 from ..replays.replay import Association, ReplayOptions
 from ..replays.sources import OwnLog, RealLog
-from ..scenario import OdometrySource
+from ..scenario import OFFLINE, OdometrySource
 from ..scoring.without_truth.references import read_references
 from ..terminal.answers import found
 from ..terminal.console import say, written
 from ..terminal.interrupts import INTERRUPTED, first_interrupt_waits
-from ..terminal.progress import progress
+from ..terminal.progress import in_lines, progress, share_of
 from ..trial import TrialResult
 from ..usage import OR_OWN, UsageError, choose
 from ..views.run_lines import lines_of, notes_of
@@ -34,16 +36,18 @@ from ..views.timelines import TimelineOutput
 
 @dataclass(frozen=True)
 class Replay:
-    """Replay a log through one or several back ends, all with identical scans.
+    """Map a log, or replay it through one or several back ends, all with identical scans.
 
-    The log of a run holds the truth. For a real robot's log it is unknown, so that only scores without it are written.
+    A real robot's log is mapped by scan matching and offline refinement, unless back ends are named. Its truth is
+    unknown, so that only scores without it are written; the log of a run holds it.
     """
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """The log.npz of a run, or of your own robot with its config.json beside it; a CARMEN, dp-slam or BreezySLAM
     log, optionally packed with gzip; or a ROS bag (a file, or the folder of a ROS 2 bag)."""
-    backend: tuple[str, ...] = field(default_factory=lambda: ("full-ekf",))
-    """Estimators (see `chainslam backends`)."""
+    backend: tuple[str, ...] = ()
+    """Estimators to compare (see `chainslam backends`), each with an estimate at each step. By default full-ekf for a
+    run's log, and none for a real robot's: offline refinement alone is faster and more accurate."""
     association: Association = "own"
     """Data association: the back end's own, or the true one."""
     perfect_extraction: bool = False
@@ -55,7 +59,7 @@ class Replay:
     when the run was driven, and scan matching for a real robot's log."""
     second_looks: bool = False
     """Refine a real robot's log offline once its drive has ended: associate all segments again and smooth the path
-    (trajectory_smoothed.tum). Back ends that smooth always do so."""
+    (trajectory_smoothed.tum). Without --backend, and with back ends that smooth, this is always done."""
     every: int = 1
     """Map every n-th keyframe of a real robot's log (keyframes are scans 0.1 m or 5 degrees apart)."""
     range_noise: float | None = None
@@ -70,6 +74,9 @@ class Replay:
     compared."""
     reference: Path | None = None
     """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
+    map: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Go on with the map of an earlier run in the same building, of this results folder: the robot's place in that map
+    is found from the log, and both are mapped as one."""
     robot: str | None = None
     """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
     file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
@@ -92,10 +99,15 @@ class Replay:
         for name in self.backend:
             choose("back end", name, BACKENDS, OR_OWN)
         references = read_references(self.relations, self.reference)
-        source = self.source()
+        source, session = self.source(), None
+        names = self.backend or (source.backend,)
+        if self.map is not None:
+            if not isinstance(source, OwnLog):
+                raise UsageError(f"expected the log of a run with the truth for --map, found {self.log}: leave it out")
+            source, session = placed_log(source, self.map, names[0])
         check_references(references, *source.odometry)
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
-        folders = {name: out / name if len(self.backend) > 1 else out for name in self.backend}
+        folders = {name: out / name if len(names) > 1 else out for name in names}
         with ExitStack() as stack:
             for folder in folders.values():
                 prepare(folder)
@@ -105,12 +117,17 @@ class Replay:
                 if folder.samefile(self.log.parent):
                     raise UsageError(f"expected a folder other than the log's, found {folder}: name another --out")
                 refuse_others(folder, configs[name], self.force)
-            recording = self._timeline(source)
+            recording = self._timeline(source, names)
             summaries, problems, status = [], [], 0
             for name, folder in folders.items():
-                result = held_against(self._one(source, name, recording), references)
-                settle(folder, configs[name])
-                problems += write_results(result, folder, configs[name])
+                mapped = self._one(source, name, recording)
+                # What was computed is written first, which takes seconds.
+                with first_interrupt_waits():
+                    result = held_against(mapped, references)
+                    if session is not None:
+                        result.summary["session"] = scored(session, result)
+                    settle(folder, configs[name])
+                    problems += write_results(result, folder, configs[name])
                 summaries.append(result.summary)
                 status = max(status, result.ending.exit_status)
                 if status == INTERRUPTED:
@@ -140,24 +157,29 @@ class Replay:
     def _kind(self, source: OwnLog | RealLog) -> str:
         return self.association if isinstance(source, OwnLog) else source.title.partition(".")[0]
 
-    def _timeline(self, source: OwnLog | RealLog) -> TimelineOutput:
+    def _timeline(self, source: OwnLog | RealLog, names: tuple[str, ...]) -> TimelineOutput:
         if isinstance(source, RealLog):
-            return TimelineOutput(source.title, self.backend, None, True, self.rrd)
-        return TimelineOutput(source.title, self.backend, source.world, source.run.trial.errorless, self.rrd)
+            return TimelineOutput(source.title, names, None, True, self.rrd)
+        return TimelineOutput(source.title, names, source.world, source.run.trial.errorless, self.rrd)
 
     def _one(self, source: OwnLog | RealLog, name: str, recording: TimelineOutput) -> TrialResult:
-        """Replay through one back end; an interrupt ends it between two steps."""
-        with (
-            progress(f"replaying with {name}", float(source.scans)) as show,
-            first_interrupt_waits() as stop_if_asked,
-        ):
+        """Replay through one back end; an interrupt ends it between two steps, and what was found so far is kept."""
+        title = "matching scans" if name == OFFLINE else f"replaying with {name}"
+        in_file = in_lines(title)
+        with progress(title, float(source.scans)) as show, first_interrupt_waits() as stop_if_asked:
 
             def watch(step: Step) -> None:
                 show(step)
+                in_file((step.index + 1) / source.scans)
                 stop_if_asked()
 
             if isinstance(source, OwnLog):
                 return source.go(name, recording.watch(name, source.true_pose, watch))
             mapped = source.mapped(name, recording.watch(name, None, watch, source.wheels_pose))
-        # Offline refinement takes as long as mapping. An interrupt ends it at once, and the map is kept.
-        return source.looked_over(mapped)
+        with share_of("refining offline") as show_share, first_interrupt_waits() as stop_if_asked:
+
+            def refining(share: float) -> None:
+                show_share(share)
+                stop_if_asked()
+
+            return source.looked_over(mapped, refining)

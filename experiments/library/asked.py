@@ -34,7 +34,7 @@ from ..usage import UsageError
 CampaignName = Literal["smoke", "paper", "paper-method", "full"]
 SETTLED = (
     *("world", "backend", "strategy", "seed", "p0", "errorless", "sweep", "navigation", "following", "odometry"),
-    *("start", *DRAWING, "fence", "preset", "robot", "config", "set"),
+    *("start", "map", *DRAWING, "fence", "preset", "robot", "config", "set"),
 )
 """Options that a saved run determines; only its limits may change when it is continued."""
 
@@ -53,7 +53,8 @@ def asked_trial(
     `said` are the given options (`KEYS`), `drawing` those of the world's file by their dotted keys. Raises UsageError
     if no world is given, or if a value is invalid.
     """
-    given = {KEYS[name]: list(value) if isinstance(value, tuple) else value for name, value in said.items()} | drawing
+    plain = {name: list(value) if isinstance(value, tuple) else value for name, value in said.items()}
+    given = {KEYS[name]: str(value) if isinstance(value, Path) else value for name, value in plain.items()} | drawing
     if fence is not None:
         given["mission.free_space.fence"] = fence_of(fence)
     base = {} if config is None else read_settings(config)

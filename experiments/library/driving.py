@@ -15,6 +15,8 @@ from ..artifacts.saved import SavedRun, read_saved
 from ..scenario import Scenario, TrialConfig, build, check, load_world
 from ..trial import TrialResult, default_mission, run_scenario
 from ..usage import UsageError
+from .earlier import scored
+from .sessions import begin_later, together
 
 Watch = Callable[[Step], None]
 Watching = Callable[[Scenario], AbstractContextManager[Watch]]
@@ -92,7 +94,13 @@ def _take(folder: Path, trial: TrialConfig, force: bool) -> None:
 
 def _drive(trial: TrialConfig, world: World, folder: Path, watching: Watching, saved: SavedRun | None = None) -> Driven:
     """Drive a run in a locked folder, with a log that survives if the process is killed, and write its results."""
-    scenario, config = build(trial, world), config_record(trial)
+    scenario, config, begun = build(trial, world), config_record(trial), None
+    if trial.map is not None:
+        with watching(scenario) as watch:
+            begun = begin_later(Path(trial.map), scenario, watch)
+        if begun.later is None:
+            return Driven(folder, begun.result, write_results(begun.result, folder, config))
+        scenario = begun.later
     log = RunningLog(folder, config, saved.kept if saved is not None else None)
     try:
         with watching(scenario) as watch:
@@ -103,7 +111,7 @@ def _drive(trial: TrialConfig, world: World, folder: Path, watching: Watching, s
                 log.add(step)
                 watch(step)
 
-            result = run_scenario(scenario, see, default_mission)
+            result = run_scenario(scenario, see, default_mission if begun is None else together(begun.recorded))
             log.check()
     except UsageError:
         if saved is not None and saved.kept is None:
@@ -111,6 +119,8 @@ def _drive(trial: TrialConfig, world: World, folder: Path, watching: Watching, s
         raise
     finally:
         log.close()
+    if begun is not None:
+        result.summary["session"] = scored(begun.told, result)
     if saved is not None and result.ending.exit_status and len(result.log or ()) < len(saved):
         return Driven(folder, result, fell_short=True)
     problems = write_results(result, folder, config)

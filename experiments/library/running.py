@@ -59,6 +59,7 @@ def explore(
     level: str | None = None,
     threshold: float | None = None,
     negate: bool = False,
+    map: str | Path | Run | None = None,
     fence: str | None = None,
     preset: PresetName | None = None,
     robot: str | Path | RobotSpec | None = None,
@@ -86,6 +87,7 @@ def explore(
         "backend": backend, "strategy": strategy, "seed": seed, "p0": p0, "errorless": errorless, "sweep": sweep,
         "navigation": navigation, "following": following, "odometry": odometry, "max_steps": max_steps,
         "max_path": max_path, "time_limit": time_limit, "return_to_start": return_to_start, "start": start,
+        "map": map.folder if isinstance(map, Run) else map,
     }  # fmt: skip
     said = {key: value for key, value in said.items() if value is not None and value != DEFAULTS[key]}
     drawing = drawing_said(
@@ -135,7 +137,7 @@ DEFAULTS = {name: each.default for name, each in signature(explore).parameters.i
 def replay(
     log: str | Path | Run,
     *,
-    backend: str = "full-ekf",
+    backend: str | None = None,
     association: Association = "own",
     odometry: OdometrySource | None = None,
     second_looks: bool = False,
@@ -172,7 +174,7 @@ def replay(
 def replay(
     log: str | Path | Run,
     *,
-    backend: str | list[str] | tuple[str, ...] = "full-ekf",
+    backend: str | list[str] | tuple[str, ...] | None = None,
     association: Association = "own",
     odometry: OdometrySource | None = None,
     second_looks: bool = False,
@@ -185,13 +187,14 @@ def replay(
     force: bool = False,
     watch: Watch = lambda step: None,
 ) -> Run | dict[str, Run]:
-    """Replay a log, or the log of a run, through one back end or several, as `chainslam replay` does.
+    """Map a log, or replay that of a run through one back end or several, as `chainslam replay` does.
 
+    Without a back end, a real robot's log is mapped by scan matching and offline refinement, and a run's by `full-ekf`.
     Returns the run, or for a list of names the runs by name. `relations` and `reference` are files with measurements,
-    and `second_looks` refines a real robot's log offline once it has ended. Raises UsageError for bad input.
+    and `second_looks` refines a real robot's log offline after each back end, too. Raises UsageError for bad input.
     """
     register_installed()
-    names = (backend,) if isinstance(backend, str) else tuple(backend)
+    names = () if backend is None else (backend,) if isinstance(backend, str) else tuple(backend)
     path = file_in(log.folder if isinstance(log, Run) else Path(log), "log.npz")
     for name in names:
         choose("back end", name, BACKENDS, OR_OWN)
@@ -205,13 +208,14 @@ def replay(
         settings_of(settings or {}),
     )
     check_references(references, *source.odometry)
+    names = (source.backend,) if backend is None else names
     runs: dict[str, Run] = {}
     folder, home = _folder(out)
     for name in names:
         own = folder / name if len(names) > 1 else folder
         said = source.config(name)
         runs[name] = _kept(own, home, said, force, partial(_replayed, source, name, watch, references))
-    return runs[backend] if isinstance(backend, str) else runs
+    return runs if isinstance(backend, list | tuple) else runs[names[0]]
 
 
 def _replayed(source: OwnLog | RealLog, name: str, watch: Watch, references: References) -> TrialResult:

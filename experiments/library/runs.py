@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 from weakref import finalize
 
 import numpy as np
@@ -19,10 +20,11 @@ from chainslam.slam.geometry.lines import directions, normals
 
 from ..artifacts.maps.map_files import read_map
 from ..artifacts.maps.mapped import MappedCorners, read_corners
-from ..artifacts.reading import read_json, told
+from ..artifacts.reading import told
 from ..artifacts.results import SUMMARY
-from ..artifacts.saved import Ended
+from ..artifacts.saved import read_summary
 from ..artifacts.schema import UnfitError
+from ..scoring.keys import Steps, Summary, Words
 from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REMEDY = "name a folder that explore or replay left"
-STEPS = "steps.csv"
+BROKEN = "another table, or one that was cut short"
 Picture = Literal["map", "visibility", "paths", "nees", "model", "traversals"]
 
 
@@ -75,14 +77,17 @@ class Run:
     _home: Home | None = field(default=None, repr=False, compare=False)
 
     @cached_property
-    def summary(self) -> dict[str, Any]:
-        """The keys of `summary.json`."""
-        return read_json(self.folder / SUMMARY, Ended, REMEDY)
+    def summary(self) -> Summary:
+        """The scores, by the keys of `summary.json`."""
+        return cast(Summary, read_summary(self.folder))
 
     @cached_property
-    def steps(self) -> Any:
-        """`steps.csv`, one row for each step: a pandas DataFrame, or arrays by name without pandas."""
-        return table_at(self.folder / STEPS)
+    def steps(self) -> Steps:
+        """An array for each column of `steps.csv`, with one entry for each step; `pandas.DataFrame` takes them all."""
+        path = self.folder / "steps.csv"
+        with told(path, REMEDY):
+            kinds, columns = Steps.__annotations__, _columns(path)
+            return cast(Steps, {name: _array(cells, kinds.get(name) == Words) for name, cells in columns.items()})
 
     @cached_property
     def map(self) -> Map:
@@ -135,23 +140,31 @@ class Run:
 def table_at(path: Path) -> Any:
     """Return a CSV table as a pandas DataFrame, or as arrays by name without pandas; raises UsageError."""
     with told(path, REMEDY):
-        file = regular(path)
         try:
             import pandas
         except ImportError:
-            with file.open(newline="", encoding="utf-8") as stream:
-                rows = list(csv.DictReader(stream))
-            return {name: _array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+            return {name: _array(cells) for name, cells in _columns(path).items()}
         try:
-            return pandas.read_csv(file)
+            return pandas.read_csv(regular(path))
         except (ValueError, pandas.errors.ParserError) as error:
-            raise UnfitError("another table, or one that was cut short") from error
+            raise UnfitError(BROKEN) from error
 
 
-def _array(cells: list[str]) -> np.ndarray:
-    """Return a column as numbers, with NaN for an empty cell; as text if it contains any."""
+def _columns(path: Path) -> dict[str, tuple[str, ...]]:
+    """Return the cells of a CSV table by column; raises UnfitError, OSError."""
     try:
-        return np.array([float(cell or "nan") for cell in cells])
+        with regular(path).open(newline="", encoding="utf-8") as stream:
+            names, *rows = csv.reader(stream)
+        columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+        return dict(zip(names, columns, strict=True))
+    except (ValueError, csv.Error) as error:
+        raise UnfitError(BROKEN) from error
+
+
+def _array(cells: Sequence[str], words: bool = False) -> np.ndarray:
+    """Return a column as numbers, with NaN for an empty cell; as text where `words`, or if any is no number."""
+    try:
+        return np.array(cells, dtype=np.str_) if words else np.array([float(cell or "nan") for cell in cells])
     except ValueError:
         return np.array(cells)
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from chainslam.slam.estimation.backend import PathKeeper
 
-from ..artifacts.trajectories import path_of, smoothed_path
+from ..artifacts.trajectories import estimated_path, smoothed_path
 from ..scoring.records import Log
 from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalised_relations, pair_covs_of
 from ..scoring.without_truth.references import References, scored_by
@@ -91,7 +91,7 @@ def held_against(result: TrialResult, references: References) -> TrialResult:
     log, smoothed = result.log, result.smoothed
     if log is None or (references.relations is None and references.path is None):
         return result
-    scores = scored_by(references, *path_of(result, log, log.estimated_world))
+    scores = scored_by(references, *estimated_path(result, log))
     if smoothed is not None:
         of_all = scored_by(references, *smoothed_path(result, log, smoothed))
         scores |= {f"{name}_smoothed": value for name, value in of_all.items()}

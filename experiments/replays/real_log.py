@@ -21,11 +21,11 @@ from chainslam.slam.mapper import Mapper
 
 from ..artifacts.saved import cut_short, read_trial
 from ..artifacts.settings import asked, record_of, trial_of
-from ..scenario import STRATEGY_OF_REPLAYS, OdometrySource, Scenario, TrialConfig, heard_by
+from ..scenario import OFFLINE, STRATEGY_OF_REPLAYS, OdometrySource, Scenario, TrialConfig, heard_by
 from ..scoring.summary import Ending, odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
-from .looked_again import looked_again
+from .looked_again import PathMapper, looked_again
 from .motion_of_scans import motion_of_scans
 from .replay import OPEN_TO_REPLAYS
 from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
@@ -48,7 +48,7 @@ class RealOptions:
     odometry: OdometrySource | None = None
     """Source of the motion between two keyframes; None for that of the drive, or scan matching for logs of others."""
     second_looks: bool = False
-    """Whether to refine offline once the drive has ended; back ends that smooth always do."""
+    """Whether to refine offline once the drive has ended; without a back end, and with those that smooth, always."""
     range_noise: float | None = None
     """Standard deviation of a range, if the scanner's is known; None for the default of all logs."""
     scan_topic: str | None = None
@@ -95,7 +95,7 @@ def read_real_run(
     except RecordingError as error:
         raise UsageError(str(error)) from error
     options = replace(options, odometry=options.odometry or "scans")
-    plain = TrialConfig(path.name, strategy=STRATEGY_OF_REPLAYS, p0="zero")
+    plain = TrialConfig(path.name, OFFLINE, STRATEGY_OF_REPLAYS, p0="zero")
     settled = record_of(plain).keys() - set(OPEN_TO_REPLAYS)
     at_axle = {"robot": {"scanner": record_of(plain)["robot"]["scanner"]}}
     trial = trial_of(record_of(plain), REAL_WALLS, robot, at_axle, asked(config, dict(named), settled))
@@ -143,28 +143,48 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
 
 
 def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
-    """Map it, without offline refinement."""
+    """Map it, without offline refinement; for `OFFLINE`, add up its path."""
     scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
         heard = heard_by(run.options.odometry or run.trial.odometry, scenario.robot, scenario.config)
-        mapper = Mapper(scenario.backend, scenario.config.mission.mapper)
+        make = PathMapper if backend == OFFLINE else Mapper
+        mapper = make(scenario.backend, scenario.config.mission.mapper)
         return ride_mission(heard, mapper, len(run.log.recording), run.cut_short, run.unread)
 
     return run_unwitnessed(scenario, watch, mission, run.log)
 
 
-def looked_over(run: RealRun, result: TrialResult) -> TrialResult:
-    """Return a mapped log after offline refinement, if it was asked for.
+def looked_over(run: RealRun, result: TrialResult, watch: Callable[[float], None] = lambda share: None) -> TrialResult:
+    """Return a mapped log after offline refinement, if it was asked for or there is no other map.
 
-    If the refinement is interrupted, the mapped result is kept.
+    `watch` hears of the share that is done. If it raises KeyboardInterrupt, what was found so far makes the map; if
+    anything else does, the mapped result is kept.
     """
-    asked_for = run.options.second_looks or result.smoothed is not None
-    if not asked_for or result.ending.outcome is Outcome.INTERRUPTED:
+    is_offline, ended = result.scenario.config.backend == OFFLINE, result.ending
+    asked_for = is_offline or run.options.second_looks or result.smoothed is not None
+    if not asked_for or (ended.outcome is Outcome.INTERRUPTED and not is_offline):
         return result
+    stopped = [ended] if ended.outcome is Outcome.INTERRUPTED else []
+
+    def goes_on(share: float) -> bool:
+        try:
+            watch(share)
+        except KeyboardInterrupt as interrupt:
+            stopped.append(_interrupted(interrupt))
+        return not stopped
+
     try:
-        return looked_again(result)
+        refined = looked_again(result, goes_on)
+        return _ended(refined, stopped[0]) if stopped else refined
     except KeyboardInterrupt as interrupt:
-        ending = Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'} during offline refinement")
-        said = {"status": ending.status, "reason": ending.reason, "outcome": str(ending.outcome)}
-        return replace(result, ending=ending, smoothed=None, summary=result.summary | said)
+        return replace(_ended(result, _interrupted(interrupt)), smoothed=None)
+
+
+def _interrupted(interrupt: KeyboardInterrupt) -> Ending:
+    return Ending(Outcome.INTERRUPTED, f"interrupted by {str(interrupt) or 'Ctrl-C'} during offline refinement")
+
+
+def _ended(result: TrialResult, ending: Ending) -> TrialResult:
+    said = {"status": ending.status, "reason": ending.reason, "outcome": str(ending.outcome)}
+    return replace(result, ending=ending, summary=result.summary | said)

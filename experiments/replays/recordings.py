@@ -30,6 +30,7 @@ def recorded(made: TrialResult) -> RecordedRun:
         log.scan_start_s,
         log.fans,
         log.resolution_m,
+        log.carried,
     )
     return RecordedRun(
         scenario.config, recording, scenario.start_estimate, scenario.start_cov, log.true_world, log.face_of_beam

@@ -78,6 +78,8 @@ class RecordedRun:
     start_cov: Float[np.ndarray, "3 3"]
     true_poses_world: Float[np.ndarray, "s 3"]
     true_face_of_beam: Int[np.ndarray, "s k"]
+    true_faces: Float[np.ndarray, "f 2 2"] | None = None
+    """The faces of its world; None where the world itself is at hand."""
     cut_short: str = ""
     """Why the drive ended early, in words."""
 
@@ -120,7 +122,7 @@ def run_of(arrays: dict[str, np.ndarray], trial: Callable[[], TrialConfig]) -> R
         raise UsageError(
             "expected a log with the truth, found one that does not come from a simulated run: record it again"
         )
-    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces)
+    return RecordedRun(trial(), recording, arrays["start_pose"], cov, poses, faces, arrays["true_faces"])
 
 
 class ReplayedRobot(RecordedRobot):
@@ -146,7 +148,7 @@ class ReplayedRobot(RecordedRobot):
     def drive(self, command: MotionCommand) -> Odometry:
         """Go to the next scan."""
         odometry = super().drive(command)
-        self._record.path_length_m += float(np.hypot(*odometry.motion[:2]))
+        self._record.path_length_m += odometry.path_m
         self._record.collisions += odometry.touched
         return odometry
 
@@ -185,6 +187,9 @@ def replay(
     check(config)
     world = world or load_world(config.world, config.start, config.drawing)
     recording = run.recording
+    if recording.carried is not None:  # Start and limits in the settings are those of the last session.
+        world = replace(world, start=run.true_poses_world[0])
+        config = replace(config, max_steps=len(recording) + 1, max_path_m=None, time_limit_s=None)
     if options.perfect_odometry:
         recording = replace(recording, odometry=true_odometry(run.true_poses_world))
     backend_made = make_backend(config, run.start_pose, run.start_cov)

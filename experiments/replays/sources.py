@@ -11,6 +11,7 @@ from chainslam.explore.step import Step
 from chainslam.sim.worlds import World
 
 from ..artifacts.results import REPLAY, config_record
+from ..scenario import OFFLINE, TrialConfig
 from ..scoring.summary import odometry_poses
 from ..trial import TrialResult
 from .real_log import RealRun, looked_over, mapped_real, replay_real, replayed_real
@@ -32,6 +33,8 @@ class OwnLog:
     run: RecordedRun
     options: ReplayOptions
     world: World
+    backend: str = TrialConfig.backend
+    """What replays it unless a back end is named."""
 
     @property
     def title(self) -> str:
@@ -91,9 +94,14 @@ class RealLog:
         """Map it."""
         return mapped_real(self.run, backend, watch)
 
-    def looked_over(self, result: TrialResult) -> TrialResult:
+    def looked_over(self, result: TrialResult, watch: Callable[[float], None]) -> TrialResult:
         """Refine a result offline."""
-        return looked_over(self.run, result)
+        return looked_over(self.run, result, watch)
+
+    @property
+    def backend(self) -> str:
+        """What maps it unless a back end is named: offline refinement, if somebody else recorded it."""
+        return OFFLINE if self.run.trial.backend == OFFLINE else TrialConfig.backend
 
     @property
     def odometry(self) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s 3"]]:

@@ -72,7 +72,7 @@ def _figure(search: Search) -> Figure:
     words = "path length, m", "trace of the pose covariance over the start's"
     paint_curves(trace, log_of(drive.made).path_length_m, curves, words)
     trace.axhline(1.0, color=palette.INK, linewidth=0.8, linestyle="--")
-    trace.set_title("(a) no look tells where the world lies: below 1 is wrong", fontsize=8, loc="left")
+    trace.set_title("(a) no scan observes the world frame: below 1 is overconfident", fontsize=8, loc="left")
     step = drive.steps[-1 if double is None else double.standing[-1]]
     small = small_map(drive.made, "", step.map, step.chains, step.index + 1)
     points = np.concatenate([small.ends_world.reshape(-1, 2), *small.true_floor])
@@ -92,8 +92,8 @@ def _paint_space(axes: Axes, double: Double) -> None:
     first, second = double.space.rows(double.ids)
     middle = double.space.ends_world[first].mean(axis=0)
     theirs = double.space.about(middle)
-    paint_ellipses(axes, theirs.lines_world[[first]], theirs.covs[[first]], palette.ALARM, "A, as the map held it")
-    paint_ellipses(axes, theirs.lines_world[[second]], theirs.covs[[second]], palette.REFUSED, "A*, as it was seen")
+    paint_ellipses(axes, theirs.lines_world[[first]], theirs.covs[[first]], palette.ALARM, "A in the map")
+    paint_ellipses(axes, theirs.lines_world[[second]], theirs.covs[[second]], palette.REFUSED, "A*, observed")
     for row, name, colour, down in ((first, "A", palette.ALARM, 5), (second, "A*", palette.REFUSED, -12)):
         axes.annotate(
             name, theirs.lines_world[row], xytext=(5, down), textcoords="offset points", size=10, weight="bold",

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from chainslam.explore.planning.visibility_graph import NEIGHBOUR, SIGHT
 from chainslam.viz import palette
+from chainslam.viz.figures.map_axes import scale_bar
 from chainslam.viz.figures.panels import panels
 from chainslam.viz.figures.visibility import GraphPicture, extent_of, paint_graph
 
@@ -25,6 +26,8 @@ PLANNED = f"planned from wall {FROM} to wall {TO}"
 LENGTH, WALLS = "walls of this route", "walls in the graph"
 SAID: Said = {PLANNED: "8, 3, 12, 15, 16", LENGTH: 5, WALLS: 16}
 PANEL_INCH = (6.1, 6.1)
+BAR_BELOW = 0.05
+"""The scale bar lies so far below a panel, as a share of its height."""
 RADIUS_POINTS = 6.2
 
 
@@ -97,6 +100,8 @@ def _figure(drive: RouteDrive) -> Figure:
     place.set_xlim(low[0], high[0])
     place.set_ylim(low[1], high[1])
     metres = log_of(drive.made).path_length_m[drive.steps[0]]
+    for axes in (place, graph):
+        scale_bar(axes, float((high - low)[0]), BAR_BELOW)
     place.set_title(f"(a) the environment, explored in {metres:.1f} m", fontsize=9, loc="left")
     return figure
 

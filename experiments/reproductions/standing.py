@@ -34,7 +34,7 @@ def reproduce(seed: int) -> Reproduction:
         _figure({"0.1 m, 2 degrees": large, "0.01 m, 0.1 degree": small}),
         (
             f"{LOOKS} looks at the same walls, P0 large, seed {seed}; no noise of the wheels, for they do not turn.",
-            "The column of the paper holds what is right: a look tells nothing of where the world lies.",
+            "The column of the paper holds the right values: no scan observes where the world lies.",
         ),
     )
 

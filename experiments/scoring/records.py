@@ -95,6 +95,8 @@ class Log:
     """The first route with the most walls."""
     fans: Float[np.ndarray, "s 3"] | None = None
     """As `Recording.fans`: the beams of each scan, where they differ."""
+    carried: Bool[np.ndarray, " s"] | None = None
+    """As `Recording.carried`: first steps of later sessions; None for one session."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -162,6 +164,7 @@ class Recorder:
                 "heard": step.odometry.motion,
                 "heard_cov": step.odometry.cov,
                 "touched": step.odometry.touched,
+                "carried": step.odometry.carried,
                 "estimated_world": belief.pose_world,
                 "estimated_cov": belief.pose_cov,
                 "from_start_world": from_start_world,
@@ -207,10 +210,12 @@ class Recorder:
         count, first, pitch = fans[np.argmax(fans[:, 0])]
         is_like = len(scan.bearings_rad) == count
         columns["face_of_beam"] = columns["face_of_beam"].astype(np.int64)
+        carried = columns.pop("carried")
         return Log(
             bearings_rad=scan.bearings_rad if is_like else first + pitch * np.arange(int(count)),
             sigma_m=np.resize(np.asarray(scan.sigma_m, dtype=np.float64), int(count)),
             fans=differing(fans),
+            carried=carried if carried.any() else None,
             sigma_share=scan.sigma_share,
             resolution_m=scan.resolution_m,
             range_max_m=float(scan.range_max_m),

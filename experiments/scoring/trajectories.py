@@ -27,8 +27,12 @@ def aligned(
     estimated_world: Float[np.ndarray, "s 3"], true_world: Float[np.ndarray, "s 3"]
 ) -> Float[np.ndarray, "s 3"]:
     """Return the estimated path after the rigid motion that brings its positions nearest to the true ones."""
-    motion = alignment_of_paths(estimated_world, true_world)
-    return np.column_stack([to_world(estimated_world[:, :2], motion), wrap(estimated_world[:, 2] + motion[2])])
+    return moved(estimated_world, alignment_of_paths(estimated_world, true_world))
+
+
+def moved(poses_world: Float[np.ndarray, "s 3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "s 3"]:
+    """Return poses after a rigid motion (m, m, rad) of the world."""
+    return np.column_stack([to_world(poses_world[:, :2], motion), wrap(poses_world[:, 2] + motion[2])])
 
 
 def alignment_of_paths(

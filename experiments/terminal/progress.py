@@ -1,5 +1,6 @@
-"""What a person sees of a run while it goes on: a progress line."""
+"""What a person sees of a run while it goes on: a progress line, or lines in a file."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
@@ -19,10 +20,12 @@ from chainslam.explore.step import Step
 from chainslam.slam.extraction.curved_share import SCANS, curved_beams, few_straight, returns_of_scan
 
 from .answers import is_quiet
-from .console import plain_console
+from .console import plain_console, say
 
 ALMOST = 0.95
 """A run that takes longer than expected stays at this share of its bar."""
+EVERY_S = 10.0
+"""In a file there is a line so often."""
 
 
 @contextmanager
@@ -47,6 +50,36 @@ def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step]
             bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch
+
+
+@contextmanager
+def share_of(title: str) -> Iterator[Callable[[float], None]]:
+    """Show on standard error which share of some work is done; where that is not a terminal, in lines."""
+    in_file = in_lines(title)
+    with bar_of(title, 1.0) as (bar, task):
+
+        def watch(share: float) -> None:
+            bar.update(task, completed=share)
+            in_file(share)
+
+        yield watch
+
+
+def in_lines(title: str) -> Callable[[float], None]:
+    """Return what tells in lines on standard error which share is done, unless that is a terminal."""
+    began = last = time.monotonic()
+    silent = is_quiet() or plain_console(stderr=True).is_terminal
+
+    def tell(share: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if silent or now - last < EVERY_S or not 0.0 < share <= 1.0:
+            return
+        last = now
+        left = duration((now - began) * (1.0 - share) / share)
+        say(f"chainslam: {title}: {100.0 * share:.0f} % after {duration(now - began)}, {left} left", stderr=True)
+
+    return tell
 
 
 @contextmanager

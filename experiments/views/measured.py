@@ -7,6 +7,7 @@ from typing import Any
 
 from chainslam.viz.reports.report import PageTable, table
 
+from ..scenario import OFFLINE
 from .numbers import number, percent
 
 Row = dict[str, Any]
@@ -49,16 +50,22 @@ def _spread(found: Row | None, name: str, turn: bool) -> str:
 
 
 def _relations(summaries: Sequence[Row]) -> Iterator[Row]:
-    for summary, (tail, path) in product(summaries, PATHS.items()):
-        scores = summary.get("relations" + tail) or {}
-        for (times, words), (part, far) in product(TIMES.items() if scores else (), PARTS.items()):
-            yield {"estimator": summary["backend"], "path": path, "relations": words + far, **scores[times][part]}
+    for named, scores in _scores(summaries, "relations"):
+        for (times, words), (part, far) in product(TIMES.items(), PARTS.items()):
+            yield {**named, "relations": words + far, **scores[times][part]}
 
 
 def _references(summaries: Sequence[Row]) -> Iterator[Row]:
+    for named, scores in _scores(summaries, "reference"):
+        yield {**named, **scores}
+
+
+def _scores(summaries: Sequence[Row], kind: str) -> Iterator[tuple[Row, Row]]:
+    """Yield the scores of each path of each run; without a back end there is one path, the smoothed one."""
     for summary, (tail, path) in product(summaries, PATHS.items()):
-        if scores := summary.get("reference" + tail):
-            yield {"estimator": summary["backend"], "path": path, **scores}
+        scores, smoothed = summary.get(kind + tail), summary.get(f"{kind}_smoothed")
+        if scores and not (summary["backend"] == OFFLINE and smoothed and not tail):
+            yield {"estimator": summary["backend"], "path": path}, scores
 
 
 def _stated(summaries: Sequence[Row]) -> Iterator[Row]:

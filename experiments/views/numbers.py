@@ -1,6 +1,6 @@
 """Readable numbers: three significant digits, no powers of ten, intervals in brackets."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,3 +59,9 @@ def estimated(found: Mapping[str, Any] | None, scale: float = 1.0, digits: int =
 def listed(words: Sequence[str]) -> str:
     """Return words as a list in a sentence."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def markdown(table: Iterable[Sequence[str]]) -> str:
+    """Return a table as Markdown; its first row holds the names of the columns."""
+    head, *lines = ["| " + " | ".join(cells) + " |" for cells in table]
+    return "\n".join([head, "|" + "---|" * (head.count(" | ") + 1), *lines])

@@ -135,7 +135,7 @@ def draw_all(runs: Sequence[PicturedRun]) -> dict[str, Callable[[], Figure]]:
     true, wheels = first.log["true_poses"], odometry_poses(first.log["true_poses"][0], first.log["odometry"])
     colours = [palette.of_backend(trial.backend)] * count
     return {
-        "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and believed", wheels),
+        "paths": lambda: draw_trajectories(true, paths, rings, f"{title}: paths, true and estimated", wheels),
         "nees": lambda: draw_nees([_curve(run) for run in runs]),
         "model": lambda: draw_model_space(lines, covs, colours, f"{title}, {trial.backend}"),
         "traversals": lambda: draw_traversal(true, rings, f"{title}: how often each stretch was driven"),

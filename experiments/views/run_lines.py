@@ -1,11 +1,14 @@
 """A run in a few lines: what happened, and how consistent the estimate is; and what the robot noticed of itself."""
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from math import degrees
 from typing import Any
 
+from chainslam.explore.outcome import Outcome
 from chainslam.slam.association.ranges.errors import RangeErrors
+from chainslam.slam.evaluation.consistency import CONSISTENT, NOISE_MODELS, noise_model
 from chainslam.slam.extraction.curved_share import MOSTLY
 
 from .numbers import listed, number, percent
@@ -14,6 +17,10 @@ Row = dict[str, Any]
 SCATTER = (0.2, 3.0)
 """Approximate range of the ANEES of single runs of a consistent estimator."""
 
+ENDED = (Outcome.ALL_CLOSED, Outcome.NONE_REACHABLE, Outcome.ENDS_LEFT)
+"""Outcomes of runs that were not stopped: what these left could not be reached."""
+MOST = 3
+"""So many gaps are named; summary.json has all."""
 MOST_LOCKED = 0.9
 """Share of its own path up to which a robot has locked itself in, or its map contradicts the path."""
 
@@ -22,7 +29,28 @@ def lines_of(summaries: Sequence[Row]) -> tuple[str, ...]:
     """Return what happened, and how consistent each back end is, from the summaries of runs of one drive."""
     happened = f"{'; '.join(_happened(summaries))}."
     moved = [summary for summary in summaries if summary.get("steps")]
-    return (happened, f"{_consistent(moved)}.") if moved else (happened,)
+    left = f"{_left(summaries[0])}." if len(summaries) == 1 and _left(summaries[0]) else ""
+    return (*filter(None, (happened, left)), f"{_consistent(moved)}.") if moved else (happened,)
+
+
+def _left(summary: Row) -> str:
+    """Return what a run that found no more to do did not reach, and why; nothing where it reached all."""
+    if summary.get("outcome") not in ENDED:
+        return ""
+    certificate = summary.get("certificate") or {}
+    ends = Counter(end["why"] for end in certificate.get("open_ends") or ())
+    told = [f"{number(sum(ends.values()))} open end{'s' * (sum(ends.values()) > 1)}: {_counted(ends)}"] if ends else []
+    gaps = certificate.get("narrow_gaps") or ()
+    told += [f"floor behind ({', '.join(number(x) for x in gap['position_m'])}) m: {gap['why']}" for gap in gaps[:MOST]]
+    told += [f"floor behind {number(len(gaps) - MOST)} more such gaps"] if len(gaps) > MOST else []
+    return f"not reached: {'; '.join(told)}" if told else ""
+
+
+def _counted(reasons: Counter[str]) -> str:
+    """Return reasons, each with how often it occurs if there are several."""
+    if len(reasons) == 1:
+        return next(iter(reasons))
+    return ", ".join(f"{words} ({number(count)})" for words, count in reasons.most_common())
 
 
 def _happened(summaries: Sequence[Row]) -> list[str]:
@@ -64,7 +92,7 @@ def _errs(summary: Row) -> str:
 def _untrue(summary: Row) -> str:
     """Return the walls, and the errors of measured relations where there are any; of the smoothed path if there is one.
 
-    Without them the NIS is all that tells of consistency.
+    Without them the NIS is all that tells of consistency, and what it says of the noise model is told where it is off.
     """
     looked = summary.get("second_looks") or summary
     words = f"{number(looked['lines'])} walls, {number(looked['duplicate_lines'])} of them duplicates"
@@ -75,8 +103,14 @@ def _untrue(summary: Row) -> str:
         words += f"; median error of {number(relations['count'])} relations {number(metres)} m and"
         words += f" {number(degrees(turn))} degrees"
     stated = (summary.get(f"relations{tail}_normalised") or {}).get("all", {}).get("anees")
-    ideal = ("ANEES", stated) if stated is not None else ("NIS", summary.get("nis"))
-    return f"{words}, {ideal[0]} {number(ideal[1])} (1 is ideal)"
+    if stated is not None:
+        return f"{words}, ANEES {number(stated)} (1 is ideal)"
+    nis, share = summary.get("nis"), summary.get("nis_in_band")
+    if nis is None:
+        return words
+    model = CONSISTENT if share is None else noise_model(nis, share)
+    meaning = "" if model == CONSISTENT else f"; {NOISE_MODELS[model]}"
+    return f"{words}, NIS {number(nis)} (1 is ideal{meaning})"
 
 
 def notes_of(summary: Row) -> list[str]:
@@ -86,18 +120,31 @@ def notes_of(summary: Row) -> list[str]:
         "lost_steps": "steps without a place in the map",
         "own_beams": "returns from the robot's own body, left out",
     }
-    notes = [f"{number(summary[key])} {words}" for key, words in counts.items() if summary.get(key)]
+    notes = [words_on_session(summary["session"])] if summary.get("session") else []
+    notes += [f"{number(summary[key])} {words}" for key, words in counts.items() if summary.get(key)]
     notes += [f"the scanner's ranges have {words}" for words in words_on_ranges(range_errors_of(summary))]
     if (summary.get("curved_share") or 0.0) > MOSTLY:
         notes.append(
             f"few straight walls: {percent(summary['curved_share'])} % of the first returns are on curved ones"
         )
-    if (factor := summary.get("wheel_noise_factor", 1.0)) != 1.0:
+    if (factor := summary.get("wheel_noise_factor") or 1.0) != 1.0:
         notes.append(f"the noise of the wheels is {number(factor)} times as large as stated")
     way_back = (summary.get("certificate") or {}).get("reachable_way")
     if way_back is not None and way_back <= MOST_LOCKED:
         notes.append(f"the robot can drive only {percent(way_back)} % of its path again")
     return notes
+
+
+def words_on_session(said: Row) -> str:
+    """Return where a later session found itself in the map of an earlier one, or why it has a map of its own."""
+    places = listed([f"({x:.2f}, {y:.2f}) m, {degrees(turn):.0f} degrees" for x, y, turn in said["places_world"]])
+    if said["first_step"]:
+        after = number(said["placed_at_step"] - said["first_step"] + 1)
+        return f"the robot's place in the map of {said['map']} was found after {after} scans; both sessions are one map"
+    why = {0: "nothing fits", 1: f"it may be {places}, but only one search says so"}.get(
+        len(said["places_world"]), f"two places are possible: {places}"
+    )
+    return f"the robot's place in the map of {said['map']} was not found ({why}): this session has a map of its own"
 
 
 def words_on_ranges(errors: RangeErrors) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from chainslam.sim.logs.archive import regular
-from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.evaluation.consistency import NOISE_MODELS, noise_model
 from chainslam.viz import palette
 from chainslam.viz.figures.maps import Picture, saved
 from chainslam.viz.figures.panels import map_figures
@@ -27,7 +27,7 @@ from ..artifacts.settings import KEYS, differing, leaves, options_of
 from ..replays.real_log import REAL_WALLS
 from ..replays.replay import OPEN_TO_REPLAYS, ReplayOptions, read_options
 from ..replays.sources import RECORDED, was_real
-from ..scenario import STRATEGY_OF_REPLAYS, TrialConfig
+from ..scenario import OFFLINE, STRATEGY_OF_REPLAYS, TrialConfig
 from ..scoring.maps.measurements import Measured
 from ..usage import UsageError
 from .measured import measured_tables
@@ -153,7 +153,7 @@ def _told(value: Any, scale: float) -> str:
 def _more(run: Row) -> Row:
     """Return further figures of a run: the verdict of the NIS on the stated noise, and those of offline refinement."""
     nis, share = run.get("nis"), run.get("nis_in_band")
-    noise = None if nis is None or share is None else verdict_on_noise(nis, share)
+    noise = None if nis is None or share is None else NOISE_MODELS[noise_model(nis, share)]
     return {"noise": noise} | {f"refined_{key}": value for key, value in (run.get("second_looks") or {}).items()}
 
 
@@ -265,7 +265,8 @@ def _command_real(trial: TrialConfig, names: list[str], said: Any) -> str:
     """Return the command that maps a real robot's log again."""
     of_every_log = list(leaves(REAL_WALLS))
     tuned = [item for item in differing(trial) if item[0].split(".")[0] in OPEN_TO_REPLAYS and item not in of_every_log]
-    words = ["chainslam", "replay", trial.world, "--backend", *names, *options_of(tuned)]
+    named = [] if names == [OFFLINE] else ["--backend", *names]
+    words = ["chainslam", "replay", trial.world, *named, *options_of(tuned)]
     for key, value in sorted(said[RECORDED].items()):
         words += [] if value is False else _option(key, value)
     return shlex.join([*words, "--out", "DIR"])

@@ -59,7 +59,7 @@ def saved_map(
     world = load_world(trial.world, trial.start, trial.drawing)
     return over_truth(
         world, trial, summary, _map(walls), _chains(features["chain"]),
-        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"],
+        tuple(aside), covs, estimated_world, log["true_poses"], log["start_pose"], log.get("carried"),
     )  # fmt: skip
 
 

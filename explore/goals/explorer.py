@@ -246,7 +246,7 @@ class Explorer:
         if not in_time:
             self._ledger.put_aside(end, late)
         elif errand.looks_done:
-            self._ledger.put_aside(end, f"still open after {errand.looks_done} views")
+            self._ledger.put_aside(end, f"still open after {errand.looks_done} view{'s' * (errand.looks_done > 1)}")
         else:
             known = known_floor(around.free_space, end.position_world, following.viewpoints.near_m)
             self._ledger.put_aside(end, errand.trouble, known)

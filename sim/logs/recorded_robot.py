@@ -36,6 +36,7 @@ LATER = {
     "scan_start_s": "float s",
     "fans": "float s 3",
     "resolution_m": "float",
+    "carried": "bool s",
 }
 """Arrays that older logs lack."""
 MOST_M = 1e6
@@ -75,6 +76,8 @@ class Recording:
     """Number of beams of each scan, bearing of the first one and step to the next, rad; None if they are all equal."""
     resolution_m: float = 0.0
     """Resolution of the ranges; 0 for none."""
+    carried: Bool[np.ndarray, " s"] | None = None
+    """Whether each scan is the first of a later session, to which the robot was carried; None for one session."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -120,8 +123,7 @@ class RecordedRobot:
 
     def sense(self) -> Scan:
         """Return the scan at the present position of the recording."""
-        r = self._recording
-        return r.scan(self._at)
+        return self._recording.scan(self._at)
 
     def drive(self, command: MotionCommand) -> Odometry:
         """Go to the next scan, whatever the command; raises EOFError at the end of the recording."""
@@ -130,7 +132,8 @@ class RecordedRobot:
         self._at += 1
         r = self._recording
         touched = r.touched is not None and bool(r.touched[self._at])
-        return Odometry(r.odometry[self._at], r.odometry_cov[self._at], touched)
+        carried = r.carried is not None and bool(r.carried[self._at])
+        return Odometry(r.odometry[self._at], r.odometry_cov[self._at], touched, carried=carried)
 
 
 def read_log(source: Path | bytes) -> dict[str, np.ndarray]:
@@ -164,7 +167,7 @@ def recording_of(arrays: Mapping[str, np.ndarray]) -> Recording:
         arrays["time_s"], arrays["bearings_rad"], arrays["ranges_m"], arrays["sigma_m"],
         float(arrays["range_max_m"]), arrays["odometry"], arrays["odometry_cov"], arrays.get("touched"),
         float(arrays.get("sigma_share", 0.0)), arrays.get("scan_start_s"), arrays.get("fans"),
-        float(arrays.get("resolution_m", 0.0)),
+        float(arrays.get("resolution_m", 0.0)), arrays.get("carried"),
     )  # fmt: skip
     for wrong, words in _faults(recording):
         if wrong:

@@ -61,7 +61,7 @@ def read_bag(
     at = 0
     try:
         with (
-            _by_another_name(path) as named,
+            named_as_its_kind(path) as named,
             AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader,
         ):
             for scan in _scans(reader, wanted or TopicsWanted(), [] if notes is None else notes):
@@ -77,7 +77,7 @@ def read_bag(
 
 
 @contextmanager
-def _by_another_name(path: Path) -> Iterator[Path]:
+def named_as_its_kind(path: Path) -> Iterator[Path]:
     """Yield a path to the same bag; rosbags treats everything named `*.bag` as a ROS 1 file, even a folder."""
     if not (path.is_dir() and path.suffix == ".bag"):
         yield path

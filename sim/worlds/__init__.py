@@ -3,7 +3,7 @@
 from .contour import Contour
 from .drawing import WorldError
 from .options import AS_DRAWN, DrawingOptions
-from .registry import WORLDS, listing, load
+from .registry import WORLDS, is_own, listing, load
 from .world import World
 
-__all__ = ["AS_DRAWN", "WORLDS", "Contour", "DrawingOptions", "World", "WorldError", "listing", "load"]
+__all__ = ["AS_DRAWN", "WORLDS", "Contour", "DrawingOptions", "World", "WorldError", "is_own", "listing", "load"]

@@ -28,7 +28,7 @@ class Contour:
     segments: Float[np.ndarray, "m 2 2"]
     """The intervals as points, m, world frame, free side on the left."""
     rings: Int[np.ndarray, " c"]
-    """Rings with a visible part of at least 0.1 m, or half of a shorter ring."""
+    """Rings with a visible part of at least 0.1 m, or half of a shorter ring; within the fence, where there is one."""
 
     @property
     def length_m(self) -> float:

@@ -82,6 +82,11 @@ def listing() -> dict[str, str]:
     return {name: world.about for name, world in WORLDS.items()} | families
 
 
+def is_own(name: str) -> bool:
+    """Return whether a name is that of a bundled world, or of one of a family, and no file's."""
+    return name in WORLDS or (":" in name and name.partition(":")[0] in FAMILIES)
+
+
 def load(
     name_or_path: str | Path,
     start: tuple[float, ...] | Float[np.ndarray, " k"] | None = None,
@@ -117,8 +122,8 @@ def _read(text: str, options: DrawingOptions) -> tuple[str, Drawing]:
     if text in WORLDS:
         options.check_only(("layers", "ids", "without"), "a bundled world")
         return text, _read_svg((HERE / WORLDS[text].file).read_bytes(), options)
-    family, colon, which = text.partition(":")
-    if colon and family in FAMILIES:
+    if is_own(text):
+        family, _, which = text.partition(":")
         options.check_only((), "a random world")
         return text, FAMILIES[family].read(which)
     if not text.isprintable():

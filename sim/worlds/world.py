@@ -1,6 +1,6 @@
 """A building: its free space, its faces, and what a robot can reach and see of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -78,10 +78,16 @@ class World:
     ) -> Contour:
         """Return the parts of the faces in line of sight within range of a reachable scanner position.
 
-        The scanner is `scanner_m` from the middle of the disc, in any direction.
+        Of its `rings` those that leave the fence are left out. The scanner is `scanner_m` from the middle of the disc,
+        in any direction.
         """
         lookouts, off_m = self.lookouts(radius_m, scanner_m), min(scanner_m, radius_m)
-        return visible_contour(self.faces, self.face_rings, lookouts, radius_m - off_m, range_m)
+        seen = visible_contour(self.faces, self.face_rings, lookouts, radius_m - off_m, range_m)
+        if self.fence is None:
+            return seen
+        # A ring that leaves the fence ends there for the robot, so that no chain can close it.
+        within = [ring for ring in seen.rings if self.fence.covers(self._rings[ring])]
+        return replace(seen, rings=np.array(within, dtype=np.int64))
 
     def lookouts(self, radius_m: float, scanner_m: float) -> shapely.Polygon:
         """Return the possible positions of a scanner this far from the middle of a disc, at most on its rim."""

@@ -66,6 +66,8 @@ class Place:
     """Mean likelihood of the points; 1 is a perfect fit."""
     rival: float
     """That of the best place apart from it, 0 where none comes near it."""
+    rival_pose: Float[np.ndarray, "3"] | None = None
+    """That place."""
 
     def is_right(self, config: PlaceSearchConfig) -> bool:
         """Return whether it is a fit, and no other place nearly as good."""
@@ -104,10 +106,12 @@ def place_on(
     moved = window.guess[:2] + c.cell_m * found[:, :0:-1][:, :2]
     poses = np.column_stack([moved, angles[found[:, 1].astype(np.int64)]])
     best = int(np.argmax(found[:, 0]))
-    rival = float(found[apart(poses, poses[best], c), 0].max(initial=0.0))
+    others = np.flatnonzero(apart(poses, poses[best], c))
+    second = int(others[np.argmax(found[others, 0])]) if len(others) else None
+    rival, rival_pose = (0.0, None) if second is None else (float(found[second, 0]), poses[second])
     fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.cell_m, 4)
     pose, _ = refine(fine, points, poses[best], 0.5 * c.step_rad, 0.1 * c.cell_m)
-    return Place(pose, float(found[best, 0]), rival)
+    return Place(pose, float(found[best, 0]), rival, rival_pose)
 
 
 def place_of(
@@ -120,13 +124,11 @@ def place_of(
 
     A `likely_world` pose is taken where no other explains much more.
     """
-    points = _along(segments.take(np.flatnonzero(~segments.is_tentative)).ends, config.cell_m)
-    surface_world = _along(walls.ends_world, 0.5 * config.cell_m)
+    points = along(segments.take(np.flatnonzero(~segments.is_tentative)).ends, config.cell_m)
+    surface_world = along(walls.ends_world, 0.5 * config.cell_m)
     if not len(points) or not len(surface_world):
         return None
-    low, high = surface_world.min(axis=0), surface_world.max(axis=0)
-    half_m = 0.5 * float((high - low).max()) + float(np.hypot(*points.T).max())
-    best = place_on(surface_world, points, Window(np.array([*(0.5 * (low + high)), 0.0]), half_m, np.pi), config)
+    best = place_anywhere(surface_world, points, config)
     if likely_world is not None:
         likely = place_on(surface_world, points, Window(likely_world, 0.0, 0.0), config)
         if likely is not None and (best is None or likely.score >= config.rival * best.score):
@@ -134,6 +136,15 @@ def place_of(
     return best.pose if best is not None and best.is_right(config) else None
 
 
-def _along(ends: Float[np.ndarray, "n 2 2"], every_m: float) -> Float[np.ndarray, "m 2"]:
+def place_anywhere(
+    surface_world: Float[np.ndarray, "m 2"], points: Float[np.ndarray, "n 2"], config: PlaceSearchConfig
+) -> Place | None:
+    """Return the place that lays points, robot frame, best on known surfaces, whichever way the robot is turned."""
+    low, high = surface_world.min(axis=0), surface_world.max(axis=0)
+    half_m = 0.5 * float((high - low).max()) + float(np.hypot(*points.T).max())
+    return place_on(surface_world, points, Window(np.array([*(0.5 * (low + high)), 0.0]), half_m, np.pi), config)
+
+
+def along(ends: Float[np.ndarray, "n 2 2"], every_m: float) -> Float[np.ndarray, "m 2"]:
     """Return the points of line segments, no farther apart than that."""
     return np.concatenate([np.zeros((0, 2)), *(joined(pair, every_m, np.inf) for pair in ends)])

@@ -48,6 +48,8 @@ class BackendEntry:
     """Whether it gains no information along the unobservable directions: the position and heading of everything."""
     carries_start: bool = False
     """Whether the pose's covariance is exactly the start's, transported along the path, plus the error since then."""
+    version: str | None = None
+    """Version of an estimator that is not chainslam's own, for the rows of `chainslam benchmark`."""
 
     def make(
         self,

@@ -16,11 +16,14 @@ from ..geometry.lines import normals
 from ..geometry.poses import J, rotation, to_robot, turned, wrap
 
 
+def whitened(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, "n d"]:
+    """Return L^-1 e, P = L L', of each error; raises numpy.linalg.LinAlgError where P is not positive definite."""
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(covs), errors[..., None])[..., 0])
+
+
 def nees(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, " n"]:
     """Return e' P^-1 e for each error (n, d); raises numpy.linalg.LinAlgError where P is not positive definite."""
-    roots = np.linalg.cholesky(covs)
-    whitened = np.linalg.solve(roots, errors[..., None])[..., 0]
-    return np.asarray(np.sum(whitened**2, axis=-1))
+    return np.asarray(np.sum(whitened(errors, covs) ** 2, axis=-1))
 
 
 def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> Float[np.ndarray, " n"]:
@@ -28,11 +31,20 @@ def nis(innovations: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"])
     return nees(innovations, covs)
 
 
-def verdict_on_noise(nis: float, in_band: float) -> str:
-    """Return in words what a NIS, and the share of steps whose last scans lie in its band, say of the stated noise."""
+def noise_model(nis: float, in_band: float) -> str:
+    """Return what a NIS, and the share of steps whose last scans lie in its band, say of the noise model, in a word."""
     if in_band >= 0.5:
-        return "as stated"
-    return "smaller than stated" if nis < 1.0 else "larger than stated"
+        return CONSISTENT
+    return "conservative" if nis < 1.0 else "overconfident"
+
+
+CONSISTENT = "consistent"
+NOISE_MODELS = {
+    CONSISTENT: "innovations as stated: the noise model is consistent",
+    "conservative": "innovations smaller than stated: the noise model is conservative",
+    "overconfident": "innovations larger than stated: the noise model is overconfident",
+}
+"""What each word of `noise_model` means."""
 
 
 def chi2_band(dof: int, confidence: float = 0.95, runs: int = 1) -> tuple[float, float]:

@@ -1,9 +1,9 @@
 """Loops over arrays, compiled to machine code (numba) and kept in the user's cache.
 
 A kernel is a plain function of arrays and numbers, with `@compiled` above it: it can be read, and stepped through, as
-the loop that it is. What was compiled is kept under the fingerprint of its source, of the kernels that it calls and of
-the numbers that it reads, so that a changed kernel is never run as it was before. numba is imported only to compile:
-what an earlier process kept runs without it (`machine_code.py`).
+the loop that it is. numba keeps the machine code of a function as long as its own file stays as it is; so that a kernel
+is compiled anew, too, when one that it calls has changed, the folder is named by all that a file of kernels is made of.
+numba is imported when the first kernel is called: a command that calls none starts without it.
 """
 
 import atexit
@@ -15,119 +15,109 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import lru_cache, update_wrapper
+from functools import cached_property, lru_cache, update_wrapper
 from hashlib import blake2b
 from pathlib import Path
+from threading import local
 from time import thread_time
 from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 
-from .machine_code import IS_KNOWN, decide, file_of, keep, kinds, linked, read, remembering
-
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-_FINGERPRINTS: dict[str, str] = {}
-"""By module, of all that its kernels are made of."""
 _KERNELS: list["Kernel[..., Any]"] = []
-_SPENT_S = [0.0]
-_FROZEN = (int, float, bool, str, tuple)
-"""What a kernel reads of its module is compiled into it."""
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Return the function compiled at its first call, or as an earlier process compiled it.
 
     Division by zero gives inf or NaN as in numpy, and sums are taken in the order in which they stand.
+    It must not call itself: numba crashes where it loads such code (its issue 6061).
     """
     return Kernel(inspect.unwrap(function))
 
 
 class Kernel(Generic[_P, _R]):
-    """A function that becomes machine code when it is called, together with the kernels that it calls."""
+    """A function that numba compiles when it is called, together with the kernels that it calls."""
 
     def __init__(self, plain: Callable[_P, _R]) -> None:
         self.plain = plain
-        self._machine: Callable[_P, _R] | None = None
-        self._made: dict[tuple[Any, ...], Callable[..., _R]] | None = None
         update_wrapper(self, plain)
         _KERNELS.append(self)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Run the machine code."""
-        if self._made is None:
-            self.link()
-            assert self._made is not None
-        code = self._made.get(kinds(args))
-        return self._by_numba(*args, **kwargs) if code is None or kwargs else code(*args)
+        return self.machine(*args, **kwargs)
 
-    def link(self) -> None:
-        """Link what an earlier process kept, before the first call."""
-        if self._made is None:
-            file = self._file()
-            self._made = {} if file is None else {kind: linked(code, self.plain) for kind, code in read(file).items()}
-
-    def _by_numba(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        """Run what numba compiles or loads, and keep it so that the next process does without numba."""
-        began, known = thread_time(), self._known()
-        machine: Any = self.machine()
-        result: _R = machine(*args, **kwargs)
-        if self._known() != known:
-            _SPENT_S[0] += thread_time() - began
-        if (file := self._file()) is not None and not kwargs and decide(args):
-            types = tuple(map(machine.typeof_pyval, args))
-            if types in machine.overloads and types in machine._cache.made:
-                assert self._made is not None
-                self._made[kinds(args)] = machine.overloads[types].entry_point
-                keep(file, kinds(args), machine._cache.made[types])
-        return result
-
-    def _known(self) -> int:
-        """Return for how many kinds of arguments numba has machine code here."""
-        machine: Any = self._machine
-        return -1 if machine is None else len(getattr(machine, "overloads", ()))
-
-    def _file(self) -> Path | None:
-        """Return where the machine code is kept, or None where numba has to load it."""
-        if not IS_KNOWN or self.plain.__closure__ or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-            return None
-        return file_of(cache() / _fingerprint(self.plain), self.plain)
-
+    @cached_property
     def machine(self) -> Callable[_P, _R]:
-        """Return the function as numba compiles it at a call."""
-        if self._machine is None:
-            from numba import config, njit
-
-            fingerprint = _fingerprint(self.plain)
-            if not config.DISABLE_JIT and not any((cache() / fingerprint).rglob("*.nbc")):  # type: ignore[attr-defined]
-                _tell_once()
-            config.CACHE_DIR = str(cache() / fingerprint)  # type: ignore[attr-defined]
-            self._machine = njit(cache=True, error_model="numpy")(self.plain)
-            if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-                self._machine._cache = remembering(self.plain)  # type: ignore[attr-defined]
-            _let_numba_call_kernels()
-        assert self._machine is not None
-        return self._machine
-
-
-def compiling_s() -> float:
-    """Return the processor time so far, s, of first calls, in which numba is loaded and compiles."""
-    return _SPENT_S[0]
-
-
-def link_kernels() -> None:
-    """Link what earlier processes kept of all kernels imported so far, so that the time of no step counts it."""
-    for kernel in _KERNELS:
-        kernel.link()
+        """The function as numba calls it; itself where compiling is switched off (`NUMBA_DISABLE_JIT=1`)."""
+        numba, _ = _numba()
+        others, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache() / _made_of(self.plain))
+        try:
+            made: Callable[_P, _R] = numba.njit(cache=True, error_model="numpy")(self.plain)
+        finally:
+            numba.config.CACHE_DIR = others
+        return made
 
 
 @lru_cache
-def _let_numba_call_kernels() -> None:
-    """Let numba take a kernel that another one calls for what it makes of it."""
-    from numba import types
+def _numba() -> tuple[Any, Any]:
+    """Return numba, told of kernels that others call, and what counts the time of each thread in its compiler."""
+    import numba
+    from numba.core import event as events
     from numba.extending import typeof_impl
 
-    typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.machine()))
+    class Watch(events.Listener, local):
+        depth, began_s, spent_s = 0, 0.0, 0.0
+
+        def on_start(self, event: Any) -> None:
+            if event.kind == "numba:compile" and event.data["dispatcher"].py_func in [each.plain for each in _KERNELS]:
+                _tell_once()
+            if self.depth == 0:
+                self.began_s = thread_time()
+            self.depth += 1
+
+        def on_end(self, event: Any) -> None:
+            self.depth -= 1
+            if self.depth == 0:
+                self.spent_s += thread_time() - self.began_s
+
+    watch = Watch()
+    for kind in ("numba:compile", "numba:compiler_lock"):
+        events.register(kind, watch)  # type: ignore[no-untyped-call]
+    typeof_impl.register(Kernel)(lambda kernel, _: numba.types.Dispatcher(kernel.machine))
+    return numba, watch
+
+
+def compiling_s() -> float:
+    """Return the processor time so far, s, in which this thread compiled, or loaded what was compiled."""
+    spent_s: float = _numba()[1].spent_s
+    return spent_s
+
+
+def prepare_kernels() -> None:
+    """Let numba know all kernels imported so far, so that the time of no step counts it."""
+    for kernel in _KERNELS:
+        kernel.machine  # noqa: B018
+
+
+@lru_cache
+def _made_of(function: Callable[..., object]) -> str:
+    """Return one name for all that the kernels of the function's file are made of.
+
+    It counts the file's text, the kernels that the file imports, and the numbers, enumerations and fields of tuples.
+    """
+    told = blake2b(Path(inspect.getfile(function)).read_bytes(), digest_size=8)
+    held: dict[str, Any] = function.__globals__
+    for name, value in sorted(held.items()):
+        if isinstance(value, Kernel) and value.plain.__module__ != function.__module__:
+            told.update(_made_of(value.plain).encode())
+        elif isinstance(value, (int, float, str, tuple, type)) and not name.startswith("__"):
+            inside = getattr(value, "_fields", ()), getattr(value, "__members__", ())
+            told.update(repr((name, value, *inside)).encode())
+    return f"{function.__module__}-{told.hexdigest()}"
 
 
 @lru_cache
@@ -197,27 +187,3 @@ def _user_cache() -> Path:
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches"
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-
-
-def _globals(function: Callable[..., object]) -> list[tuple[str, Any]]:
-    """Return by name what the function's module holds, without what Python puts there."""
-    held: dict[str, Any] = function.__globals__
-    return [(name, value) for name, value in sorted(held.items()) if not name.startswith("__")]
-
-
-def _fingerprint(function: Callable[..., object]) -> str:
-    """Return one name for all that the kernels of the function's module are made of."""
-    module = function.__module__
-    if module not in _FINGERPRINTS:
-        path = inspect.getfile(function)
-        # numba keeps the machine code of each place by itself: another installation compiles anew, and says so.
-        told = blake2b(os.fsencode(path) + Path(path).read_bytes(), digest_size=8)
-        for name, value in _globals(function):
-            if isinstance(value, _FROZEN):
-                told.update(f"{name}={value!r};".encode())
-            if isinstance(value, type) and issubclass(value, tuple):
-                told.update(f"{name}{getattr(value, '_fields', ())};".encode())
-            if isinstance(value, Kernel) and value.plain.__module__ != module:
-                told.update(_fingerprint(value.plain).encode())
-        _FINGERPRINTS[module] = f"{module}-{told.hexdigest()}"
-    return _FINGERPRINTS[module]

@@ -28,5 +28,8 @@ class MatchedRobot:
         """Carry out one command and return the motion of the body as the scans tell it."""
         wheels = self._robot.drive(command)
         self._scan = self._robot.sense()
+        if wheels.carried:
+            self._matcher.begin(self._scan)
+            return wheels
         matched = self._matcher.match(self._scan, odometry_of_scanner(wheels, self._scanner))
         return replace(odometry_of_body(matched, self._scanner), wheels=wheels)

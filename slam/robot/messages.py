@@ -203,6 +203,8 @@ class Odometry:
     """Whether scan matching confirmed the motion, so that no unmodelled one is looked for."""
     wheels: "Odometry | None" = None
     """What the wheels reported, if the motion is that of scan matching."""
+    carried: bool = False
+    """Whether the robot was carried there: between two sessions it is, and that is no path."""
 
     def __post_init__(self) -> None:
         """Raise RobotError for numbers that are not finite."""
@@ -213,6 +215,11 @@ class Odometry:
     def reported(self) -> "Odometry":
         """What the wheels reported."""
         return self if self.wheels is None else self.wheels
+
+    @property
+    def path_m(self) -> float:
+        """Length of the path, m; none where the robot was carried."""
+        return 0.0 if self.carried else float(np.hypot(self.motion[0], self.motion[1]))
 
     @property
     def states_its_error(self) -> bool:

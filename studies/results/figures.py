@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import rich.table
 
-from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.evaluation.consistency import noise_model
 
 from ..runner.marks import short
 from ..runner.rows import Row
@@ -61,7 +61,7 @@ def innovations(rows: Sequence[Row]) -> str:
     if not told:
         return "-"
     nis, share = mean_of(told, "nis"), mean_of(told, "nis_in_band")
-    return f"{nis:.2f}, {100 * share:.0f} %: {verdict_on_noise(nis, share)}"
+    return f"{nis:.2f}, {100 * share:.0f} %: {noise_model(nis, share)}"
 
 
 def total(rows: Sequence[Row], name: str) -> int:

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import tyro
 
-from ..runner.marks import filled, markdown
+from chainslam.experiments.views.numbers import markdown
+
+from ..runner.marks import filled
 from ..runner.rows import Row, fingerprint
 from .sources import SOURCES, Source
 

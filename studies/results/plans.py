@@ -21,7 +21,7 @@ from .figures import (
 )
 
 WRONG = "false matches of five beams or more"
-NOISE = "NIS, scans in its band: the noise is"
+NOISE = "NIS, scans in its band: the noise model is"
 LOST = 3.0
 """A run whose mean NEES is this many times what the estimator expects no longer knows where it is."""
 

@@ -12,13 +12,14 @@ import numpy as np
 
 from chainslam.experiments.scenario import TrialConfig, check
 from chainslam.experiments.terminal.console import plain_console
+from chainslam.experiments.views.numbers import markdown
 from chainslam.sim.faults import FaultsConfig
 from chainslam.sim.lidar import LidarConfig
 from chainslam.sim.people import PeopleConfig
 from chainslam.sim.robot import RobotConfig
 
 from ..runner.command import run_study
-from ..runner.marks import markdown, short
+from ..runner.marks import short
 from ..runner.rows import Row, rows_of
 from ..runner.trials import one
 

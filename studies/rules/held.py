@@ -55,7 +55,7 @@ NEAR = {
     "split_kernels": "extract split_kernels splits",
     "segment_kernels": "extract split_kernels",
     "fit_kernels": "extract noise_of_each_beam line_kernels",
-    "loop_search": "where_places_are_sought loop_search places_of_drives",
+    "loop_search": "where_places_are_sought far_loops loop_search places_of_drives",
     "place_search": "where_places_are_sought loop_search",
     "submaps": "where_places_are_sought loop_search",
     "closures": "where_places_are_sought loop_search second_looks",

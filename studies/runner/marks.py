@@ -1,7 +1,7 @@
-"""Tables on pages: numbers in words, and generated parts between `<!-- table: NAME -->` and `<!-- end -->`."""
+"""Parts of pages: numbers in words, and tables between `<!-- table: NAME -->` and `<!-- end -->`."""
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 
 PART = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -14,9 +14,3 @@ def filled(page: str, make: Callable[[str], str]) -> str:
 def short(value: float) -> str:
     """Return a number to three digits, in words."""
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{float(f'{value:.3g}'):,.0f}"
-
-
-def markdown(table: Iterable[Sequence[str]]) -> str:
-    """Return a table as Markdown; its first row holds the names of the columns."""
-    head, *lines = ["| " + " | ".join(cells) + " |" for cells in table]
-    return "\n".join([head, "|" + "---|" * (head.count(" | ") + 1), *lines])

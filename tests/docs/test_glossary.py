@@ -106,13 +106,18 @@ def literals(tree):
             yield "".join(str(part.value) if isinstance(part, ast.Constant) else "#" for part in node.values)
 
 
+def is_text(node):
+    """Return whether a statement is a string."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
 def docstrings(tree):
     """Return what stands below public classes, functions and fields."""
     yield ast.get_docstring(tree) or ""
     for before, node in zip([None, *tree.body], tree.body, strict=False):
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
             yield from docstrings(node)
-        elif isinstance(node, ast.Expr) and isinstance(before, ast.AnnAssign) and before.target.id[0] != "_":
+        elif is_text(node) and isinstance(before, ast.AnnAssign) and before.target.id[0] != "_":
             yield node.value.value
 
 

@@ -5,11 +5,15 @@ import json
 import subprocess
 import sys
 
+import msgspec
 import numpy as np
+import pandas
 import pytest
 
 import chainslam
 from chainslam.experiments.commands.cli import main
+from chainslam.experiments.library.runs import table_at
+from chainslam.experiments.scoring.keys import Words
 from chainslam.slam.backends.full_ekf import FullEkf
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
@@ -107,9 +111,25 @@ def test_the_map_has_ends_lines_and_covariance_of_its_walls(run):
     assert walls.cov.shape == (3 + 2 * len(walls),) * 2
 
 
-def test_steps_are_a_table_with_pandas_and_arrays_without(run, monkeypatch):
-    frame = run.steps
+def test_the_types_of_a_run_are_those_of_its_files(run):
+    assert set(run.summary) == chainslam.Summary.__required_keys__
+    assert run.summary == json.loads((run.folder / "summary.json").read_text())
+    msgspec.convert(run.summary, chainslam.Summary)
+    assert list(run.steps) == list(chainslam.Steps.__annotations__)
+    words = {name for name, kind in chainslam.Steps.__annotations__.items() if kind == Words}
+    assert {name for name, column in run.steps.items() if column.dtype.kind == "U"} == words == {"behaviour", "reason"}
+    assert all(column.dtype == np.float64 for name, column in run.steps.items() if name not in words)
+
+
+def test_steps_are_an_array_for_each_column(run):
+    frame = pandas.read_csv(run.folder / "steps.csv")
     assert len(frame) == run.summary["steps"]
+    np.testing.assert_allclose(run.steps["pose_nees"], frame["pose_nees"].to_numpy())
+    assert pandas.DataFrame(run.steps)["reason"].tolist() == frame["reason"].tolist()
+
+
+def test_a_campaign_is_a_table_with_pandas_and_arrays_without(run, monkeypatch):
+    frame = table_at(run.folder / "steps.csv")
     imported = builtins.__import__
 
     def without(name, *more):
@@ -118,10 +138,18 @@ def test_steps_are_a_table_with_pandas_and_arrays_without(run, monkeypatch):
         return imported(name, *more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    plain = chainslam.load(run.folder).steps
+    plain = table_at(run.folder / "steps.csv")
     assert list(plain) == list(frame.columns)
     np.testing.assert_allclose(plain["pose_nees"], frame["pose_nees"].to_numpy())
     assert plain["reason"][0] == frame["reason"][0]
+
+
+def test_steps_of_a_table_that_was_cut_short_are_refused(run, tmp_path):
+    lines = (run.folder / "steps.csv").read_text().splitlines()
+    for kept in ([], [*lines[:3], lines[3][:20]]):
+        (tmp_path / "steps.csv").write_text("\n".join(kept))
+        with pytest.raises(chainslam.UsageError, match="found another table, or one that was cut short"):
+            _ = chainslam.Run(tmp_path).steps
 
 
 @pytest.mark.parametrize("picture", ["map", "visibility", "paths", "nees", "model", "traversals"])

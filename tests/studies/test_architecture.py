@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from studies.architecture import PLACES, draw, imports, rooms
+from studies.code.architecture import PLACES, draw, imports, rooms
 
 ROOT = Path(__file__).parents[2]
 

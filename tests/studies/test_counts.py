@@ -2,7 +2,7 @@
 
 import pytest
 
-from studies.counts import LAYOUT, arrows, by_folder, entries, tunable
+from studies.code.counts import LAYOUT, arrows, by_folder, entries, tunable
 
 CODE = '''
 """A file."""

@@ -53,7 +53,7 @@ def test_a_table_has_means_and_medians_over_plans_and_intervals_weighed_by_pairs
     assert found[1] == ["own", "`graph`", "1, 1", "3, 3", "90.0 %", "3.00", "0.00", "-"]
     noise = {"nis": 0.7, "nis_in_band": 0.2, "pose_anees_from_start": 1.5}
     (told,) = cells(table_of_backends([row("graph", "own", "a") | noise]))
-    assert told[-3:] == ("1.50", "1.50", "0.70, 20 %: smaller than stated")
+    assert told[-3:] == ("1.50", "1.50", "0.70, 20 %: conservative")
     older = [row("block-ekf", "own", plan) | {"code": "old"} for plan in "ab"]
     both = real_plans([*older, *rows])
     assert list(both) == ["#### 1 back ends in 2 apartments", "#### 1 back ends in 3 apartments"]

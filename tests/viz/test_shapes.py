@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainslam.slam.geometry.lines import normals
-from chainslam.viz.shapes import Changes, ellipses, hessian_cov, rounded, spread
+from chainslam.viz.shapes import Changes, ellipses, hessian_cov, rounded, spread, with_gaps
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -78,3 +78,11 @@ def test_labels_of_one_group_are_raised_until_they_stand_apart():
     np.testing.assert_allclose(spread(heights, groups, 0.5), heights)
     np.testing.assert_allclose(spread(heights, np.zeros(5, dtype=int), 0.5), [1.5, 0.0, 5.0, 0.5, 1.0])
     assert spread(np.zeros(0), np.zeros(0, dtype=int), 0.5).shape == (0,)
+
+
+def test_a_path_has_a_gap_where_the_robot_was_carried():
+    path = np.arange(12.0).reshape(4, 3)
+    assert with_gaps(path, None) is path
+    broken = with_gaps(path, np.array([False, True, False, True]))
+    assert np.flatnonzero(np.isnan(broken).all(axis=1)).tolist() == [1, 4]
+    np.testing.assert_array_equal(broken[np.isfinite(broken[:, 0])], path)

@@ -128,7 +128,7 @@ def _extent(picture: Picture) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray,
     wheels = () if picture.odometry_path_world is None else (picture.odometry_path_world[:, :2],)
     points = [picture.path_world[:, :2], *wheels, picture.map.ends_world.reshape(-1, 2), *picture.true_floor]
     stacked = np.concatenate(points)
-    low, high = stacked.min(axis=0) - MARGIN_M, stacked.max(axis=0) + MARGIN_M
+    low, high = np.nanmin(stacked, axis=0) - MARGIN_M, np.nanmax(stacked, axis=0) + MARGIN_M
     contours = _corner_contours(picture)[0].reshape(-1, 2)
     # The few corners of which nearly nothing is known do not shrink the map.
     near = contours[np.all((contours > low - MARGIN_M) & (contours < high + MARGIN_M), axis=1)]

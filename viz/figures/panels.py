@@ -20,6 +20,8 @@ from .map_axes import bar_m
 MARGIN_M = 0.5
 BAR_SHARE = 0.4
 """Largest share of a small map's width that its scale bar takes."""
+BAR_ROOM = 0.05
+"""Room for the bar below a small map, as a share of its width."""
 DASHES: tuple[Any, ...] = ("-", "-", "-", (0, (6, 6)), (0, (2, 10)))
 """Of curves in turn: those that lie on one before them leave it to be seen."""
 
@@ -52,6 +54,7 @@ def _extent(maps: Sequence[SmallMap]) -> tuple[Float[np.ndarray, "2"], Float[np.
 @own_look()
 def _map_figure(small: SmallMap, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> Figure:
     """Draw one map over the true floor, with a scale bar; `low` and `high` are the corners of what is shown."""
+    low = low - np.array([0.0, BAR_ROOM * (high - low)[0]])
     size = high - low
     figure = Figure(figsize=(3.2, 3.2 * float(size[1] / size[0])), dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)

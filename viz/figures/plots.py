@@ -18,6 +18,7 @@ from .. import palette
 from ..shapes import SIGMAS, VAGUE_RAD, ellipses
 from ..text import literal
 from . import own_look
+from .map_axes import scale_bar
 
 STRETCH_M = 0.25
 """A place counts as driven again when the path comes back to within this of it ..."""
@@ -29,8 +30,14 @@ ENLARGED = 10.0
 """How much ellipses of the model space are enlarged."""
 NARROW = (5.0, 3.3)
 """Inches of a figure whose letters are as large as those of the text on a phone."""
+WIDEST = 50
+"""Letters of a legend's row beyond which it has two names in place of four."""
 MOST_SPREADS = 4
 """Curves beyond which pale bands would only cover one another."""
+BAR_BELOW = 0.042
+"""A plan's scale bar lies so far below it, as a share of its width."""
+LEGEND_INCH = 1.1
+"""Width of the legend of shades beside a plan."""
 GREYS = ("#D8D8D8", "#A8A8A8", "#787878", "#484848", "#101010")
 """Driven once, twice, ..., five times or more, as in the paper's figures 5 and 6."""
 
@@ -48,19 +55,21 @@ class NeesCurve:
     """Where that of a consistent estimator lies in 95 % of all cases."""
     quartiles: Float[np.ndarray, "2 p"] | None = None
     """Of many runs; drawn as a pale band."""
+    colour: str | None = None
+    """None takes that of the back end."""
 
 
 @own_look()
-def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
-    """Return the NEES of estimators against the path length, on a logarithmic axis, with the band of a consistent one.
+def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)") -> Figure:
+    """Return the NEES of estimators on a logarithmic axis, with the band of a consistent one.
 
-    It is as wide as a phone's screen, so that its letters can be read there.
+    `along` names what it is drawn against. It is as wide as a phone's screen, so that its letters can be read there.
     """
     figure, axes = _figure("", NARROW)
     longest = max(curves, key=lambda curve: curve.path_m[-1])
     axes.fill_between(longest.path_m, *longest.band, color=palette.SOLID, linewidth=0, zorder=1)
     for curve in curves:
-        colour = palette.of_backend(curve.name)
+        colour = curve.colour or palette.of_backend(curve.name)
         if curve.quartiles is not None and len(curves) <= MOST_SPREADS:
             axes.fill_between(curve.path_m, *curve.quartiles, color=colour, alpha=0.15, linewidth=0, zorder=2)
         width = 1.5 if curve.quartiles is not None else 0.9
@@ -68,7 +77,7 @@ def draw_nees(curves: Sequence[NeesCurve]) -> Figure:
     axes.fill_between([], [], [], color=palette.SOLID, linewidth=0, label="95 % band")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    _label(axes, "path length (m)", "NEES of the pose")
+    _label(axes, along, "NEES of the pose")
     return figure
 
 
@@ -94,7 +103,9 @@ def _label(axes: Axes, x: str, y: str) -> None:
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
     look: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 1.4, "columnspacing": 1.2}
-    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
+    names = [str(words) for words in axes.get_legend_handles_labels()[1]]
+    wide = max((sum(map(len, names[k : k + 4])) for k in range(0, len(names), 4)), default=0) > WIDEST
+    axes.legend(ncols=2 if wide else 4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), **look)
 
 
 @own_look()
@@ -120,6 +131,7 @@ def draw_trajectories(
     for (backend, path), width in zip(estimated_world.items(), widths, strict=False):
         axes.plot(path[:, 0], path[:, 1], color=palette.of_backend(backend), linewidth=width, label=backend)
     axes.legend(frameon=False, fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    _scale(axes)
     return figure
 
 
@@ -162,7 +174,7 @@ def draw_model_space(
 @own_look()
 def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: str) -> Figure:
     """Return the path shaded by how often each stretch was driven, the start in a circle (paper, figures 5 and 6)."""
-    figure, axes = _plan(rings, title)
+    figure, axes = _plan(rings, title, LEGEND_INCH)
     places = _dense(path_world[:, :2])
     times = traversals(places)
     pieces = np.stack([places[:-1], places[1:]], axis=1)
@@ -178,6 +190,7 @@ def draw_traversal(path_world: Float[np.ndarray, "s 3"], rings: Rings, title: st
     bar.ax.set_yticklabels([*(str(k) for k in range(1, len(GREYS))), f"{len(GREYS)} or more"], fontsize=7)
     bar.set_label("times driven", fontsize=8)
     axes.plot(*places[0], "o", markersize=9, color="none", markeredgecolor=palette.ALARM, mew=1.6, zorder=4)
+    _scale(axes)
     return figure
 
 
@@ -195,11 +208,11 @@ def _dense(places: Float[np.ndarray, "s 2"]) -> Float[np.ndarray, "p 2"]:
     return np.stack([np.interp(at, along, places[:, axis]) for axis in (0, 1)], axis=-1)
 
 
-def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
-    """Return axes in metres with the true walls, if any."""
+def _plan(rings: Rings, title: str, beside_inch: float = 0.0) -> tuple[Figure, Axes]:
+    """Return axes in metres with the true walls, if any, and room beside them."""
     size = np.ptp(np.concatenate(rings), axis=0) if len(rings) else np.array([1.0, 1.0])
     width, height = size * 7.0 / max(size[0], 1.3 * size[1])
-    figure, axes = _figure(title, (float(width) + 0.9, float(height) + 1.0))
+    figure, axes = _figure(title, (float(width) + 0.9 + beside_inch, float(height) + 1.0))
     for ring in rings:
         axes.plot(*np.concatenate([ring, ring[:1]]).T, color=palette.WALL_LINE, linewidth=1.4, zorder=2)
     axes.set_aspect("equal")
@@ -208,6 +221,16 @@ def _plan(rings: Rings, title: str) -> tuple[Figure, Axes]:
     axes.yaxis.set_major_locator(MultipleLocator(2.0))
     axes.grid(color=palette.GRID, linewidth=0.5)
     return figure, axes
+
+
+def _scale(axes: Axes) -> None:
+    """Name the unit of a plan on which all is drawn, and add a scale bar."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+    axes.set_xlabel("x, m", fontsize=8)
+    axes.set_ylabel("y, m", fontsize=8)
+    scale_bar(axes, right - left, BAR_BELOW * (right - left) / (high - low))
 
 
 def _figure(title: str, size: tuple[float, float]) -> tuple[Figure, Axes]:

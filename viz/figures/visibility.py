@@ -24,6 +24,7 @@ from .. import palette
 from ..text import literal
 from . import own_look
 from .graph_shapes import Nodes, heads, nodes_of
+from .map_axes import scale_bar
 
 MARGIN_M = 0.5
 RADIUS_POINTS = 7.5
@@ -81,15 +82,16 @@ def draw_graph(picture: GraphPicture) -> Figure:
     inch_per_m = longer / float(size.max())
     width, height = np.maximum(size * inch_per_m, (5.0, 2.0)).tolist()
     words = wrap(picture.subtitle, int(width / LETTER_INCH))
-    whole = np.array([width + 2.0 * EDGE_INCH, height + 0.8 + 0.17 * len(words)])
+    whole = np.array([width + 2.0 * EDGE_INCH, height + 1.02 + 0.17 * len(words)])
     figure = Figure(figsize=tuple(whole), dpi=150, facecolor=palette.PAGE)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((EDGE_INCH / whole[0], 0.4 / whole[1], width / whole[0], height / whole[1]))
+    axes = figure.add_axes((EDGE_INCH / whole[0], 0.62 / whole[1], width / whole[0], height / whole[1]))
     left, above = EDGE_INCH / whole[0], 1.0 - 0.33 / whole[1]
     figure.text(left, above, literal(picture.title), size=12, weight="bold")
     below = above - 0.08 / whole[1]
     figure.text(left, below, literal("\n".join(words)), size=8.5, color="#5A5A5A", va="top", linespacing=1.2)
     handles = paint_graph(axes, picture, low, high, inch_per_m)
+    scale_bar(axes, float(size[0]), 0.3 / height)
     figure.legend(
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8,
         handler_map={tuple: HandlerTuple(None)},

@@ -52,7 +52,7 @@ def map_dxf(features: Iterable[Mapping[str, Any]], dimensions: Sequence[Dimensio
 
 
 @contextmanager
-def _without_time() -> Iterator[None]:
+def without_time() -> Iterator[None]:
     """Remove time stamps and identifiers, so that the same map gives the same bytes."""
     from ezdxf import options  # type: ignore[attr-defined]
 
@@ -71,7 +71,7 @@ class _Plan:
         from ezdxf import units
         from ezdxf.filemanagement import new
 
-        with _without_time():
+        with without_time():
             self._document = new(VERSION, units=units.M)
         self._document.linetypes.add(DASHED, [sum(map(abs, DASH_M)), *DASH_M], description="not confirmed yet")
         self._document.styles.add(LETTERS, font="arial.ttf")
@@ -98,7 +98,7 @@ class _Plan:
             1.2 * max(float(size.max()), 1.0), (0.5 * (low_world + high_world)).tolist()
         )
         text = io.StringIO()
-        with _without_time():
+        with without_time():
             self._document.write(text)
         return self._document.encode(text.getvalue())
 
@@ -121,8 +121,8 @@ class _Plan:
 
     def dimension(self, told: Dimension) -> None:
         """Write a length beside its wall, or an area in its room, as in the floor plan."""
-        if told.letters_m is not None:
-            self._text(told.words, told.beside_world, CAPITALS * told.letters_m, -told.clockwise_deg, DIMENSIONS)
+        if told.shown:
+            self._text(told.shown, told.beside_world, CAPITALS * told.letters_m, -told.clockwise_deg, DIMENSIONS)
 
     def note(self, words: str, corner_world: Float[np.ndarray, "2"]) -> None:
         """Write a line of text that starts at a point."""

@@ -9,6 +9,7 @@ from msgspec import defstruct
 from chainslam.sim.logs.archive import ArchiveError
 from chainslam.sim.logs.recorded_robot import MOST_M, are_covariances, within
 
+from ...usage import UsageError
 from ..reading import read_arrays, read_json, told
 from ..schema import UnfitError, fit, many
 
@@ -59,6 +60,17 @@ def read_map(folder: Path) -> dict[str, np.ndarray]:
         if not lost and not (within(cov, MOST_M) and are_covariances(cov)):
             raise ArchiveError("an invalid covariance")
     return arrays
+
+
+def read_joint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, list[dict[str, Any]]]]:
+    """Return the arrays and the features of a run's map; raises UsageError for another, and for a lost covariance."""
+    arrays = read_map(folder)
+    features = read_features(folder, arrays["ids"])
+    if not np.all(np.isfinite(arrays["cov"])):
+        raise UsageError(
+            "expected a map with its joint covariance, found one whose estimate was lost: take another run"
+        )
+    return arrays, features
 
 
 def read_features(folder: Path, ids: np.ndarray) -> dict[str, list[dict[str, Any]]]:

@@ -18,7 +18,7 @@ from ...scoring.maps.measurements import (
     perimeter,
 )
 from ...usage import UsageError
-from .map_files import read_features, read_map
+from .map_files import read_joint
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,7 @@ class MappedCorners:
 
 def read_corners(folder: Path) -> MappedCorners:
     """Read `map.npz` and `map.geojson` of a run; raises UsageError for anything else."""
-    arrays = read_map(folder)
-    features = read_features(folder, arrays["ids"])
-    if not np.all(np.isfinite(arrays["cov"])):
-        raise UsageError(
-            "expected a map with its joint covariance, found one whose estimate was lost: measure another run"
-        )
+    arrays, features = read_joint(folder)
     return corners_of(arrays, features["corner"], features["chain"])
 
 

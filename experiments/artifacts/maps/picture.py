@@ -6,7 +6,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import shapely
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from chainslam.explore.goal import SetAside
 from chainslam.explore.step import Step
@@ -17,6 +17,7 @@ from chainslam.slam.map.chains import Chain
 from chainslam.slam.map.stochastic_map import StochasticMap
 from chainslam.viz.figures.maps import Picture, draw_map, png
 from chainslam.viz.figures.visibility import GraphPicture, draw_graph
+from chainslam.viz.shapes import with_gaps
 
 from ...scenario import STRATEGY_OF_REPLAYS, TrialConfig
 from ...scoring.maps.corners import corners
@@ -46,7 +47,7 @@ def map_picture(result: TrialResult) -> Picture:
     ]
     return over_truth(
         scenario.world, scenario.config, result.summary, last.map, last.chains, last.set_aside, known,
-        log.estimated_world, log.true_world, scenario.start_estimate,
+        log.estimated_world, log.true_world, scenario.start_estimate, log.carried,
     )  # fmt: skip
 
 
@@ -96,8 +97,9 @@ def over_truth(
     estimated_world: Float[np.ndarray, "s 3"],
     true_world: Float[np.ndarray, "s 3"],
     start_estimate: Float[np.ndarray, "3"],
+    carried: Bool[np.ndarray, " s"] | None = None,
 ) -> Picture:
-    """Return the content of the picture of a map."""
+    """Return the content of the picture of a map; its paths have a gap where the robot was `carried`."""
     to_estimate = inverse(own_alignment(start_estimate, estimated_world, true_world, summary["map_began_step"]))
     rings = (world.free.exterior, *world.free.interiors)
     off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
@@ -113,11 +115,11 @@ def over_truth(
     return Picture(
         map=walls,
         chains=chains,
-        path_world=estimated_world,
+        path_world=with_gaps(estimated_world, carried),
         title=f"{world.name}   {config.backend}, {how}, {noise}",
         subtitle=";  ".join(words),
         set_aside=set_aside,
-        true_path_world=np.array([compose(to_estimate, pose) for pose in true_world]),
+        true_path_world=with_gaps(np.array([compose(to_estimate, pose) for pose in true_world]), carried),
         corners_world=np.array([place for place, _ in corners_with_covs]).reshape(-1, 2),
         corner_covs=np.array([cov for _, cov in corners_with_covs]).reshape(-1, 2, 2),
         true_floor=tuple(to_world(shapely.get_coordinates(ring)[:-1], to_estimate) for ring in rings),

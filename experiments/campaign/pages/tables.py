@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import pi
 from typing import Any
 
-from chainslam.slam.evaluation.consistency import verdict_on_noise
+from chainslam.slam.evaluation.consistency import noise_model
 from chainslam.viz.reports.report import PageTable, table
 from chainslam.viz.text import NONE
 
@@ -122,7 +122,7 @@ MARKS: Columns = {
 
 
 def _noise(nis: Row | None, in_band: Row | None) -> str:
-    return verdict_on_noise(nis["mean"], in_band["mean"]) if nis and in_band else NONE
+    return noise_model(nis["mean"], in_band["mean"]) if nis and in_band else NONE
 
 
 def _probability(p: float | None) -> str:

@@ -9,7 +9,7 @@ from chainslam.slam.association.matching import KnownWalls, Matches, MatchingCon
 from chainslam.slam.association.methods import Matcher
 from chainslam.slam.estimation.backend import Joint
 from chainslam.slam.estimation.models import innovations
-from chainslam.slam.evaluation.consistency import nis
+from chainslam.slam.evaluation.consistency import nis, whitened
 from chainslam.slam.extraction.segments import Segments
 from chainslam.slam.extraction.straightness import cov_of_faces
 from chainslam.slam.map.reliability import ReliabilityConfig, are_clear
@@ -75,7 +75,7 @@ class InnovationEar:
         self.dofs.append(len(e))
         # Whiten each wall's own 2 by 2 block, so that scans are comparable whatever else they show.
         blocks = S.reshape(len(rows), 2, len(rows), 2)[np.arange(len(rows)), :, np.arange(len(rows))]
-        white = np.linalg.solve(np.linalg.cholesky(blocks), e.reshape(-1, 2, 1))[..., 0]
+        white = whitened(e.reshape(-1, 2), blocks)
         now = dict(zip(pairs[:, 1].tolist(), white, strict=True))
         self._pairs += [np.stack([self._before[wall], now[wall]]) for wall in now if wall in self._before]
         self._before = now

@@ -87,13 +87,17 @@ def perimeter(corners: CornerPoints, ring: Sequence[int]) -> Measured:
     return _propagated(float(length.sum()), np.roll(along, 1, axis=0) - along, corners, ring)
 
 
-def area(corners: CornerPoints, ring: Sequence[int]) -> Measured:
-    """Return the area inside a closed ring of corners, positive whichever way it runs."""
-    points = corners.positions_world[list(ring)]
-    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-    signed = 0.5 * float(np.sum(points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]))
-    gradient = 0.5 * np.stack([after[:, 1] - before[:, 1], before[:, 0] - after[:, 0]], axis=-1)
-    return _propagated(abs(signed), gradient, corners, ring)
+def area(corners: CornerPoints, ring: Sequence[int], *holes: Sequence[int]) -> Measured:
+    """Return the area inside a closed ring of corners less that of its holes, whichever way each of them runs."""
+    total, gradients = 0.0, []
+    for sign, each in ((1.0, ring), *((-1.0, hole) for hole in holes)):
+        points = corners.positions_world[list(each)]
+        before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+        signed = 0.5 * float(np.sum(points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]))
+        total += sign * abs(signed)
+        turned = 0.5 * np.stack([after[:, 1] - before[:, 1], before[:, 0] - after[:, 0]], axis=-1)
+        gradients.append(sign * np.sign(signed) * turned)
+    return _propagated(total, np.concatenate(gradients), corners, [k for each in (ring, *holes) for k in each])
 
 
 def _propagated(

@@ -28,6 +28,17 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
             {**obstacle_record(thing), "position_m": thing.cells_world.mean(axis=0).tolist()}
             for thing in certificate.obstacles
         ],
+        "narrow_gaps": None
+        if certificate.narrow_gaps is None
+        else [
+            {
+                "width_m": gap.width_m,
+                "beyond_m2": gap.beyond_m2,
+                "why": gap.why,
+                "position_m": gap.position_world.tolist(),
+            }
+            for gap in certificate.narrow_gaps
+        ],
         "floor_m2": certificate.floor_m2,
         "unseen_m2": certificate.unseen_m2,
         "reachable_way": certificate.reachable_way,

@@ -42,14 +42,18 @@ class ClosuresConfig:
     """Search radius around the believed position, before it grows with the path."""
     radius_share: Weight = 0.04
     """Growth of the search radius per metre of path since the old scan."""
-    most_m: Distance = 6.0
-    """Largest search radius."""
     turn_rad: Angle = float(np.deg2rad(10.0))
     """Half-width of the heading search, before it grows with the path."""
     turn_a_metre: Angle = float(np.deg2rad(0.3))
     """Growth of the heading search per metre of path since the old scan."""
     most_rad: Angle = float(np.deg2rad(45.0))
     """Largest half-width of the heading search."""
+    far_m: Distance = 6.0
+    """Where the search radius would grow beyond this, the covariance of the pose graph takes its place."""
+    far_sigmas: Sigmas = 3.0
+    """Drift that is searched then, in standard deviations; a place beyond it is refused."""
+    far_agree: Count = 3
+    """Number of closures that must agree then before any is used."""
     slip_fit: Share = 0.4
     """If a smaller share of a scan's points lies near the scans before it, the robot has slipped and all headings are
     searched."""

@@ -4,7 +4,7 @@ A filter decides once, when a segment is seen, which wall it is of. Here every s
 that all scans agree on, as often as there are rounds. Nothing of it asks which back end ran.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +22,16 @@ from .loop_search import LoopSearch
 from .refuted import NO_RAYS, Rays, refuted
 from .solve import begun, normal_equations, solved, without_lines
 from .submaps import Returns
-from .walls import inverse_at, merged, spans, surveyed
+from .walls import blocks_at, inverse_at, merged, spans, surveyed
 
 DEFAULTS = SecondLooksConfig()
+SEARCH = 0.5
+"""Share of the work that is the search for loops."""
+
+
+def to_the_end(share: float) -> bool:
+    """Go on whatever share is done."""
+    return True
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,10 @@ class Survey:
     """So many places that the robot came back to hold the path together."""
     information: csc_array
     """About all poses, of which the first is fixed, and then all walls; the floors of walls are not in it."""
+
+    def pose_covs(self) -> Float[np.ndarray, "s 3 3"]:
+        """Return the covariance of each pose."""
+        return blocks_at(self.information, len(self.poses))
 
     def pair_covs(self, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 6 6"]:
         """Return how two poses err together, each in its body frame."""
@@ -55,24 +66,36 @@ def second_looks(
     returns: Sequence[Float[np.ndarray, "_ 2"]],
     config: SecondLooksConfig = DEFAULTS,
     rays: Rays = NO_RAYS,
+    goes_on: Callable[[float], bool] = to_the_end,
 ) -> Survey:
     """Return the poses and walls that agree best with all motions between scans and the segments of all scans.
 
     The drive has one motion less than poses; `segments` and `returns` are those of each scan, robot frame. The first
-    pose stays where it is. By `rays`, walls that came and went are left out.
+    pose stays where it is. By `rays`, walls that came and went are left out. `goes_on` hears of the share that is done;
+    where it answers no, no further loop is sought, and segments are associated once.
     """
-    search = LoopSearch(start_world, drive, Returns(returns, config.closures), config)
+    found = Returns(returns, config.closures)
+    search = LoopSearch(start_world, drive, found, config, lambda share: goes_on(SEARCH * share))
     sightings = joined([firm(k, each, config) for k, each in enumerate(segments)])
-    return _with_walls(search, sightings, config, rays)
+    return _with_walls(search, sightings, config, rays, lambda share: goes_on(SEARCH + (1.0 - SEARCH) * share))
 
 
-def _with_walls(search: LoopSearch, sightings: Sightings, config: SecondLooksConfig, rays: Rays = NO_RAYS) -> Survey:
+def _with_walls(
+    search: LoopSearch,
+    sightings: Sightings,
+    config: SecondLooksConfig,
+    rays: Rays = NO_RAYS,
+    goes_on: Callable[[float], bool] = to_the_end,
+) -> Survey:
     """Return poses and walls after all rounds of association and solution; at last, duplicate walls are one."""
     c, drive = config.closures, search.drive.links(config.doubt, config)
     unknowns = without_lines(settled(search.poses, search.drive, search.closures, config))
     seen, of = sightings, np.zeros(0, dtype=np.int64)
     links, kept = [drive], search.closures
-    for gate_m in [*config.gates_m, None]:
+    rounds = [*config.gates_m, None]
+    for number, gate_m in enumerate(rounds):
+        if 0 < number < len(rounds) - 1 and not goes_on(number / len(rounds)):
+            continue
         if gate_m is None:
             of = merged(unknowns, spans(unknowns, seen, of), of, config)
             unknowns = begun(unknowns.poses, seen, of)

@@ -94,6 +94,20 @@ def surveyed(
     return StochasticMap(belief, reach, np.bincount(owner, minlength=count), none, none.copy()), joint
 
 
+def blocks_at(information: csc_array, count: int) -> Float[np.ndarray, "s 3 3"]:
+    """Return the blocks of the first poses on the diagonal of the inverse."""
+    solver = splu(information, permc_spec="MMD_AT_PLUS_A")
+    found = np.empty((count, POSE, POSE))
+    for first in range(0, count, AT_ONCE // POSE):
+        poses = np.arange(first, min(first + AT_ONCE // POSE, count))
+        rows = (POSE * poses[:, None] + np.arange(POSE)).ravel()
+        wanted = np.zeros((information.shape[0], len(rows)))
+        wanted[rows, np.arange(len(rows))] = 1.0
+        solved = solver.solve(wanted)[rows].reshape(len(poses), POSE, len(poses), POSE)
+        found[poses] = solved[np.arange(len(poses)), :, np.arange(len(poses))]
+    return 0.5 * (found + found.transpose(0, 2, 1))
+
+
 def inverse_at(information: csc_array, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, "r r"]:
     """Return the inverse at some rows and columns, `AT_ONCE` columns at a time."""
     solver = splu(information, permc_spec="MMD_AT_PLUS_A")

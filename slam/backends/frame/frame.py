@@ -42,15 +42,6 @@ class Frame:
         """Return the Gaussian of pose and lines in the world frame: the map's own error, and the frame's on top."""
         return Joint(*frame_kernels.joint_world(self.pose_world, self.root, joint.mean, joint.cov, joint.anchors))
 
-    def moving(
-        self,
-        pose_world: Float[np.ndarray, "3"],
-        means_world: Float[np.ndarray, "m 2"],
-        anchors_world: Float[np.ndarray, "m 2"],
-    ) -> Float[np.ndarray, "s 3"]:
-        """Return how a pose and lines about their anchors move with the frame, s = 3 + 2 m."""
-        return frame_kernels.moving(self.pose_world, pose_world, means_world, anchors_world)
-
     @cached_property
     def root(self) -> Float[np.ndarray, "3 3"]:
         """A root of the covariance, also where something of the frame is known exactly."""

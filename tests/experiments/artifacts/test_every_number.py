@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from chainslam.experiments.artifacts.results import STEP_COLUMNS
 from chainslam.experiments.campaign.comparison.comparison import compare
 from chainslam.experiments.campaign.comparison.findings import findings
 from chainslam.experiments.campaign.comparison.hypothesis import hypothesis
 from chainslam.experiments.campaign.comparison.tables import GATE, band_scores, mark_rows, step_rows, trial_row
 from chainslam.experiments.campaign.plan import Campaign, Trial, config_of
 from chainslam.experiments.campaign.work import Job, perform, unpack
+from chainslam.experiments.scoring.keys import Steps
 
 HERE = Path(__file__).parents[1]
 BY_HAND = (
@@ -48,7 +48,7 @@ def test_every_number_that_is_written_is_named_in_a_test_that_works_it_out():
     said = compare(campaign, rows, marks, bands)
     said |= {"hypothesis": hypothesis(marks), "findings": findings(said["pooled"], GATE)}
     summary = {key: value for key, value in records[0].summary.items() if key not in ("certificate", "distances")}
-    written = keys_of([summary, *rows, *marks, *steps, said]) | set(STEP_COLUMNS)
+    written = keys_of([summary, *rows, *marks, *steps, said]) | set(Steps.__annotations__)
     tests = "".join((HERE / f"{name}.py").read_text() for name in BY_HAND)
     unnamed = sorted(key for key in written if f'"{key}"' not in tests and not key.startswith("step_ms_"))
     assert len(written) > 150

@@ -17,8 +17,8 @@ from chainslam.experiments.artifacts.settings import (
     record_of,
     trial_of,
 )
+from chainslam.experiments.commands.campaigns.compare import Compare
 from chainslam.experiments.commands.cli import main
-from chainslam.experiments.commands.compare import Compare
 from chainslam.experiments.commands.explore import Explore
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.experiments.usage import UsageError
@@ -53,6 +53,7 @@ NAMED = {
     "mission.free_space.fence": FENCE,
     "robot.outline_m": [[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]],
     "backend_options.own": {"MyConfig": {"gain": 0.5}},
+    "map": "results/first",
     "drawing.level": "1",
     "drawing.threshold": 0.5,
     "robot.faults.people.standing": [1.0, 2.0],

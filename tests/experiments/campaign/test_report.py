@@ -240,7 +240,7 @@ def test_lengths_that_no_run_reached_are_left_out():
 def test_the_command_on_the_page_runs_the_campaign_again():
     import tyro
 
-    from chainslam.experiments.commands.compare import Compare
+    from chainslam.experiments.commands.campaigns.compare import Compare
 
     words = command_of(CAMPAIGN).split()
     assert tyro.cli(Compare, args=words[2:]).campaign == CAMPAIGN

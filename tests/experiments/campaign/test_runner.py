@@ -134,6 +134,30 @@ def test_another_campaign_in_the_same_folder_is_refused_in_one_line(undisturbed,
 
 
 @pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (["--trials", "3"], ("--first-seed 3", "--merge")), (["--backends", "full-ekf"], ("--merge",)),
+        (["--max-steps", "13"], ("name another --out",)),
+    ],
+)  # fmt: skip
+def test_a_folder_of_another_campaign_is_refused_with_the_way_to_extend_it(
+    changed, words, undisturbed, tmp_path, capsys
+):
+    assert main(["compare", *WORDS, *changed, "--out", str(undisturbed)]) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in words)
+    assert ("--merge" in said) == ("--merge" in words)
+
+
+def test_the_trials_announced_are_those_that_are_run(tmp_path, capsys):
+    words = [*WORDS, "--modes", "replay", "--association", "own", "--jobs", "1", "--out", str(tmp_path / "campaign")]
+    assert main(["compare", *words]) == 0
+    said = capsys.readouterr().out
+    assert "4 trials, 2 of them recordings for the replays;" in said
+    assert "4 trials in " in said
+
+
+@pytest.mark.parametrize(
     "change",
     [
         ["--worlds", "nowhere"],

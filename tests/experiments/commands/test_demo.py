@@ -70,7 +70,7 @@ def test_force_holds_for_every_run_and_json_is_all_there_is(done, tmp_path, caps
 @pytest.mark.parametrize(("outcome", "status"), [("interrupted", 130), ("failed", 1)])
 def test_a_run_that_does_not_come_to_its_end_is_the_last(which, outcome, status, done, tmp_path, capsys):
     name = (demo.WORLD, *ESTIMATORS)[which]
-    done.ends[name] = {"outcome": outcome, "status": "stopped", "reason": "by a hand"}
+    done.ends[name] = {"outcome": outcome, "status": "stopped", "steps": 3, "reason": "by a hand"}
     assert main(["demo", "--out", str(tmp_path)]) == status
     said = capsys.readouterr()
     assert said.out == ""

@@ -11,7 +11,7 @@ from PIL import Image
 
 from chainslam.experiments.artifacts.files import json_bytes
 from chainslam.experiments.commands.cli import main
-from chainslam.experiments.commands.echo import campaign_line, expected_steps, run_line, world_lines
+from chainslam.experiments.library.echo import campaign_line, expected_steps, run_line, world_lines
 from chainslam.experiments.scenario import TrialConfig, load_world
 from chainslam.experiments.terminal.console import say
 from chainslam.experiments.trial import run_trial
@@ -147,5 +147,5 @@ def test_a_run_is_told_with_both_clocks_and_no_further_than_its_limit():
 
 def test_a_campaign_is_told_with_its_trials_and_processes():
     runs = [(load("rooms"), "full-ekf")] * 4
-    assert campaign_line(runs, 100, 2).startswith("expected, roughly: 4 trials; computing time 1 s to 6 s on 2 proc")
-    assert campaign_line(runs, 100, None).endswith("computing time 2 s to 12 s summed over all workers")
+    assert campaign_line(runs, 0, 100, 2).startswith("expected, roughly: 4 trials; computing time 1 s to 6 s on 2 proc")
+    assert campaign_line(runs, 1, 100, None).endswith("computing time 2 s to 12 s summed over all workers")

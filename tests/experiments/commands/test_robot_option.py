@@ -9,8 +9,8 @@ import pytest
 from chainslam.experiments.artifacts.presets import robot_of, stated
 from chainslam.experiments.artifacts.saved import read_trial
 from chainslam.experiments.artifacts.settings import parse_setting, trial_of
+from chainslam.experiments.commands.campaigns.compare import Compare
 from chainslam.experiments.commands.cli import main
-from chainslam.experiments.commands.compare import Compare
 from chainslam.experiments.commands.explore import Explore
 from chainslam.experiments.usage import UsageError
 from chainslam.sim.robots import ROBOTS

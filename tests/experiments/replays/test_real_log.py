@@ -190,7 +190,7 @@ def test_a_report_is_made_of_it(replayed, capsys):
 
 
 def test_the_same_command_leaves_the_same_bytes_and_another_is_refused_in_its_folder(replayed, tmp_path, capsys):
-    words = ["replay", str(replayed / "room.log"), "--out", str(tmp_path)]
+    words = ["replay", str(replayed / "room.log"), "--backend", "full-ekf", "--out", str(tmp_path)]
     assert main(words) == 0
     for name in ("trajectory_estimated.tum", "map.npz", "log.npz"):
         assert (tmp_path / name).read_bytes() == (replayed / "out" / "full-ekf" / name).read_bytes()
@@ -272,12 +272,13 @@ def test_every_and_noise_are_refused_for_a_runs_own_log(replayed, capsys, option
 
 @pytest.mark.parametrize("stop", ["SIGTERM", ""])
 def test_an_interrupt_in_second_looks_ends_them_and_keeps_the_map(stop, tmp_path, monkeypatch, capsys):
-    def interrupted(result):
+    def interrupted(result, goes_on):
         raise KeyboardInterrupt(stop) if stop else KeyboardInterrupt
 
     monkeypatch.setattr(real_log, "looked_again", interrupted)
     log = write_log(tmp_path / "room.log")
-    assert main(["replay", str(log), "--second-looks", "--out", str(tmp_path / "out")]) == 130
+    words = ["replay", str(log), "--backend", "full-ekf", "--second-looks", "--out", str(tmp_path / "out")]
+    assert main(words) == 130
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["status"], summary["outcome"]) == ("stopped", "interrupted")
     assert summary["reason"] == f"interrupted by {stop or 'Ctrl-C'} during offline refinement"

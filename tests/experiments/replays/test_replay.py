@@ -10,7 +10,7 @@ from chainslam.experiments.artifacts.results import write_results
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.replays.oracles import true_odometry
 from chainslam.experiments.replays.recordings import recorded
-from chainslam.experiments.replays.replay import ReplayOptions, read_run, replay
+from chainslam.experiments.replays.replay import ReplayedRobot, ReplayOptions, read_run, replay
 from chainslam.experiments.scenario import TrialConfig, sigmas_of
 from chainslam.experiments.trial import run_trial
 from chainslam.sim.logs.recorded_robot import RecordedRobot
@@ -51,6 +51,16 @@ def test_a_replay_of_a_drive_that_was_cut_short_says_so_and_is_not_complete(made
         assert summary["reason"] == reason
     whole = replay(recorded(result), "full-ekf").ending
     assert (whole.status, whole.reason) == ("complete", "the recording has ended")
+
+
+def test_where_the_robot_was_carried_a_replay_counts_no_path(made):
+    run = recorded(made[0])
+    carried = np.arange(len(run.recording)) == 7
+    robot = ReplayedRobot(run, replace(run.recording, carried=carried))
+    for _ in carried[1:]:
+        robot.drive(MotionCommand(0.0, 0.0))
+    driven = np.hypot(*run.recording.odometry[~carried, :2].T).sum()
+    assert robot.record.path_length_m == pytest.approx(driven)
 
 
 def test_a_log_on_disk_replays_like_the_run_in_memory(made):

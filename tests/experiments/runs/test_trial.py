@@ -34,13 +34,13 @@ def test_a_run_is_scored(world, scripted_mission):
     assert 0.0 < summary["planning_ms"]["mean"] < summary["step_ms"]["mean"]
 
 
-def test_what_was_compiled_is_linked_before_the_first_step(world, scripted_mission, monkeypatch):
+def test_the_compiler_is_loaded_before_the_first_step(world, scripted_mission, monkeypatch):
     order: list[str] = []
-    monkeypatch.setattr(trial_module, "link_kernels", lambda: order.append("linked"))
+    monkeypatch.setattr(trial_module, "prepare_kernels", lambda: order.append("prepared"))
     trial_module._prepare_process.cache_clear()
     run_trial(TrialConfig("square"), lambda step: order.append("step"), world, scripted_mission)
-    assert order[:2] == ["linked", "step"]
-    assert order.count("linked") == 1
+    assert order[:2] == ["prepared", "step"]
+    assert order.count("prepared") == 1
 
 
 def test_without_noise_there_is_no_nees_and_no_odometry_error(world, scripted_mission):

@@ -5,7 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from chainslam.experiments.artifacts.results import STEP_COLUMNS, steps_csv
+from chainslam.experiments.artifacts.results import steps_csv
+from chainslam.experiments.scoring.keys import Steps
 from chainslam.experiments.scoring.summary import nees_of_poses
 from tests.experiments.by_hand import COVS, OFF, TRUE, log_of
 
@@ -24,7 +25,7 @@ def test_each_column_is_that_of_its_name():
         wheel_noise_factor=np.array([1.0, 1.0, 3.0]),
     )
     rows = list(csv.DictReader(steps_csv(log).decode().splitlines()))
-    table = {name: [row[name] for row in rows] for name in STEP_COLUMNS}
+    table = {name: [row[name] for row in rows] for name in Steps.__annotations__}
     assert table.pop("reason") == ["begins", "follows", "ends"]
     assert table.pop("behaviour") == ["look", "follow", "look"]
     estimated = TRUE + OFF

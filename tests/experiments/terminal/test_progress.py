@@ -2,7 +2,8 @@
 
 import pytest
 
-from chainslam.experiments.terminal.progress import bar_of, duration, total_of
+from chainslam.experiments.terminal import progress
+from chainslam.experiments.terminal.progress import EVERY_S, bar_of, duration, share_of, total_of
 
 
 @pytest.mark.parametrize(
@@ -32,3 +33,20 @@ def test_progress_tells_what_is_left_on_a_terminal_and_nothing_elsewhere(capsys,
 def test_a_run_longer_than_expected_never_fills_its_bar():
     assert [done / total_of(10.0, done) for done in (1, 9, 20)] == pytest.approx([0.1, 0.9, 0.95])
     assert total_of(None, 3) is None
+
+
+def test_in_a_file_a_line_every_ten_seconds_tells_how_far_it_is_and_what_is_left(capsys, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    with share_of("refining offline") as watch:
+        for k in range(1, 41):
+            now[0] += EVERY_S / 10.0
+            watch(k / 80.0)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 4
+    assert said[1] == "chainslam: refining offline: 25 % after 20 s, 1 min 0 s left"
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with share_of("refining offline") as watch:
+        now[0] += 20.0 * EVERY_S
+        watch(0.5)
+    assert "after" not in capsys.readouterr().err

@@ -41,8 +41,11 @@ def test_a_file_after_an_option_of_many_values_is_the_commands(name, option, see
     rng = np.random.default_rng(seed)
     values = [f"v{k}" for k in range(int(rng.integers(1, 4)))]
     others = [["--force"], ["--out", "o"], ["--set", "a=b"]]
-    before = [word for k in rng.permutation(3)[: int(rng.integers(0, 3))] for word in others[k]]
-    after = ["--rrd", "r"] if rng.random() < 0.5 else []
+    known = {"--force", *_values(CLASSES[name])}
+    before = [
+        word for k in rng.permutation(3)[: int(rng.integers(0, 3))] if others[k][0] in known for word in others[k]
+    ]
+    after = ["--rrd", "r"] if rng.random() < 0.5 and "--rrd" in known else []
     rest = [*before, option, *values]
     assert in_order([name, *rest, "a file.x", *after], CLASSES[name]) == [name, "a file.x", *rest, *after]
     # What is not there, what is the only value, and a file beside one that stands alone are left where they are.

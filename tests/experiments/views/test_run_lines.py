@@ -51,6 +51,25 @@ def test_without_truth_walls_relations_and_nis_are_told(summary):
     assert numbers_in(consistent) == ["12", "3", "7", "0.250", "5.73", "4.00", "1"]
 
 
+def test_a_noise_model_is_told_only_where_it_is_off(summary):
+    untrue = summary | dict.fromkeys(("pose_rmse_m", "pose_anees_from_start", "coverage"))
+    for nis, share, words in ((0.5, 0.2, "conservative"), (2.0, 0.2, "overconfident")):
+        assert words in lines_of([untrue | {"nis": nis, "nis_in_band": share}])[1]
+    assert "noise model" not in lines_of([untrue | {"nis": 0.9, "nis_in_band": 0.6}])[1]
+
+
+def test_what_a_complete_run_did_not_reach_is_told_with_the_reasons(summary):
+    ends = [{"why": "beyond the fence"}, {"why": "still open after 4 views"}, {"why": "still open after 4 views"}]
+    gaps = [{"position_m": [1.0, 2.0], "why": "a gap of about 0.35 m"}] * 5
+    left = {"certificate": {"open_ends": ends, "narrow_gaps": gaps}}
+    happened, told, _ = lines_of([summary | {"outcome": "none-reachable"} | left])
+    assert happened == lines_of([summary])[0]
+    assert "3 open ends: still open after 4 views (2), beyond the fence (1)" in told
+    assert (told.count("a gap of about 0.35 m"), "2 more" in told) == (3, True)
+    assert len(lines_of([summary | left])) == 2, "a run that was stopped could have gone on"
+    assert len(lines_of([summary | {"outcome": "all-closed", "certificate": {"open_ends": []}}])) == 2
+
+
 def test_a_run_without_a_step_has_one_line():
     assert len(lines_of([{"status": "failed", "reason": "no wall", "steps": 0, "backend": "graph"}])) == 1
 

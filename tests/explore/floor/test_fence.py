@@ -1,6 +1,7 @@
 """A fence: nothing beyond it is floor, and nothing there is driven to, looked for or scored."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import chainslam
 from chainslam.experiments.artifacts.fences import fence_of
 from chainslam.experiments.commands.cli import main
 from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
+from chainslam.sim.worlds import World
 from chainslam.slam.robot import Scan
 
 BOX = ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0))
@@ -60,6 +62,15 @@ def test_a_mission_ends_at_the_fence(run):
     assert shapely.contains_xy(room, run.steps["true_x_m"], run.steps["true_y_m"]).all()
     assert run.summary["coverage"] > 0.99
     assert run.summary["swept"] > 0.95
+
+
+def test_only_rings_within_the_fence_are_to_be_closed():
+    free = shapely.box(0, 0, 6, 4).difference(shapely.union_all([shapely.box(x, 1.5, x + 1, 2.5) for x in (1.5, 4)]))
+    world = World("drawn", shapely.orient_polygons(free), np.array([0.7, 0.7, 0.0]), {})
+    assert world.reachable_contour().contours == 3
+    fenced = replace(world, fence=shapely.box(0, 0, 3.5, 4)).reachable_contour()
+    assert fenced.contours == 1, "the pillar within; the outline goes on beyond, and so is the other pillar"
+    assert fenced.length_m < world.reachable_contour().length_m
 
 
 def test_a_fence_is_a_box_or_a_polygon_in_a_file(tmp_path):

@@ -45,8 +45,9 @@ def test_an_end_that_is_open_after_its_views_is_set_aside_and_the_next_one_is_th
     kinds["EndErrand"].looks_done = looks
     ends = ends_at((1, 2), (4, 4))
     decision = ask(explorer_at(scene), scene, ends)
+    words = f"still open after {looks} view{'s' * (looks > 1)}"
     assert [(end.wall, end.reason) for end in decision.given_up.ends] == [
-        (0, f"still open after {looks} views"), (1, f"still open after {looks} views"),
+        (0, words), (1, words),
     ]  # fmt: skip
     assert names(made) == ["EndErrand", "EndErrand"]
 

@@ -48,6 +48,12 @@ def test_a_good_log_is_a_recording_and_is_played_to_its_end():
         robot.drive(MotionCommand(0.0, 0.0))
 
 
+def test_a_recording_tells_where_the_robot_was_carried():
+    robot = RecordedRobot(recording_of(arrays_of(carried=np.array([False, False, True]))))
+    assert [robot.drive(MotionCommand(0.0, 0.0)).carried for _ in range(2)] == [False, True]
+    assert not RecordedRobot(recording_of(arrays_of())).drive(MotionCommand(0.0, 0.0)).carried
+
+
 NAMES = ("time_s", "bearings_rad", "sigma_m", "sigma_share", "range_max_m", "odometry", "odometry_cov")
 FAULTS = {
     "no scan": (

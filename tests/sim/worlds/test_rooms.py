@@ -99,6 +99,13 @@ def test_a_room_with_a_hole_is_a_room_and_says_so(tmp_path):
     assert "assumed" in world.reading.start
 
 
+def test_a_door_drawn_as_a_polygon_is_counted_once(tmp_path):
+    rooms = [feature(shapely.box(x, 0, x + 3, 3), kind="room") for x in (0, 3.1)]
+    world = world_of(tmp_path, [*rooms, feature(shapely.box(2.9, 1, 3.2, 2), kind="door")])
+    assert world.reading is not None
+    assert world.reading.understood == "2 polygons as rooms, 1 door"
+
+
 def test_what_the_file_says_goes_before_what_the_shape_suggests(tmp_path):
     broad = shapely.box(0, 0, 12, 12).difference(shapely.box(4, 4, 8, 8))
     same(world_of(tmp_path, [feature(broad)]), broad)

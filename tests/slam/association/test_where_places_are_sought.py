@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chainslam.slam.association.place_search import Place, apart
+from chainslam.slam.association.place_search import Place, Window, apart
 from chainslam.slam.association.second_looks import loop_search
 from chainslam.slam.association.second_looks.closures import Closure, settled
 from chainslam.slam.association.second_looks.config import SecondLooksConfig
-from chainslam.slam.association.second_looks.loop_search import LoopSearch
+from chainslam.slam.association.second_looks.loop_search import Candidate, LoopSearch
 from chainslam.slam.association.second_looks.submaps import Returns
 from chainslam.slam.geometry.poses import compose, inverse
 from tests.slam.association.drives import driven, followed
@@ -103,7 +103,11 @@ def test_with_few_points_no_place_is_sought(points, is_sought, monkeypatch):
 def windows(at=70, **changes):
     """The old scans beside which a scan is sought, with the windows."""
     config = replace(CONFIG, closures=replace(PLACES, **changes))
-    return dict(search(config=config)._windows(at))
+    return sought(search(config=config), at)
+
+
+def sought(looked, at):
+    return {each.old: each.window for each in looked._candidates(at)}
 
 
 def test_a_place_is_sought_beside_the_nearest_old_scan_as_far_around_as_the_path_may_have_drifted():
@@ -118,50 +122,50 @@ def test_a_place_is_sought_beside_the_nearest_old_scan_as_far_around_as_the_path
 
 def test_places_that_the_robot_left_just_now_or_a_short_way_ago_are_not_sought():
     out = np.array([AHEAD] * 5 + [TURN] + [AHEAD] * 5 + [0.1 * AHEAD] * 12)
-    assert search(out)._windows(23) == []  # 5.6 m ago
-    assert dict(search(out, config=replace(CONFIG, closures=replace(PLACES, way_m=3.0)))._windows(23)).keys() == {0}
+    assert sought(search(out), 23) == {}  # 5.6 m ago
+    assert sought(search(out, config=replace(CONFIG, closures=replace(PLACES, way_m=3.0))), 23).keys() == {0}
     assert windows(61) != {}
     assert windows(61, recent=62) == {}
 
 
-def test_where_the_path_may_be_anywhere_no_place_is_sought():
-    assert windows(radius_share=0.5) == {}
-    assert windows(radius_share=0.1) != {}
-
-
 def test_three_stretches_are_tried_and_of_each_the_scan_that_is_nearest():
     laps = np.array([[*AHEAD[:2], np.pi / 20]] * 200)  # five laps of 20 m
-    found = search(laps)._windows(200)
-    assert [old for old, _ in found] == sorted((old for old, _ in found), key=lambda k: abs(k % 40))
+    found = [*sought(search(laps), 200)]
+    assert found == sorted(found, key=lambda k: abs(k % 40))
     assert len(found) == 3
 
 
 def test_ways_are_short_over_closures():
     looked = search()
-    assert looked._shortest_ways(70)[11] == pytest.approx(0.5 * 58)
+    assert looked._shortest_ways(70)[0][11] == pytest.approx(0.5 * 58)
     looked.closures.append(put(12, 69))
-    assert looked._shortest_ways(70)[11] == pytest.approx(0.5 + loop_search.NEAR_M + 0.5)
-    assert looked._windows(70) == []
+    assert looked._shortest_ways(70)[0][11] == pytest.approx(0.5 + loop_search.NEAR_M + 0.5)
+    assert looked._candidates(70) == []
 
 
 def test_after_a_slip_any_turn_is_tried_and_as_far_around_as_it_moved_what_came_after():
     slipped = search(returns=StandIn(slips=[66]))
-    (old, window), *_ = slipped._windows(70)
+    (old, window), *_ = sought(slipped, 70).items()
     lever = 2.0 * float(np.hypot(*(slipped.poses[70] - slipped.poses[66])[:2]))
     assert window.half_rad == np.pi
     assert window.half_m == pytest.approx(PLACES.radius_m + PLACES.radius_share * 0.5 * (69 - old) + lever, abs=0.05)
     assert lever == pytest.approx(4.0)
     # Over a slip even what was left just now is a place to come back to.
     short = search(np.array([AHEAD] * 4), StandIn(slips=[3]))
-    assert short._windows(4) != []
+    assert short._candidates(4) != []
 
 
 def test_an_old_submap_ends_where_the_robot_slipped():
     slipped = search(returns=StandIn(slips=[8, 14]))
-    assert search()._around(11, 70) == range(1, 21)
-    assert slipped._around(11, 70) == range(8, 14)
-    assert slipped._around(16, 70).start == 14
-    assert slipped._around(3, 70).stop == 8
+
+    def beside(old, half_m=1.0):
+        return Candidate(old, Window(np.zeros(3), half_m, 0.1))
+
+    assert search()._around(beside(11), 70) == range(1, 21)
+    assert search()._around(beside(11, 5.5), 70) == range(22)
+    assert slipped._around(beside(11), 70) == range(8, 14)
+    assert slipped._around(beside(16), 70).start == 14
+    assert slipped._around(beside(3), 70).stop == 8
 
 
 def place(x, score=0.9, rival=0.0):
@@ -185,13 +189,14 @@ def test_a_place_must_fit_and_have_no_rival_on_any_stretch(told, is_found, monke
     laps = np.array([[*AHEAD[:2], np.pi / 20]] * 100)
     looked, left = search(laps), list(told)
     looked._returns = StandIn(200)
-    assert len(looked._windows(100)) == 2
+    assert len(looked._candidates(100)) == 2
     monkeypatch.setattr(loop_search, "place_on", lambda *_: left.pop(0))
     found = looked._place(100)
     assert (found is not None) is is_found
     if found is not None:
+        closure, _ = found
         best = max((each for each in told if each is not None), key=lambda each: each.score)
-        np.testing.assert_allclose(compose(looked.poses[found.old], found.motion), best.pose, atol=1e-9)
+        np.testing.assert_allclose(compose(looked.poses[closure.old], closure.motion), best.pose, atol=1e-9)
 
 
 UNTOLD = np.array([AHEAD] * 80)

@@ -112,3 +112,25 @@ def test_a_map_that_was_lost_altogether_begins_anew(make_walls):
     np.testing.assert_allclose(backend.belief.pose_world, before.pose_world, atol=1e-12)
     np.testing.assert_allclose(backend.belief.pose_cov, before.pose_cov, atol=1e-12)
     assert backend._frame is not None
+
+
+@few
+@given(seed=seeds)
+def test_a_frame_moves_with_the_robot_and_its_covariance_to_first_order(seed):
+    rng = np.random.default_rng(seed)
+    frame, odometry = Frame(rng.uniform(-3, 3, 3), spread(3, rng)), Odometry(rng.uniform(-1, 1, 3), spread(3, rng))
+
+    def at(errors):
+        return compose(frame.pose_world + errors[:3], odometry.motion + errors[3:])
+
+    moved = frame.moved(odometry)
+    np.testing.assert_allclose(moved.pose_world, at(np.zeros(6)), atol=1e-12)
+    D = np.stack([wrap_heading(at(step) - at(-step)) / 2e-6 for step in 1e-6 * np.eye(6)], axis=-1)
+    both = np.zeros((6, 6))
+    both[:3, :3], both[3:, 3:] = frame.cov, odometry.cov
+    np.testing.assert_allclose(moved.cov, D @ both @ D.T, rtol=1e-6, atol=1e-9)
+
+
+def wrap_heading(step):
+    """Return a difference of two poses, its heading wrapped."""
+    return np.array([step[0], step[1], wrap(step[2])])

@@ -1,5 +1,6 @@
 """Scan matching tells the motion between scans, how sure it is, and finds the robot again where wheels have slipped."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -161,6 +162,25 @@ def test_a_matched_robot_senses_once_at_each_place_and_hands_that_scan_on():
             np.testing.assert_allclose(odometry.motion, compose(inverse(poses[k]), poses[k + 1]), atol=0.012)
             assert odometry.reported is odometry.wheels
             np.testing.assert_allclose(odometry.reported.motion - odometry.motion, [0.03, 0.0, 0.04], atol=0.012)
+
+
+def test_where_the_robot_was_carried_the_matcher_begins_anew_with_the_scan_there():
+    poses = walk()[[0, 1, 20, 21]]
+    inner, matcher = Scripted(poses), ScanMatcher()
+    robot, drive = MatchedRobot(inner, matcher), inner.drive
+    robot.sense()
+    robot.drive(MotionCommand(0.1, 0.0))
+    inner.drive = lambda command: replace(drive(command), carried=True)
+    told = robot.drive(MotionCommand(0.1, 0.0))
+    assert told.carried
+    assert not told.by_scans
+    assert told.wheels is None
+    np.testing.assert_array_equal(told.motion, compose(inverse(poses[1]), poses[2]) + np.array([0.03, 0.0, 0.04]))
+    inner.drive = drive
+    told = robot.drive(MotionCommand(0.1, 0.0))
+    assert inner.scans == 4
+    assert not told.carried
+    np.testing.assert_allclose(told.motion, compose(inverse(poses[2]), poses[3]), atol=0.012)
 
 
 class Mounted(Scripted):

@@ -51,7 +51,7 @@ def drawn(figure):
 
 def test_every_wall_has_its_number_and_every_pair_one_edge():
     names, legend, edges = drawn(draw_graph(room()))
-    assert names == ["3", "5", "eight", "120"]
+    assert names == ["3", "5", "eight", "120", "1 m"]  # the last is that of the scale bar
     assert legend == ["seen from there (two heads: both ways)", "neighbours in a chain"]
     walls, sights, neighbours = edges
     assert (walls, sights, neighbours) == (4, 2, 3)  # two heads on one of the sights

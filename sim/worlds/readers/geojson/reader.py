@@ -70,8 +70,9 @@ def _drawing(found: _Found, where: Laid, storey: str) -> Drawing:
     plan = plan_of(outlines, lines)
     openings, doors = _openings(found, lines)
     guessed = any(outline.kind is None for outline in outlines)
+    # A door drawn as a polygon is free floor, as a room is; it is counted as a door.
     words = [
-        counted(plan.rooms, "polygon as a room", "polygons as rooms"),
+        counted(plan.rooms - len(found.leaves), "polygon as a room", "polygons as rooms"),
         counted(len(polygons) - plan.rooms, "polygon as solid", "polygons as solid"),
         counted(len(found.lines), "line as a wall", "lines as walls"),
         counted(len(lines) - len(found.lines), "edge that rooms share as a wall", "edges that rooms share as walls"),

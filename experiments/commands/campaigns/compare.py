@@ -12,31 +12,32 @@ from chainslam.explore.following.wall_following import Following
 from chainslam.explore.planning.navigators import Navigation
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
-from ..artifacts.settings import drawing_settings, parse_settings
-from ..campaign.cluster import ClusterError, on_dask
-from ..campaign.comparison.tables import write_tables
-from ..campaign.contrast import contrast, read_contrast
-from ..campaign.merge import merge
-from ..campaign.pages.contrast_page import lines_of_contrast
-from ..campaign.pages.film import record_campaign
-from ..campaign.pages.lines import deciding_arm, lines_of
-from ..campaign.plan import (
+from ...artifacts.settings import drawing_settings, parse_settings
+from ...campaign.cluster import ClusterError, on_dask
+from ...campaign.comparison.tables import write_tables
+from ...campaign.contrast import contrast, read_contrast
+from ...campaign.merge import merge
+from ...campaign.pages.contrast_page import lines_of_contrast
+from ...campaign.pages.film import record_campaign
+from ...campaign.pages.lines import deciding_arm, lines_of
+from ...campaign.plan import (
+    RECORDING,
     Campaign,
     check_campaign,
     check_parts,
     drawing_of,
     trials,
 )
-from ..campaign.runner import on_cores, run_campaign
-from ..campaign.store import opened
-from ..library.asked import CampaignName, asked_campaign
-from ..replays.replay import Association
-from ..scenario import P0, load_world
-from ..terminal.answers import found
-from ..terminal.console import say, written
-from ..terminal.interrupts import INTERRUPTED
-from ..usage import UsageError
-from .echo import campaign_line, echo_world
+from ...campaign.runner import missing, on_cores, run_campaign
+from ...campaign.store import opened
+from ...library.asked import CampaignName, asked_campaign
+from ...library.echo import campaign_line, echo_world
+from ...replays.replay import Association
+from ...scenario import P0, load_world
+from ...terminal.answers import found
+from ...terminal.console import say, written
+from ...terminal.interrupts import INTERRUPTED
+from ...usage import UsageError
 
 FAILED = 1
 JOBS_A_CORE = 8
@@ -154,9 +155,11 @@ class Compare:
                     echo_world(world)
                 jobs = None if self.dask else self.jobs or len(os.sched_getaffinity(0))
                 by_name = dict(zip(campaign.worlds, worlds, strict=True))
-                left = [(by_name[trial.world], trial.backend) for trial in trials(campaign) if not store.has(trial)]
+                left = missing(store)
                 if left:
-                    say(campaign_line(left, campaign.max_steps, jobs))
+                    runs = [(by_name[trial.world], trial.backend or campaign.driver) for trial in left]
+                    recorded = sum(trial.arm == RECORDING for trial in left)
+                    say(campaign_line(runs, recorded, campaign.max_steps, jobs))
                 tally = run_campaign(store, executor)
             except KeyboardInterrupt:
                 print(f"chainslam: interrupted; finished trials are kept in {self.out}, and the same command continues",

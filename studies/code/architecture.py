@@ -1,6 +1,6 @@
 """The rooms of the code as one picture, drawn from the import contracts that `make check` holds and from the imports.
 
-.venv/bin/python -m studies.architecture --out docs/pictures/architecture.svg
+.venv/bin/python -m studies.code.architecture --out docs/pictures/architecture.svg
 """
 
 import textwrap
@@ -146,7 +146,7 @@ def _box(left: float, bottom: float, width: float, height: float, face: str, edg
 
 def main() -> int:
     """Draw the picture."""
-    asked = tyro.cli(Asked, prog="studies.architecture")
+    asked = tyro.cli(Asked, prog="studies.code.architecture")
     asked.out.parent.mkdir(parents=True, exist_ok=True)
     asked.out.write_bytes(saved(draw(rooms(Path()), imports(list(PLACES))), asked.out.suffix[1:]))  # type: ignore[arg-type]
     return 0

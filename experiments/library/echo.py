@@ -74,12 +74,16 @@ def run_line(world: World, trial: TrialConfig) -> str:
     )
 
 
-def campaign_line(runs: Iterable[tuple[World, str]], most: int, processes: int | None) -> str:
-    """Return an estimate of the computing time of many runs, each given by its world and back end, in one line."""
+def campaign_line(runs: Iterable[tuple[World, str]], recorded: int, most: int, processes: int | None) -> str:
+    """Return an estimate of the computing time of many runs, each given by its world and back end, in one line.
+
+    Of these, `recorded` are only driven to be replayed.
+    """
     each = [expected_computing_s(world, backend, most) for world, backend in runs]
     low, high = (sum(column) / (processes or 1) for column in zip(*each, strict=True))
     where = "summed over all workers" if processes is None else f"on {processes} process{'es' if processes > 1 else ''}"
-    return f"expected, roughly: {len(each)} trials; computing time {_range(_about(low), _about(high))} {where}"
+    also = f", {recorded} of them recordings for the replays" if recorded else ""
+    return f"expected, roughly: {len(each)} trials{also}; computing time {_range(_about(low), _about(high))} {where}"
 
 
 def _range(low: str, high: str) -> str:

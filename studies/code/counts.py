@@ -1,7 +1,7 @@
 """How large the code is where size hurts: numbers that one may tune, entries of a folder, arrows between files.
 
-.venv/bin/python -m studies.counts            # a table
-.venv/bin/python -m studies.counts --numbers  # every such number that is no setting, with its value and place
+.venv/bin/python -m studies.code.counts            # a table
+.venv/bin/python -m studies.code.counts --numbers  # every such number that is no setting, with its value and place
 """
 
 import ast
@@ -203,7 +203,7 @@ def _cell(text: str) -> str:
 
 def main() -> int:
     """Print the counts, or the numbers."""
-    asked, console = tyro.cli(Asked, prog="studies.counts"), Console()
+    asked, console = tyro.cli(Asked, prog="studies.code.counts"), Console()
     numbers = tunable(asked.root)
     if asked.numbers:
         print(page(numbers), end="")

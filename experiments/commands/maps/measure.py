@@ -6,14 +6,18 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
+from rich.console import Console
 from rich.table import Table
 
-from ..artifacts.maps.mapped import MappedCorners, read_corners
-from ..artifacts.saved import read_config
-from ..scoring.maps.measurements import Measured
-from ..terminal.answers import found
-from ..terminal.console import plain_console
-from ..usage import UsageError
+from ...artifacts.maps.mapped import MappedCorners, read_corners
+from ...artifacts.saved import read_config
+from ...scoring.maps.measurements import Measured
+from ...terminal.answers import found
+from ...terminal.console import plain_console
+from ...usage import UsageError
+from ...views.plans.faces import END_SIGMA_M
+from ...views.plans.records import HEAD, ROUGH, dimension_record, dimension_rows, direction_record, named
+from ...views.plans.survey import survey_at
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,11 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         corners=[_corner_record(mapped, k) for k in range(len(mapped))],
         rooms=[_room_record(mapped, room) for room in mapped.rooms],
     )
+    measured = survey_at(folder)
+    found(
+        dimensions=[dimension_record(measured, name, each) for name, each in named(measured)],
+        main_direction=direction_record(measured),
+    )
     corners = Table(title=f"corners of {folder}{_estimator(folder)}", title_justify="left")
     for title in ("corner", "x m", "y m", "sigma mm", "walls", "chain"):
         corners.add_column(title, justify="right")
@@ -59,9 +68,21 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         sigma = f"{spread:.1f}" if mapped.sharp[k] else "collinear"
         corners.add_row(str(k), f"{x:.3f}", f"{y:.3f}", sigma, f"{walls[0]}, {walls[1]}", str(mapped.chains[k]))
     console.print(corners)
-    if not mapped.rooms:
-        print("no chain is closed, so there is no area")
-        return
+    if mapped.rooms:
+        _list_chains(mapped, console)
+    else:
+        print("no chain is closed")
+    dimensions = Table(title="dimensions, `chainslam plan` draws them", title_justify="left")
+    for title in HEAD:
+        dimensions.add_column(title, justify="right" if title == HEAD[1] else "left")
+    for row in dimension_rows(measured):
+        dimensions.add_row(*row)
+    console.print(dimensions)
+    if not all(each.is_firm for each in measured.dimensions):
+        print(f"{ROUGH} an end without a corner, taken to be known to {100 * END_SIGMA_M:g} cm (1 sigma)")
+
+
+def _list_chains(mapped: MappedCorners, console: Console) -> None:
     rooms = Table(title="closed chains, value and 95 % interval", title_justify="left")
     for title in ("chain", "is", "corners", "area m²", "length m"):
         rooms.add_column(title, justify="left" if title == "is" else "right")

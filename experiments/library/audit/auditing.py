@@ -1,0 +1,192 @@
+"""`audit` as a function: trajectories of any SLAM system, and what can be said of their covariances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chainslam.sim.logs.rosbag import is_bag
+
+from ...artifacts.files import json_bytes, stamp, write
+from ...artifacts.run_folder import prepare
+from ...scoring.without_truth.references import read_relations
+from ...usage import UsageError
+from .audited import Align, Audited, Options, audited, audited_relations
+from .bags import read_poses
+from .graphs import is_graph, read_graph
+from .stated import Frame, Stated, read_folder, read_text
+from .verdicts import Pair, Pooled, compare, pool
+from .words import lines, pooled_line
+
+Paths = str | Path | Sequence[str | Path]
+GIVE = "give --truth FILE, --reference FILE or --relations FILE"
+REPORT, RECORD, TABLES = "report.html", "audit.json", "tables.tex"
+
+
+@dataclass(frozen=True, repr=False)
+class Audit:
+    """An audit of one or several trajectories."""
+
+    trajectories: tuple[Audited, ...]
+    pooled: Pooled | None
+    """Over several runs of one estimator, each with a truth of its own."""
+    pairs: tuple[Pair, ...]
+    """Of several estimators on one drive."""
+    asked: tuple[str, ...]
+    """The words of the command that makes it."""
+
+    @property
+    def verdict(self) -> list[str]:
+        """The findings, in words: four to six lines for each trajectory."""
+        is_told = "--error" in self.asked
+        each = [line for found in self.trajectories for line in lines(found, is_told)]
+        return [*each, *self._pooled(), *(pair.told() for pair in self.pairs)]
+
+    def _pooled(self) -> list[str]:
+        return [] if self.pooled is None else [pooled_line(self.pooled)]
+
+    def record(self) -> dict[str, Any]:
+        """Return all figures, by name."""
+        pooled = self.pooled
+        return {
+            "trajectories": [each.record() for each in self.trajectories],
+            "pooled": pooled and {
+                "runs": pooled.runs, "verdict": pooled.verdict.words, "factor": pooled.verdict.factor,
+                "factor_interval": pooled.verdict.factor_interval, "anees": pooled.anees,
+                "anees_interval": [pooled.low, pooled.high],
+            },
+            "pairs": [
+                {"first": pair.first, "second": pair.second, "nees_ratio": pair.ratio,
+                 "nees_ratio_interval": pair.interval, "stretches": pair.blocks} for pair in self.pairs
+            ],
+        }  # fmt: skip
+
+    def report(self, folder: str | Path) -> Path:
+        """Write audit.json, report.html and tables.tex into a folder, and return the path of the report."""
+        from chainslam.viz.reports.report import html, latex
+
+        from .page import page_of
+
+        place = Path(folder)
+        prepare(place)
+        singles = [f"{each.name}: {each.verdict.told()}" for each in self.trajectories]
+        told = [*self._pooled(), *singles, *(pair.told() for pair in self.pairs)]
+        page = page_of(self.trajectories, self.pooled, self.pairs, told, self.asked)
+        write(place / RECORD, json_bytes({**stamp(), "command": list(self.asked), **self.record()}))
+        write(place / TABLES, latex(page.all_tables))
+        write(place / REPORT, html(page))
+        return place / REPORT
+
+    def __repr__(self) -> str:
+        return "\n".join(self.verdict)
+
+
+def audit(
+    trajectories: Paths,
+    *,
+    truth: Paths = (),
+    reference: Paths = (),
+    relations: str | Path | None = None,
+    error: Frame | None = None,
+    align: Align = "none",
+    reference_sigma: tuple[float, float] | None = None,
+    nearest: float | None = None,
+    topic: str | None = None,
+    truth_topic: str | None = None,
+) -> Audit:
+    """Tell whether the covariances of trajectories may be believed, as `chainslam audit` does.
+
+    `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
+    (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
+    estimators. `relations` is a file of measured relations between poses. `error` is the frame that the covariances are
+    stated in: "additive" (the default), "body" or "world". `nearest` takes the nearest true pose within so many
+    seconds, which is otherwise interpolated. Raises UsageError for bad input.
+    """
+    paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
+    given: dict[str, Any] = {
+        "truth": true, "reference": references, "relations": [] if relations is None else [relations],
+        "error": [] if error is None else [error], "align": [] if align == "none" else [align],
+        "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],
+        "topic": [] if topic is None else [topic], "truth-topic": [] if truth_topic is None else [truth_topic],
+    }  # fmt: skip
+    _check(paths, given)
+    asked = ["chainslam", "audit", *map(str, paths)]
+    asked += [word for name, values in given.items() if values for word in (f"--{name}", *map(str, values))]
+    options = Options(error, align, reference_sigma, nearest)
+    stated = _named([read(path, topic) for path in paths])
+    if relations is not None:
+        measured = read_relations(Path(relations))
+        found = tuple(audited_relations(each, measured, options) for each in stated)
+        return Audit(found, None, _pairs(found, stated[:1] * len(found)), tuple(asked))
+    known = true or references or _own(stated)
+    if len(known) not in (1, len(paths)):
+        raise UsageError(
+            f"expected one truth for all or one for each of {len(paths)} trajectories, found {len(known)}: correct it"
+        )
+    truths = [read(path, truth_topic, needs_covariance=False) for path in known]
+    every = truths if len(truths) == len(stated) else truths * len(stated)
+    found = tuple(audited(each, against, options) for each, against in zip(stated, every, strict=True))
+    estimators = {each.estimator for each in stated} - {None}
+    if len(stated) > 1 and len(truths) == len(stated) and (len(estimators) < 2 or true or references):
+        return Audit(found, pool([each.pose for each in found]), (), tuple(asked))
+    return Audit(found, None, _pairs(found, every), tuple(asked))
+
+
+def read(path: Path, topic: str | None = None, needs_covariance: bool = True) -> Stated:
+    """Read a trajectory of whatever format; raises UsageError."""
+    if is_graph(path):
+        return read_graph(path)
+    if is_bag(path):
+        return read_poses(path, topic, needs_covariance)
+    return read_folder(path) if path.is_dir() else read_text(path)
+
+
+def _paths(given: Paths) -> list[Path]:
+    return [Path(given)] if isinstance(given, str | Path) else [Path(each) for each in given]
+
+
+def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
+    if not paths:
+        raise UsageError("expected a trajectory with covariances, found none: name a file or the folder of a run first")
+    against = [f"--{name}" for name in ("truth", "reference", "relations") if given[name]]
+    if len(against) > 1:
+        raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
+    sigma = given["reference-sigma"]
+    if sigma and (not given["reference"] or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):
+        found = f"{sigma[0]:g} {sigma[1]:g}" if given["reference"] else "no reference"
+        raise UsageError(f"expected --reference-sigma METRES RADIANS of a --reference, found {found}: correct it")
+    if given["nearest"] and not 0.0 <= given["nearest"][0] < float("inf"):
+        raise UsageError(f"expected --nearest as seconds, found {given['nearest'][0]:g}: correct it")
+
+
+def _own(stated: Sequence[Stated]) -> list[Path]:
+    """Return the truths in the folders of runs; raises UsageError if one has none."""
+    for each in stated:
+        if each.truth is None:
+            raise UsageError(f"expected something to compare {each.name} with, found none: {GIVE}")
+    return [each.truth for each in stated if each.truth is not None]
+
+
+def _named(stated: Sequence[Stated]) -> list[Stated]:
+    """Return trajectories with different names."""
+    names = [each.name for each in stated]
+    return [
+        replace(each, name=f"{each.name} ({k})") if names.count(each.name) > 1 else each
+        for k, each in enumerate(stated, 1)
+    ]
+
+
+def _pairs(found: Sequence[Audited], truths: Sequence[Stated]) -> tuple[Pair, ...]:
+    """Return the comparison of every two estimates of one drive at the times that both have."""
+    pairs = []
+    for (one, true), (other, also) in combinations(zip(found, truths, strict=True), 2):
+        _, a, b = np.intersect1d(np.round(one.time_s, 3), np.round(other.time_s, 3), return_indices=True)
+        if len(a) and np.array_equal(true.poses_world, also.poses_world):
+            draws = min(one.pose.draws, other.pose.draws) * len(a) / max(len(one.time_s), len(other.time_s))
+            pairs.append(compare((one.name, other.name), one.nees[a], other.nees[b], draws))
+    return tuple(pairs)

@@ -1,0 +1,236 @@
+"""A trajectory with the covariances that its estimator states, as text: TUM, CSV, or the folder of a run."""
+
+import csv
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from chainslam.sim.logs.archive import regular
+from chainslam.sim.logs.recorded_robot import MOST_M
+from chainslam.slam.geometry.poses import wrap
+
+from ...artifacts.saved import read_summary
+from ...usage import UsageError
+
+Frame = Literal["additive", "body", "world"]
+PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
+MOST_BYTES = 2**28
+PLANE_TO_SPACE = (0, 1, 5)
+"""Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
+UNIT = 0.02
+"""Largest difference of a quaternion's length from 1."""
+TILTED_RAD = 0.2
+"""A robot that is tilted by more does not move in the plane."""
+TUM, PLANAR = 8, 4
+WIDTHS = {0: 0, 6: 3, 9: 3, 21: 6, 36: 6}
+"""Columns behind a pose, upper triangle or full matrix, and the size of the covariance."""
+FORMATS = (
+    "t x y z qx qy qz qw (TUM) or t x y theta, each with 6 more columns xx xy xt yy yt tt, or 21 of a 6 x 6 covariance"
+)
+NAMES = {
+    "t": ("time", "time_s", "t", "timestamp", "stamp", "sec", "seconds"),
+    "x": ("x", "x_m", "px", "pose_x", "position_x"),
+    "y": ("y", "y_m", "py", "pose_y", "position_y"),
+    "theta": ("theta", "theta_rad", "heading", "heading_rad", "yaw", "yaw_rad", "th", "phi"),
+    **{name: (name, f"orientation_{name[1]}") for name in ("qx", "qy", "qz", "qw")},
+}
+"""Names of CSV columns."""
+COV = re.compile(r"(?:cov|p|c)?_?(x|y|t|th|theta|yaw|heading)_?(x|y|t|th|theta|yaw|heading)")
+AXES = {"x": 0, "y": 1}
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A trajectory of n poses."""
+
+    name: str
+    time_s: Float[np.ndarray, " n"]
+    poses_world: Float[np.ndarray, "n 3"]
+    """x m, y m, heading rad."""
+    covs: Float[np.ndarray, "n d d"] | None = None
+    """Of (x, y, heading), or of x y z roll pitch yaw; None for a truth."""
+    notes: tuple[str, ...] = ()
+    """What was assumed, in words."""
+    frame: Frame | None = None
+    """The frame of the errors, if the file tells it."""
+    held: int | None = None
+    """Row of the pose that is the frame of the others, and known in it."""
+    pair_covs: PairCovs | None = None
+    """The joint covariance of two poses, each in its body frame, given their rows."""
+    truth: Path | None = None
+    """The truth in the same folder."""
+    estimator: str | None = None
+    """The back end of a run of ours."""
+    anees_from_start: float | None = None
+    """The ANEES relative to the start, as the run itself has it."""
+
+    @property
+    def planar(self) -> Float[np.ndarray, "n 3 3"] | None:
+        """The covariances of x, y and heading."""
+        if self.covs is None or self.covs.shape[1] == 3:
+            return self.covs
+        return np.asarray(self.covs[:, PLANE_TO_SPACE][:, :, PLANE_TO_SPACE])
+
+
+def read_folder(folder: Path) -> Stated:
+    """Read the poses, covariances and truth of a run of ours; raises UsageError."""
+    if not (folder / "steps.csv").is_file():
+        raise UsageError(f"expected a trajectory, found {folder} without steps.csv: name a file, or a run's folder")
+    summary, truth = read_summary(folder), folder / "trajectory_true.tum"
+    return replace(
+        read_text(folder / "steps.csv"),
+        name=folder.resolve().name,
+        truth=truth if truth.is_file() else None,
+        estimator=str(summary["backend"]),
+        anees_from_start=summary.get("pose_anees_from_start"),
+    )
+
+
+def read_text(path: Path) -> Stated:
+    """Read a trajectory in the TUM format, as `t x y theta`, or as CSV with a header; raises UsageError."""
+    header, rows = _table(path)
+    if header is None:
+        time_s, poses, covs, notes = _by_place(path, rows)
+    else:
+        time_s, poses, covs, notes = _by_name(path, header, rows)
+    if not np.all(np.isfinite(time_s)) or not np.all(np.isfinite(poses)) or np.abs(poses[:, :2]).max() > MOST_M:
+        at = int(np.flatnonzero(~np.isfinite(time_s) | ~np.all(np.isfinite(poses), axis=1)).min(initial=len(rows)))
+        where = f"in row {at + 1}" if at < len(rows) else f"beyond {MOST_M:g} m"
+        raise UsageError(f"expected times and poses that are numbers, found others {where} of {path}: correct it")
+    order = np.argsort(time_s, kind="stable")
+    if np.any(np.diff(order) < 0):
+        notes = (*notes, "its rows were sorted by time")
+    return Stated(path.name, time_s[order], poses[order], None if covs is None else covs[order], notes)
+
+
+Columns = tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"], Float[np.ndarray, "n d d"] | None, tuple[str, ...]]
+
+
+def _by_place(path: Path, rows: Float[np.ndarray, "n w"]) -> Columns:
+    width = rows.shape[1]
+    first = TUM if width - TUM in WIDTHS else PLANAR
+    if width - first not in WIDTHS:
+        raise UsageError(f"expected {FORMATS}, found {width} columns in {path}: correct it")
+    notes: tuple[str, ...] = ()
+    if first == PLANAR:
+        heading = _in_radians(rows[:, 3], path)
+    else:
+        heading, notes = heading_of(rows[:, 4:8], path)
+    size = WIDTHS[width - first]
+    covs = symmetric(rows[:, first:], size) if size else None
+    return rows[:, 0], np.column_stack([rows[:, 1:3], heading]), covs, notes
+
+
+def _by_name(path: Path, header: Sequence[str], rows: Float[np.ndarray, "n w"]) -> Columns:
+    names = [word.strip().strip('"').lower() for word in header]
+    known = {key: names.index(found) for key, words in NAMES.items() if (found := _first(words, names)) is not None}
+    missing = [key for key in ("t", "x", "y") if key not in known]
+    if missing or ("theta" not in known and not {"qz", "qw"} <= set(known)):
+        raise UsageError(
+            f"expected columns t, x, y and theta (or qx qy qz qw) in {path}, found {', '.join(names[:12])}: rename them"
+        )
+    notes: tuple[str, ...] = ()
+    if "theta" in known:
+        heading = _in_radians(rows[:, known["theta"]], path)
+    else:
+        parts = [rows[:, known[q]] if q in known else np.zeros(len(rows)) for q in ("qx", "qy", "qz", "qw")]
+        heading, notes = heading_of(np.stack(parts, axis=1), path)
+    cells = {pair: k for k, name in enumerate(names) if (pair := _pair(name)) is not None and k not in known.values()}
+    poses = np.column_stack([rows[:, known["x"]], rows[:, known["y"]], heading])
+    if not {(0, 0), (1, 1), (2, 2)} <= set(cells):
+        return rows[:, known["t"]], poses, None, notes
+    covs = np.zeros((len(rows), 3, 3))
+    for (i, j), k in cells.items():
+        covs[:, i, j] = covs[:, j, i] = rows[:, k]
+    if len(cells) < 6:
+        notes = (*notes, "correlations without a column count as 0")
+    return rows[:, known["t"]], poses, covs, notes
+
+
+def _first(words: Sequence[str], names: Sequence[str]) -> str | None:
+    return next((word for word in words if word in names), None)
+
+
+def _pair(name: str) -> tuple[int, int] | None:
+    """Return the row and column of a covariance that a column is named after."""
+    found = COV.fullmatch(name)
+    if found is None:
+        return None
+    i, j = (AXES.get(axis, 2) for axis in found.groups())
+    return min(i, j), max(i, j)
+
+
+def symmetric(cells: Float[np.ndarray, "n w"], size: int) -> Float[np.ndarray, "n d d"]:
+    """Return matrices from their upper triangles, row by row, or from all their cells."""
+    if cells.shape[1] == size * size:
+        return np.asarray(cells.reshape(-1, size, size))
+    covs = np.zeros((len(cells), size, size))
+    upper = np.triu_indices(size)
+    covs[:, upper[0], upper[1]] = covs[:, upper[1], upper[0]] = cells
+    return covs
+
+
+def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
+    """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
+    length = np.linalg.norm(np.clip(q, -9.0, 9.0), axis=1)  # beyond, its square may be infinite
+    if np.any(bad := ~(np.abs(length - 1.0) < UNIT)):
+        raise UsageError(
+            f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in row"
+            f" {np.flatnonzero(bad)[0] + 1}: correct it"
+        )
+    x, y, z, w = (q / length[:, None]).T
+    tilt = float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
+    notes = ("the robot tilts, and only x, y and yaw are audited",) if tilt > TILTED_RAD else ()
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)), notes
+
+
+def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarray, " n"]:
+    # Nobody winds up so far in steps that never come near a whole turn.
+    if np.abs(heading).max(initial=0.0) > 2.0 * np.pi and np.abs(np.diff(heading)).max(initial=0.0) > 2.0 * np.pi + 0.5:
+        raise UsageError(f"expected headings in radians in {path}, found {np.abs(heading).max():.4g}: degrees?")
+    return np.asarray(wrap(heading))
+
+
+def _table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
+    """Return the header of a text file, if it has one, and its numbers; raises UsageError."""
+    expected = f"expected a trajectory ({FORMATS}; or CSV with named columns)"
+    try:
+        if regular(path).stat().st_size > MOST_BYTES:
+            raise UsageError(f"{expected}, found {path} of more than {MOST_BYTES >> 20} MiB: name another")
+        lines = path.read_text(encoding="latin-1").splitlines()
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise UsageError(f"{expected}, found {path} ({reason}): name a file that exists") from error
+    header: list[str] | None = None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip()[0] in "#%":
+            continue
+        words = next(csv.reader([line])) if "," in line else line.split()
+        numbers = [_number(word) for word in words]
+        if not rows and header is None and len(words) > 1 and None in numbers:
+            header = words
+            continue
+        if header is None and None in numbers:
+            raise UsageError(f"expected numbers in line {number} of {path}, found other words: correct it")
+        if len(words) != len(header or rows[0] if header or rows else words):
+            raise UsageError(
+                f"expected {len(header or rows[0])} columns in line {number} of {path}, found {len(words)}: correct it"
+            )
+        rows.append([float("nan") if each is None else each for each in numbers])
+    if not rows:
+        raise UsageError(f"{expected}, found no row in {path}: name another file")
+    return header, np.array(rows)
+
+
+def _number(word: str) -> float | None:
+    """Return a cell as a number, NaN for an empty one; None for words, as tables with a header may have them."""
+    try:
+        return float(word.strip() or "nan")
+    except ValueError:
+        return None

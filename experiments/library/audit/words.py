@@ -1,0 +1,43 @@
+"""An audit in words."""
+
+from math import degrees
+from typing import Any
+
+from ...views.numbers import number, percent
+from .audited import DEFAULT, IN_WORDS, Audited
+from .draws import LEVELS
+from .verdicts import TOO_FEW, Pooled
+
+
+def lines(found: Audited, is_told: bool) -> list[str]:
+    """Return the audit of a trajectory in four to six lines; `is_told` says whether the frame was asked for."""
+    record, pose = found.record(), found.pose
+    least = "at least " if found.is_bound else ""
+    start = "" if found.from_start is None else f", relative to the start {number(found.from_start)}"
+    frame = IN_WORDS[found.frame] + ("" if is_told or found.frame != DEFAULT else ", by default")
+    inside = percent(pose.covered[LEVELS.index(0.95)])
+    told = [
+        f"{found.name}: {found.verdict.told()}",
+        f"  ANEES {least}{number(pose.anees)} (95 % interval {number(pose.low)} to {number(pose.high)}; ideally 1):"
+        f" position {number(found.position.anees)}, heading {number(found.heading.anees)}{start}",
+        f"  {pose.count:,} {found.what}, effective sample size {number(pose.draws, 2)}; {inside} % of them inside"
+        f" their 95 % region; {frame}",
+        f"  rms error {_sizes(record, 'rms')}, stated {_sizes(record, 'stated')}",
+    ]
+    if found.notes:
+        told.append(f"  note: {'; '.join(found.notes)}")
+    if found.hints:
+        told.append(f"  hint: {'; '.join(found.hints)}")
+    return told
+
+
+def _sizes(record: dict[str, Any], kind: str) -> str:
+    metres, turn = record[f"{kind}_position_m"], record[f"{kind}_heading_rad"]
+    return f"{number(metres)} m and {number(degrees(turn))} degrees"
+
+
+def pooled_line(found: Pooled) -> str:
+    """Return the verdict over several runs of one estimator."""
+    many = f"mean ANEES {number(found.anees)}, 95 % interval {number(found.low)} to {number(found.high)}"
+    many = f" ({many})" if found.verdict.words == TOO_FEW else f"; {many}"
+    return f"{found.runs} runs together: {found.verdict.told()}{many}"

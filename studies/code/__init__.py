@@ -1,0 +1,1 @@
+"""Counts and a picture of the source code itself."""
