@@ -9,7 +9,7 @@ import networkx as nx
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.robot import MotionCommand, Odometry
 
-from ..following.wall_following import Surroundings
+from ..following.surroundings import Surroundings
 from .decider import Decision, Driver
 
 
