@@ -5,14 +5,14 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
-from chainslam.slam.geometry.poses import arc, compose, to_world
-from chainslam.slam.robot import MotionCommand
+from chainslam.slam.geometry.poses import arc, compose, to_world, wrap
+from chainslam.slam.robot import MotionCommand, RobotSpec
 from chainslam.slam.robot.body import reaches_m, rim_of
 
 from ..floor.accumulated_returns import steadied
 from ..planning.paths import Field, Path, Planner
 from .driving_config import DrivingConfig
-from .motion_kernels import Motions, cells_ahead, clearance_m, cost_of_plan, metres_at, search
+from .motion_kernels import Motions, cells_ahead, clearance_m, cost_of_plan, metres_at, search, step_room_m
 from .surroundings import Surroundings
 
 _NOTHING = np.zeros((0, 2))
@@ -41,11 +41,12 @@ class Controller:
         The plan is kept until a single step is left or it is not safe any more, and where another is not better.
         """
         config, (commands, motions), pose = self._config, motions_of(self._config), around.pose_world
-        points = to_world(obstacles(around, config), pose)
-        plan, cost_m = self._plan, cost_of_plan(pose, self._plan, points, motions, field)
+        points, unseen = (to_world(places(around, config), pose) for places in (obstacles, out_of_view))
+        plan, cost_m = self._plan, cost_of_plan(pose, self._plan, points, unseen, motions, field)
         if len(plan) < 2 or not np.isfinite(cost_m):
-            found = search(pose, points, motions, field, config.better_m)
-            if cost_of_plan(pose, found, points, motions, field) < cost_m - config.better_m or not np.isfinite(cost_m):
+            found = search(pose, points, unseen, motions, field, config.better_m)
+            found_m = cost_of_plan(pose, found, points, unseen, motions, field)
+            if found_m < cost_m - config.better_m or not np.isfinite(cost_m):
                 plan = found
         self._plan = plan[1:]
         return careful(commands[plan[0]], around, config) if len(plan) else None
@@ -85,6 +86,41 @@ class Pilot:
 def obstacles(around: Surroundings, config: DrivingConfig) -> Float[np.ndarray, "m 2"]:
     """Return what the body keeps clear of: what the last scans hit and what it touched, robot frame, m."""
     return np.concatenate([steadied(around.scan, around.recent_robot, config.robot), around.touched_robot])
+
+
+def out_of_view(around: Surroundings, config: DrivingConfig) -> Float[np.ndarray, "u 2"]:
+    """Return places beside the body that no scan has shown and the scanner does not look at now, robot frame, m."""
+    scan, robot = around.scan, config.robot
+    if scan.is_full_turn:
+        return _NOTHING
+    last, first = scan.bearings_rad[-1], scan.bearings_rad[0]
+    places = _beside(robot, around.free_space.config.cell_m)
+    scanner = robot.scanner.pose_robot
+    bearings = wrap(np.arctan2(places[:, 1] - scanner[1], places[:, 0] - scanner[0]) - scanner[2])
+    places = places[np.abs(wrap(bearings - 0.5 * (first + last))) > 0.5 * (last - first)]
+    return places[around.free_space.unknown_at(to_world(places, around.pose_world))]
+
+
+@lru_cache(maxsize=16)
+def _beside(robot: RobotSpec, cell_m: float) -> Float[np.ndarray, "n 2"]:
+    """Return places beside the body as far as a step leads, a cell apart, m, robot frame."""
+    far_m = robot.radius_m + robot.step_m
+    axis = np.arange(-far_m, far_m, cell_m)
+    places = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    off_m = reaches_m(places, robot) - robot.radius_m
+    return places[(off_m > 0.0) & (off_m < robot.step_m)]
+
+
+def spin(around: Surroundings, share: float, config: DrivingConfig) -> MotionCommand:
+    """Return the turn on the spot nearest to a share of the widest for which the body has room; none without any."""
+    (commands, motions), here = motions_of(config), np.zeros(3)
+    points = np.concatenate([obstacles(around, config), out_of_view(around, config)])
+    now_m = clearance_m(0.0, 0.0, 0.0, points, motions, motions.wide_m)
+    turns = [a for a, each in enumerate(commands) if each.forward_m == 0.0]
+    for a in sorted(turns, key=lambda a: abs(commands[a].turn_rad - share * config.robot.turn_rad)):
+        if step_room_m(here, a, now_m, points, motions) > -np.inf:
+            return commands[a]
+    return MotionCommand(0.0, 0.0)
 
 
 @lru_cache(maxsize=16)

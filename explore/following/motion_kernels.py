@@ -130,7 +130,7 @@ def _rest_m(x: float, y: float, heading: float, field: Field, motions: Motions) 
 
 
 @compiled
-def _room_m(
+def step_room_m(
     pose: Float[np.ndarray, "3"], a: int, now_m: float, points: Float[np.ndarray, "m 2"], motions: Motions
 ) -> float:
     """Return the clearance on a step, -inf where the step is not safe; `now_m` is that before it."""
@@ -172,14 +172,20 @@ def cost_of_plan(
     pose: Float[np.ndarray, "3"],
     plan: Int[np.ndarray, " n"],
     points: Float[np.ndarray, "m 2"],
+    first: Float[np.ndarray, "f 2"],
     motions: Motions,
     field: Field,
 ) -> float:
-    """Return what steps and the way from their end cost, m; infinite without any, or where one is not safe."""
+    """Return what steps and the way from their end cost, m; infinite without any, or where one is not safe.
+
+    The first step keeps clear of `first`, too.
+    """
     cost = 0.0 if len(plan) else math.inf
+    if len(plan) and len(first) and step_room_m(pose, plan[0], 0.0, first, motions) == -math.inf:
+        return math.inf
     for a in plan:
         now_m = clearance_m(pose[0], pose[1], pose[2], points, motions, motions.wide_m)
-        room_m = _room_m(pose, a, now_m, points, motions)
+        room_m = step_room_m(pose, a, now_m, points, motions)
         cost += motions.costs_m[a] * _narrow(room_m, motions)
         pose = after(pose, a, motions)
     return cost + _rest_m(pose[0], pose[1], pose[2], field, motions)
@@ -187,11 +193,17 @@ def cost_of_plan(
 
 @compiled
 def search(
-    start: Float[np.ndarray, "3"], points: Float[np.ndarray, "m 2"], motions: Motions, field: Field, gain_m: float
+    start: Float[np.ndarray, "3"],
+    points: Float[np.ndarray, "m 2"],
+    first: Float[np.ndarray, "f 2"],
+    motions: Motions,
+    field: Field,
+    gain_m: float,
 ) -> Int[np.ndarray, " n"]:
     """Return the steps of the cheapest way to the horizon or to the end of the field, best first (A*).
 
-    Where none gets there, the way to the best pose does, if it saves `gain_m`. Poses and points in one frame, m.
+    The first step keeps clear of `first`, too, which the next scan will show. Where none gets there, the way to the
+    best pose does, if it saves `gain_m`. Poses and points in one frame, m.
     """
     poses, spent, clear = np.empty((MOST, 3)), np.empty(MOST), np.empty(MOST)
     parent, by = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
@@ -213,6 +225,7 @@ def search(
             break
         reach_m = longest_m + motions.radius_m + motions.wide_m
         near = points[(points[:, 0] - pose[0]) ** 2 + (points[:, 1] - pose[1]) ** 2 < reach_m**2]
+        near = np.concatenate((near, first)) if node == 0 else near
         for a in range(len(steps_m)):
             to = after(pose, a, motions)
             row = int((to[1] - start[1] + horizon_m + longest_m) / motions.apart_m)
@@ -222,7 +235,7 @@ def search(
             if 0.0 < seen[row, column, turn] <= cost:
                 continue
             rest_m = _rest_m(to[0], to[1], to[2], field, motions)
-            room_m = _room_m(pose, a, clear[node], near, motions) if math.isfinite(rest_m) else -math.inf
+            room_m = step_room_m(pose, a, clear[node], near, motions) if math.isfinite(rest_m) else -math.inf
             cost = spent[node] + motions.costs_m[a] * _narrow(room_m, motions)
             if not math.isfinite(cost) or 0.0 < seen[row, column, turn] <= cost:
                 continue

@@ -21,7 +21,7 @@ from ..planning.passable import PathConfig
 from ..planning.paths import Planner
 from ..survey.viewpoints import ViewpointsConfig
 from .behaviour import Behaviour
-from .driving import Pilot
+from .driving import Pilot, spin
 from .driving_config import DrivingConfig
 from .surroundings import Surroundings
 
@@ -98,7 +98,7 @@ class Errand(ABC):
             if self._pilot is not None and self._pilot.arrived(around.pose_world):
                 self._pilot = None
                 if self._arrived():
-                    return MotionCommand(0.0, 0.5 * self._config.robot.turn_rad)
+                    return spin(around, 0.5, self._config.driving)
             if self._pilot is None and not self._plan(around):
                 return None
             assert self._pilot is not None

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from chainslam.slam.map.chains import HEAD, TAIL, Chain, OpenEnd
 from chainslam.slam.robot import MotionCommand
 
+from ..following.driving import spin
 from ..following.end_errand import EndErrand
 from ..following.ping_pong import WallErrand
 from ..following.surroundings import Surroundings
@@ -122,7 +123,7 @@ class Explorer:
             self._task = self._give_up(task, around, ends)
             self._tries.gave_up_s = around.scan.time_s
         if self._tries.take_up_all(around, ends):
-            return MotionCommand(0.0, self._config.robot.turn_rad)
+            return spin(around, 1.0, self._config.following.driving)
         return self._look_again(around, len(self._ledger.set_aside) > known)
 
     def interrupt(self, around: Surroundings) -> None:
@@ -139,7 +140,7 @@ class Explorer:
         again = self._looked_again <= self._config.second_looks and bool(around.walls.tentative.any())
         if not again and not gave_up:
             return None
-        return MotionCommand(0.0, self._config.robot.turn_rad)
+        return spin(around, 1.0, self._config.following.driving)
 
     def _abandon(self, around: Surroundings, ends: dict[Key, OpenEnd]) -> None:
         """Drop a goal that is no open end any longer or no longer holds; a sweep, as soon as there is an end."""

@@ -17,7 +17,7 @@ from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
 
 from ..floor.accumulated_returns import returns
 from ..following.behaviour import Behaviour
-from ..following.driving import keeps_clear
+from ..following.driving import keeps_clear, spin
 from ..following.driving_config import DrivingConfig
 from ..following.surroundings import Surroundings
 from ..goal import GivenUp
@@ -71,8 +71,7 @@ class Lost:
             words = f"lost since step {self._since}: drives on to see whether it is where a scan has shown it"
             return Decision(self._onward(around), words, given_up=self._given_up, behaviour=Behaviour.LOST)
         words = f"lost since step {self._since}: turns to find its place"
-        turn = MotionCommand(0.0, self._config.robot.turn_rad)
-        return Decision(turn, words, given_up=self._given_up, behaviour=Behaviour.LOST)
+        return Decision(spin(around, 1.0, self._driving), words, given_up=self._given_up, behaviour=Behaviour.LOST)
 
     def _onward(self, around: Surroundings) -> MotionCommand:
         """Return the straightest step ahead that the scan alone shows free, or a turn."""
@@ -82,4 +81,4 @@ class Lost:
             command = MotionCommand(robot.step_m, turn)
             if keeps_clear(command, points, self._driving):
                 return command
-        return MotionCommand(0.0, robot.turn_rad)
+        return spin(around, 1.0, self._driving)

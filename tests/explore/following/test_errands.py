@@ -5,6 +5,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from chainslam.explore.following import wall_following
 from chainslam.explore.following.driving import Pilot
 from chainslam.explore.following.end_errand import EndErrand
 from chainslam.explore.following.surroundings import Surroundings
@@ -56,5 +57,8 @@ def test_an_open_end_is_looked_at_twice_from_each_place_and_other_places_once(er
     for each, first in ((end, half), (errand, None)):
         each._pilot = Pilot.__new__(Pilot)
         monkeypatch.setattr(Pilot, "arrived", lambda *_: True)
+        monkeypatch.setattr(
+            wall_following, "spin", lambda _, share, config: MotionCommand(0.0, share * config.robot.turn_rad)
+        )
         assert each.command(around) == first
         assert each.looks_done == 1

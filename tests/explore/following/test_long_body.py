@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import shapely
 
+from chainslam.explore.floor.accumulated_returns import returns
 from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from chainslam.explore.following.driving import Pilot, keeps_clear, motions_of
+from chainslam.explore.following.driving import Pilot, keeps_clear, motions_of, out_of_view, spin
 from chainslam.explore.following.driving_config import DrivingConfig
 from chainslam.explore.following.motion_kernels import clearance_m
 from chainslam.explore.planning.passable import PathConfig
@@ -13,7 +14,7 @@ from chainslam.explore.planning.paths import Planner
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.geometry.poses import arc, compose, to_world
 from chainslam.slam.robot import MotionCommand, RobotSpec, Scan, fitted
-from tests.explore.following.test_driving import around
+from tests.explore.following.test_driving import around, straight
 from tests.slam.test_mapper import faces_of
 
 LONG = RobotSpec(outline_m=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2)))
@@ -83,3 +84,44 @@ def test_a_long_body_leaves_room_for_what_its_corners_swing_out_where_the_wheels
     swing = dict(zip([(c.forward_m, c.turn_rad) for c in commands], long.clear_m - disc.clear_m, strict=True))
     assert swing[0.15 / 3.0, 0.0] == pytest.approx(0.0107, abs=5e-4)
     assert swing[0.13 * 0.15, 0.0] < swing[0.15 / 3.0, 0.0] < swing[0.15, 0.0]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_turn_on_the_spot_touches_nothing_that_the_scan_shows(seed):
+    """It turns the other way, by less, or not at all; with room on all sides it turns as it was asked to."""
+    rng, pose = np.random.default_rng(seed), np.zeros(3)
+    bearings = -np.pi + np.arange(360) * np.deg2rad(1.0)
+    beams = shapely.linestrings(np.stack([np.zeros((360, 2)), np.stack([np.cos(bearings), np.sin(bearings)], -1)], 1))
+    far = shapely.length(shapely.intersection(beams, body_at(pose)))
+    ranges = np.full(360, np.inf)
+    hit = rng.random(360) < 0.03
+    ranges[hit] = far[hit] + rng.uniform(0.01, 0.1, hit.sum())
+    for shown in (ranges, np.full(360, np.inf)):
+        scan = Scan(bearings, shown, 0.001, 6.0, 0.0)
+        command = spin(around(pose, scan, FreeSpace()), 1.0, CONFIG)
+        assert command.forward_m == 0.0
+        for share in np.linspace(0.0, 1.0, 20):
+            points = returns(scan, LONG.scanner)
+            assert not shapely.contains_xy(
+                body_at([0.0, 0.0, share * command.turn_rad]), points[:, 0], points[:, 1]
+            ).any()
+    assert command.turn_rad == LONG.turn_rad
+
+
+def test_what_the_scanner_cannot_see_is_in_the_way_until_a_scan_has_shown_it():
+    """The robot does not back into floor behind it that nobody has seen; once it was seen, it does."""
+    pose = np.zeros(3)
+    bearings = np.deg2rad(np.arange(-120.0, 121.0))
+    ahead = Scan(bearings, np.full(241, np.inf), 0.01, 4.0, 0.0)
+    unseen, seen = FreeSpace(), FreeSpace()
+    for floor in (unseen, seen):
+        floor.integrate(pose, ahead)
+    all_round = np.deg2rad(np.arange(-180.0, 180.0))
+    seen.integrate(pose, Scan(all_round, np.full(360, np.inf), 0.01, 4.0, 0.0))
+    for floor, backs in ((unseen, False), (seen, True)):
+        seen_now = around(pose, ahead, floor)
+        assert (len(out_of_view(seen_now, DrivingConfig())) == 0) == backs
+        path = straight(pose[:2], np.array([-0.45, 0.0]))
+        command = Pilot(path, Planner(floor, pose[:2], PathConfig()), DrivingConfig()).command(seen_now)
+        assert command is not None
+        assert (command.forward_m < 0.0) == backs
