@@ -14,6 +14,9 @@ KEPT_M = 1.0
 BESIDE_SHARE = 0.25
 """A return up to 15 degrees behind the body's side counts as being on the side to which it moved."""
 
+UNSURE_M = 0.03
+"""A disc that met something 30 degrees off its front has this between its front and what it met."""
+
 
 class Touches:
     """Places that the body met."""
@@ -41,10 +44,11 @@ class Touches:
     def meet(self, near_robot: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "t 2"]:
         """Return where the body may have met something, given what the last scans hit, m, robot frame; remember it.
 
-        That is its front, whatever the scans show, and the nearest return on that side.
+        That is its front, whatever the scans show, so far within the body as nobody knows where on it that was, and the
+        nearest return on that side.
         """
         gap, reach = np.hypot(near_robot[:, 0], near_robot[:, 1]), reaches_m(near_robot, self._robot)
-        met = [ahead_m(self._robot, float(self._ahead[0])) * self._ahead]
+        met = [(ahead_m(self._robot, float(self._ahead[0])) - UNSURE_M) * self._ahead]
         on_side = (near_robot @ self._ahead > -BESIDE_SHARE * gap) & (reach < self._robot.radius_m + REACH_M)
         if on_side.any():
             row = int(np.argmin(reach[on_side]))

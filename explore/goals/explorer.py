@@ -49,6 +49,10 @@ class _Task:
         return f"{self.errand.doing} ({self.choice.reason})"
 
 
+FIRST_TURNS = 4
+"""A mission begins with so many turns on the spot: where on the body the scanner sits shows in turns alone."""
+
+
 class Explorer:
     """Holds the present task and the ledger of what was given up."""
 
@@ -88,7 +92,11 @@ class Explorer:
         self._tries.take_up_moved(ends)
         self._keep_within(around, ends)
         self._abandon(around, ends)
-        command = self._command(around, chains, ends, graph)
+        command = (
+            spin(around, 1.0, self._config.following.driving)
+            if self._step < FIRST_TURNS
+            else self._command(around, chains, ends, graph)
+        )
         given_up, task = self._ledger.given_up, self._task
         if command is not None:
             if task is None:
