@@ -25,6 +25,7 @@ OPTIONS = (
     "filterwarnings=ignore::pytest.PytestAssertRewriteWarning",
 )
 NEAR = {
+    "accumulated_returns": "accumulated_returns driving",
     "candidate_kernels": "gate matching",
     "joint_kernels": "gate matching extract split_kernels",
     "matching": "matching",

@@ -105,7 +105,7 @@ def test_the_campaign_holds_the_method_against_todays_mapper_on_the_same_driving
 
 
 def test_the_method_is_a_row_of_a_campaign_driven_and_replayed(tmp_path):
-    words = ["--worlds", "paper-fig4", "--trials", "1", "--max-steps", "12", "--jobs", "1", "--out", str(tmp_path)]
+    words = ["--worlds", "paper-fig4", "--trials", "1", "--max-steps", "24", "--jobs", "1", "--out", str(tmp_path)]
     words += ["--backends", "paper-method", "block-ekf", "--association", "own", "--rrd", str(tmp_path / "a.rrd")]
     words += ["--set", "mission.mapper.matching.gate=0.5"]  # soon the one enters walls twice, the other never
     assert main(["compare", *PRESET, *words]) == 0

@@ -1,6 +1,6 @@
 """A robot without a place turns on the spot, and gives up after a turn; one with a place is left alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import networkx as nx
 import numpy as np
@@ -17,12 +17,17 @@ pytestmark = pytest.mark.usefixtures("_unchecked")
 """The surroundings are stood in for."""
 
 
+BEARINGS = np.linspace(-np.pi, np.pi, 90, endpoint=False)
+
+
 @dataclass
 class Around:
     is_lost: bool
     fault: str = ""
     is_leap_pending: bool = False
-    scan: object = None
+    scan: Scan = field(default_factory=lambda: Scan(BEARINGS, np.full(90, 2.0), 0.01, 4.0, 0.0))
+    recent_robot: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    touched_robot: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 class Inner:
@@ -96,8 +101,7 @@ def test_a_robot_with_a_fault_gives_up_at_once_and_says_why():
 
 @pytest.mark.parametrize(("walls_m", "forward"), [(2.0, True), (0.25, False)])
 def test_where_a_scan_fits_elsewhere_the_robot_drives_on_as_far_as_the_scan_shows_free(walls_m, forward):
-    bearings = np.linspace(-np.pi, np.pi, 90, endpoint=False)
-    scan = Scan(bearings, np.full(90, walls_m), 0.01, 4.0, 0.0)
+    scan = Scan(BEARINGS, np.full(90, walls_m), 0.01, 4.0, 0.0)
     decision = Lost(Inner(), LostConfig(), DrivingConfig()).decide(Around(True, "", True, scan), (), nx.DiGraph())
     assert (decision.command.forward_m > 0.0) == forward
     assert forward or decision.command.turn_rad > 0.0

@@ -9,7 +9,8 @@ import shapely
 
 from chainslam.explore.floor.floor_memory import FloorMemory
 from chainslam.explore.floor.free_space import FloorTooLargeError, FreeSpace
-from chainslam.explore.floor.touches import REACH_M, Touches
+from chainslam.explore.floor.touches import REACH_M, UNSURE_M, Touches
+from chainslam.explore.following.behaviour import Behaviour
 from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.goals.decider import Decision
@@ -157,12 +158,12 @@ def test_the_body_met_something_in_front_and_perhaps_what_is_nearest_on_the_side
     touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
     assert touches.is_new
     aside = 0.2 * near[0] / np.hypot(*near[0])
-    np.testing.assert_allclose(touches.meet(near), [[0.2, 0.0], aside])
+    np.testing.assert_allclose(touches.meet(near), [[0.2 - UNSURE_M, 0.0], aside])
     assert not touches.is_new
     touches.move(Odometry(np.array([-0.1, 0.0, 0.0]), np.eye(3), touched=True), MotionCommand(-0.1, 0.0))
-    np.testing.assert_allclose(touches.meet(near[:1]), [[-0.2, 0.0]])
-    np.testing.assert_allclose(touches.meet(np.array([[-0.2 - 1.1 * REACH_M, 0.0]])), [[-0.2, 0.0]])
-    np.testing.assert_allclose(touches.points_robot[:2], [[0.3, 0.0], aside + np.array([0.1, 0.0])])
+    np.testing.assert_allclose(touches.meet(near[:1]), [[UNSURE_M - 0.2, 0.0]])
+    np.testing.assert_allclose(touches.meet(np.array([[-0.2 - 1.1 * REACH_M, 0.0]])), [[UNSURE_M - 0.2, 0.0]])
+    np.testing.assert_allclose(touches.points_robot[:2], [[0.3 - UNSURE_M, 0.0], aside + np.array([0.1, 0.0])])
     assert len(touches.points_robot) == 4
 
 
@@ -170,9 +171,9 @@ def test_a_long_body_meets_what_stands_before_its_own_front_and_back():
     touches = Touches(RobotSpec(outline_m=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2))))
     touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(0.1, 0.0))
     beside = np.array([[0.3, 0.22]])
-    np.testing.assert_allclose(touches.meet(beside)[0], [0.5, 0.0])
+    np.testing.assert_allclose(touches.meet(beside)[0], [0.5 - UNSURE_M, 0.0])
     touches.move(Odometry(np.zeros(3), np.eye(3), touched=True), MotionCommand(-0.1, 0.0))
-    np.testing.assert_allclose(touches.meet(beside), [[-0.3, 0.0]])
+    np.testing.assert_allclose(touches.meet(beside), [[UNSURE_M - 0.3, 0.0]])
 
 
 class Glass(SimulatedRobot):
@@ -196,11 +197,13 @@ def test_after_a_touch_the_robot_moves_away_and_does_not_try_the_same_place_agai
     world = World("drawn", room, np.array([0.8, 1.5, rng.uniform(-3, 3)]), {})
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
     robot = Glass(world, glass, seed)
-    touched, poses = [], []
+    touched, tried, poses, behaviour = [], [], [], None
     for step in limited(explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make()), Limits(steps=160)):
         poses.append(robot.true_pose[:2])
         if step.odometry.touched:
             touched.append(step.index)
+            tried += [] if behaviour is Behaviour.RETREAT else [step.index]  # a wheel may slip on the way back
+        behaviour = step.decision.behaviour
     poses = np.array(poses)
     assert touched, "the post was never met"
     assert step.ended is not None
@@ -209,6 +212,6 @@ def test_after_a_touch_the_robot_moves_away_and_does_not_try_the_same_place_agai
         away = np.hypot(*(at - later).T) - np.hypot(*(at - poses[k]))
         assert len(later) < 9 or away.max() > 0.05
         assert away.min() > -0.02
-    places = poses[touched]
+    places = poses[tried]
     apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(len(places))
     assert apart.min() > 0.05, f"{len(touched)} touches"

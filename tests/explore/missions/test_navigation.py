@@ -153,7 +153,7 @@ def test_by_sequences_of_walls_the_robot_explores_figure_4(monkeypatch):
     robot = SimulatedRobot(world, 1, errorless=True)
     backend = BACKENDS["full-ekf"].make(world.start.copy(), np.diag([0.01, 0.01, 0.002]) ** 2)
     config = MissionConfig(explorer=ExplorerConfig(following=FollowingConfig(navigation="visibility")))
-    *steps, last = explore_mission(robot, Mapper(backend), STRATEGIES["nearest-robot"].make(), config)
+    *steps, last = explore_mission(robot, Mapper(backend), STRATEGIES["nearest-start"].make(), config)
     assert last.outcome is Outcome.ALL_CLOSED
     assert robot.record.collisions == 0
     led = [step.decision.walls_to_follow for step in steps if step.decision.walls_to_follow]
