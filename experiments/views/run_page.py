@@ -45,7 +45,7 @@ FIGURES: dict[str, tuple[str, float]] = {
     "pose_rmse_m": ("pose error, cm", 100.0), "heading_rmse_rad": ("heading error, degrees", degrees(1.0)),
     "odometry_max_m": ("largest error of odometry alone, m", 1.0), "pose_anees_from_start": ("pose ANEES", 1.0),
     "pose_anees": ("pose ANEES with the start's error", 1.0),
-    "pose_nees_in_band": ("steps in its 95 % band, %", 100.0), "map_anees": ("map ANEES", 1.0),
+    "pose_nees_in_band": ("steps in the 95 % band with the start's error, %", 100.0), "map_anees": ("map ANEES", 1.0),
     "nis": ("NIS", 1.0), "nis_in_band": ("scans in the 95 % band of the NIS, %", 100.0),
     "noise": ("sensor noise, by the NIS", 1.0),
     "false_matches": ("false matches", 1.0), "duplicate_lines": ("duplicate walls", 1.0),

@@ -101,7 +101,7 @@ function play(root) {
     canvas.height = Math.round((height || canvas.clientHeight) * ratio);
     const context = canvas.getContext("2d");
     context.scale(ratio, ratio);
-    context.font = "12px system-ui, sans-serif";
+    context.font = `12px ${style("font-family")}`;
     context.lineJoin = context.lineCap = "round";
     return [context, width, canvas.height / ratio];
   }
