@@ -101,7 +101,8 @@ def _filmed(home: Path, run: RecordedRun, shown: Sequence[int]) -> dict[str, Any
             f"expected the log in {home} to give the stored path again, found another (the world or the software has"
             " changed): repeat the run"
         )
-    nees, curve = steps[:, 3], summary["coverage_curve"]
+    # Without noise the errors are no draws from the stated covariance, and the summary has no ANEES either.
+    nees, curve = np.full(len(steps), np.nan) if run.trial.errorless else steps[:, 3], summary["coverage_curve"]
     mapped = np.searchsorted(curve["path_length_m"], steps[shown, 4], side="right") - 1
     covs = MM**2 * log.from_start_cov[shown]
     return {

@@ -104,6 +104,12 @@ def test_the_band_of_a_wall_is_that_of_its_ends_under_the_stated_covariance():
     assert deviations(joint, extents)[0] == pytest.approx(across.std(axis=0), rel=0.02)
 
 
+def test_a_drive_without_noise_has_no_nees(tmp_path):
+    assert main(["explore", "paper-fig4", "--errorless", "--max-steps", "5", "--out", str(tmp_path)]) == 0
+    (run,) = film_of([tmp_path])["runs"]
+    assert (run["anees"], run["in_band"], run["nees"]) == (None, None, [None] * 5)
+
+
 def test_few_steps_are_shown_and_the_last_always():
     assert shown_steps(0) == []
     assert shown_steps(3) == [0, 1, 2]
