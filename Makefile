@@ -2,6 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PLANS ?= ../shared/data/plans
 ROWS := studies/results/rows
+PLAYED := block-ekf full-ekf invariant-ekf graph
 
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
@@ -263,7 +264,14 @@ rules-held: setup
 rules-table: setup
 	$(BIN)/python -m studies.rules.report
 
-.PHONY: pictures results screenshots
+.PHONY: pictures results screenshots player
+
+# The films that the site's first page plays, from runs made now.
+player: setup
+	for world in paper-fig9 tests/data/plans/apartment.json random:1; do name=$$(basename $$world .json | tr : -); out=results/player/$$name; \
+	    $(BIN)/chainslam explore $$world --seed 1 --out $$out/drive --force && \
+	    $(BIN)/chainslam replay $$out/drive/log.npz --backend $(PLAYED) --out $$out/runs --force && \
+	    $(BIN)/python -m chainslam.experiments.views.player $(PLAYED:%=$$out/runs/%) --out docs/films/$$name.json || exit; done
 
 # The tables of docs/benchmarks.md and docs/contributing from stored rows; says which rows are of another version of the code.
 results: setup

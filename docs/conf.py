@@ -13,7 +13,7 @@ author = "The chainslam authors"
 copyright = "The chainslam authors, MIT licence"
 version = release = version_of("chainslam")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "command_help", "plain_types", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "command_help", "plain_types", "mathml", "film_player"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]

@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import signal
+from pathlib import Path
 
 import jaxtyping
 import pytest
@@ -18,9 +19,28 @@ def _interruptible():
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+WHOLE_RUNS = [
+    Path(__file__).parent / place
+    for place in (
+        "explore/missions", "library", "studies", "experiments/artifacts", "experiments/campaign",
+        "experiments/commands", "experiments/replays", "experiments/runs", "experiments/test_range_errors_of_runs.py",
+    )
+]  # fmt: skip
+"""Tests whose time goes into whole runs: the parts of a run are tested with shape checks elsewhere."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _whole_runs_unchecked(request):
+    """Leave out the shape checks that pytest adds, which are a third of the time of a run."""
+    jaxtyping.config.update("jaxtyping_disable", any(request.path.is_relative_to(each) for each in WHOLE_RUNS))
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
 @pytest.fixture
 def _unchecked():
     """Run without the shape checks that pytest adds, where a whole mission is driven."""
+    before = jaxtyping.config.jaxtyping_disable
     jaxtyping.config.update("jaxtyping_disable", True)
     yield
-    jaxtyping.config.update("jaxtyping_disable", False)
+    jaxtyping.config.update("jaxtyping_disable", before)

@@ -24,13 +24,15 @@ class Report:
     """Folder of `compare`, `explore` or `replay`."""
     latex: bool = False
     """Write the tables as LaTeX, too."""
+    play: bool = False
+    """Put a player of the run into the page in place of its NEES curve, from its log."""
     gif: bool = False
     """Write a run as an animated GIF, run.gif, too, from its log."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for a folder without results."""
         replaced = replacing(self.folder / REPORT)
-        page, _ = report_at(self.folder)
+        page, _ = report_at(self.folder, self.play)
         found(report=str(self.folder / REPORT))
         print(f"report in {self.folder / REPORT}{replaced}")
         if self.latex:

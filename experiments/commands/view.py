@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
 from chainslam.viz.viewer import Viewer, ViewerError, WebViewer, available
@@ -16,7 +15,7 @@ from ..artifacts.results import LOG, RECORDING
 from ..artifacts.run_folder import prepare
 from ..campaign.pages.film import record_campaign
 from ..campaign.store import read_campaigns
-from ..replays.replay import RecordedRun, ReplayOptions, read_options, read_run, replay
+from ..replays.replay import RecordedRun, ReplayOptions, is_same_drive, read_options, read_run, replay
 from ..scenario import load_world
 from ..terminal.answers import found
 from ..terminal.console import say
@@ -90,16 +89,10 @@ def recordings_at(path: Path) -> Callable[[], list[Path]]:
     if not logs:
         raise UsageError(f"expected a .rrd file, a {LOG} or a folder with one, found {path}: name the results of a run")
     runs = [read_run(each) for each in logs]
-    if not all(_is_same(runs[0], run) for run in runs):
+    if not all(is_same_drive(runs[0], run) for run in runs):
         raise UsageError(f"expected one run, found several in {path}: name the folder of one")
     options = read_options(logs[0].with_name("config.json"))
     return lambda: [_made(log.parent if len(logs) == 1 else path, lambda target: _record(runs, options, target))]
-
-
-def _is_same(one: RecordedRun, other: RecordedRun) -> bool:
-    """Return whether two logs have the same scans and odometry."""
-    a, b = one.recording, other.recording
-    return np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) and np.array_equal(a.odometry, b.odometry)
 
 
 def _made(folder: Path, record: Callable[[Path], list[str]]) -> Path:

@@ -1,7 +1,9 @@
 """The report of a folder: of a run, a campaign, or a comparison of two campaigns."""
 
+from dataclasses import replace
 from pathlib import Path
 
+from chainslam.viz.reports.player import player
 from chainslam.viz.reports.report import Page, html
 
 from ..artifacts.files import write
@@ -10,9 +12,17 @@ from ..usage import UsageError
 REPORT = "report.html"
 
 
-def report_at(folder: Path) -> tuple[Page, Path]:
-    """Write the report of a folder into it, and return its content and its path; raises UsageError."""
+def report_at(folder: Path, play: bool = False) -> tuple[Page, Path]:
+    """Write the report of a folder into it, and return its content and its path; raises UsageError.
+
+    With `play`, that of a run has a player in place of the picture of the NEES.
+    """
     page, place = _page(folder), folder / REPORT
+    if play:
+        from ..views.player import film_of
+        from ..views.run_page import homes_of
+
+        page = replace(page, player=player([film_of(homes_of(folder))]))
     write(place, html(page))
     return page, place
 

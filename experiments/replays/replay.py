@@ -94,6 +94,12 @@ def read_run(log: Path) -> RecordedRun:
     return replace(run, cut_short=cut_short(log.parent))
 
 
+def is_same_drive(one: RecordedRun, other: RecordedRun) -> bool:
+    """Return whether two logs have the same scans and odometry."""
+    a, b = one.recording, other.recording
+    return np.array_equal(a.ranges_m, b.ranges_m, equal_nan=True) and np.array_equal(a.odometry, b.odometry)
+
+
 def read_options(config: Path) -> ReplayOptions:
     """Return the options of the replay in a `config.json`, or the default ones for an exploration."""
     said = read_config(config).replay

@@ -45,7 +45,7 @@ FIGURES: dict[str, tuple[str, float]] = {
     "pose_rmse_m": ("pose error, cm", 100.0), "heading_rmse_rad": ("heading error, degrees", degrees(1.0)),
     "odometry_max_m": ("largest error of odometry alone, m", 1.0), "pose_anees_from_start": ("pose ANEES", 1.0),
     "pose_anees": ("pose ANEES with the start's error", 1.0),
-    "pose_nees_in_band": ("steps in the 95 % band, %", 100.0), "map_anees": ("map ANEES", 1.0),
+    "pose_nees_in_band": ("steps in the 95 % band with the start's error, %", 100.0), "map_anees": ("map ANEES", 1.0),
     "nis": ("NIS", 1.0), "nis_in_band": ("scans in the 95 % band of the NIS, %", 100.0),
     "noise": ("sensor noise, by the NIS", 1.0),
     "false_matches": ("false matches", 1.0), "duplicate_lines": ("duplicate walls", 1.0),
@@ -73,12 +73,12 @@ LARGEST_PLAN = 20_000_000
 
 def is_run(folder: Path) -> bool:
     """Return whether a folder holds a run, or runs of several back ends."""
-    return bool(_homes(folder))
+    return bool(homes_of(folder))
 
 
 def run_page(folder: Path) -> Page:
     """Return the report of a run's folder; raises UsageError if its files do not belong to one run."""
-    homes = _homes(folder)
+    homes = homes_of(folder)
     summaries = [read_summary(home) for home in homes]
     configs = [read_config(home / "config.json") for home in homes]
     trials = [config.trial for config in configs]
@@ -120,7 +120,8 @@ def run_page(folder: Path) -> Page:
     )  # fmt: skip
 
 
-def _homes(folder: Path) -> list[Path]:
+def homes_of(folder: Path) -> list[Path]:
+    """Return the folders of the runs in a folder: its own, or one for each back end; empty without a run."""
     if (folder / "summary.json").is_file():
         return [folder]
     return sorted(path.parent for path in folder.glob("*/summary.json"))

@@ -60,10 +60,6 @@ def _map(runs: Sequence[Path]) -> str:
     return f"{_where(runs[0])}: the map after {said['steps']} steps, {said['path_length_m']:.1f} m; {_closed(runs[0])}"
 
 
-def _growing(runs: Sequence[Path]) -> str:
-    return f"{_where(runs[0])}: the map grows along the walls; at the end {_closed(runs[0])}"
-
-
 def _nees(runs: Sequence[Path]) -> str:
     means = (
         f"{name} {np.nanmean(read_steps(run)[:, 3]) / 3.0:.3g}"
@@ -138,7 +134,7 @@ def _figure_10(runs: Sequence[Path]) -> str:
 
 
 CAPTIONS: Mapping[str, Callable[[Sequence[Path]], str]] = {
-    "fig9.png": _map, "exploration.gif": _growing, "nees.png": _nees, "paths.png": _paths, "model.png": _model,
+    "fig9.png": _map, "nees.png": _nees, "paths.png": _paths, "model.png": _model,
     "traversals.png": _traversals, "timeline-run.png": _one_run, "timeline-three.png": _side_by_side,
     "timeline-campaign.png": _campaign, "fig4.png": _figure_4, "fig10.png": _figure_10,
     "intel.png": _looked, "seattle.png": _looked, "intel-floor.png": _floor, "timeline-intel.png": _log_view,

@@ -11,7 +11,6 @@ import pytest
 from chainslam.experiments.commands.cli import main
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-pytestmark = pytest.mark.usefixtures("_unchecked")
 COMMANDS = re.findall(r"`chainslam (explore .+?)`", (EXAMPLES / "plans" / "README.md").read_text())
 NAMES = [command.split()[1].removeprefix("plans/") for command in COMMANDS]
 

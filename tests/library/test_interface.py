@@ -16,7 +16,6 @@ from chainslam.experiments.library.runs import table_at
 from chainslam.experiments.scoring.keys import Words
 from chainslam.slam.backends.full_ekf import FullEkf
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
 HEAVY = ("gtsam", "rerun", "matplotlib", "pandas", "numpy")
 
 

@@ -18,7 +18,6 @@ from tests.slam.streaming_base import ROOM, TICK_S
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ros_node.py"
-pytestmark = pytest.mark.usefixtures("_unchecked")
 
 
 def started(**about):

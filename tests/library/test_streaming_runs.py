@@ -3,12 +3,9 @@
 import sys
 from pathlib import Path
 
-import pytest
-
 import chainslam
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
-pytestmark = pytest.mark.usefixtures("_unchecked")
 
 
 def test_a_robot_that_no_longer_moves_fails_with_its_map_kept():

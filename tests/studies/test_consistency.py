@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import jaxtyping
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -116,14 +115,6 @@ def test_every_back_end_meets_the_same_ring_and_nothing_is_seen_in_the_gap():
     assert max(np.sqrt(looks.cov[:, 0, 0].max(initial=0.0)) for looks in one.again) < FIRM_RAD
 
 
-@pytest.fixture
-def _unchecked():
-    """Without the shape checks that pytest adds: they cost more than the filters do."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
-
-
 def mean_anees(told, loops=16):
     """Return each ring's pose ANEES of the invariant filter, from a sure start."""
     found = []
@@ -137,7 +128,6 @@ def mean_anees(told, loops=16):
     return np.array(found)
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_the_study_has_teeth():
     """A filter that is told half of the noise is rejected by its interval, and one that is told all of it is not."""
     honest, fooled = mean_anees(1.0), mean_anees(0.5)
@@ -235,7 +225,6 @@ def test_the_bias_study_sends_every_fault_through_every_back_end(tmp_path, capsy
     assert "false matches" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_standing_still_only_a_consistent_filter_learns_nothing():
     for name, least in (("invariant-ekf", -1e-12), ("full-ekf", -1.0)):
         trace, bound = stand(name, "large", 30, 1)

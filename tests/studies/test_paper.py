@@ -95,7 +95,6 @@ def alike(stored, made):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize("figures", [("table1", "fig8"), ("fig9",), ("fig10", "fig11")])
 def test_the_stored_rows_of_the_figures_are_of_todays_behaviour(figures):
     """One drive of each is made anew: a row of an older behaviour tells what the code no longer does (`make paper`)."""
@@ -106,7 +105,6 @@ def test_the_stored_rows_of_the_figures_are_of_todays_behaviour(figures):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 def test_the_stored_rows_of_both_followings_are_of_todays_behaviour():
     stored = {tuple(row[name] for name in following.NAMES): row for row in last(ROOT / FOLLOWED, following.NAMES)}
     for task in following.FollowingStudy(seeds=1).tasks():

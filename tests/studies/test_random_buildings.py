@@ -12,13 +12,11 @@ CLEAN = {"status": "complete", "reason": "", "collisions": 0, "coverage": 1.0}
 CLEAN |= {"contours_closed": 1, "contours_reachable": 1}
 
 
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize("seed", SMALL)
 def test_a_random_building_is_explored_whole_without_a_touch(seed):
     assert faults(run_trial(TrialConfig(f"random:{seed}", errorless=True, max_steps=5000)).summary) == []
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_pillars_that_show_three_beams_from_afar_are_walls_in_the_end():
     """All the floor of `random:138` is seen from along its walls, and of its pillars only a few beams at a time."""
     summary = run_trial(TrialConfig("random:138", errorless=True, max_steps=5000)).summary

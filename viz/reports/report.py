@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
 
 from .. import palette
 from ..text import NONE
@@ -81,6 +82,8 @@ class Page:
     tables: Mapping[str, PageTable] = field(default_factory=dict)
     pictures: Mapping[str, tuple[PagePicture, ...]] = field(default_factory=dict)
     drawings: tuple[PageDrawing, ...] = ()
+    player: Markup | None = None
+    """Shown in place of the picture of the NEES."""
     sections: tuple[Section, ...] = ()
     """What stands below all that the template places."""
 

@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
 from chainslam.experiments.campaign.comparison.comparison import compare
 from chainslam.experiments.campaign.comparison.findings import findings
 from chainslam.experiments.campaign.comparison.hypothesis import hypothesis
@@ -32,7 +30,6 @@ def keys_of(value):
     return set().union(*map(keys_of, value)) if isinstance(value, list | tuple) else set()
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_every_number_that_is_written_is_named_in_a_test_that_works_it_out():
     campaign = Campaign(("paper-fig4",), ("block-ekf", "full-ekf"), ("nearest-robot", "nearest-start"), 1, ("closed",),
                         max_steps=3)  # fmt: skip

@@ -19,8 +19,6 @@ from chainslam.experiments.trial import run_trial
 from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.sim.worlds import load
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 @pytest.fixture(scope="module")
 def explored(world, tmp_path_factory):

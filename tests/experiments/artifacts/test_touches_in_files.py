@@ -15,7 +15,6 @@ from chainslam.experiments.trial import run_trial
 from chainslam.sim.logs.recorded_robot import RecordedRobot, recording_of
 from chainslam.slam.robot import MotionCommand
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
 TOUCHED = np.array([False, False, True, True, False])
 
 

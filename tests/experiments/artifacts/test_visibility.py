@@ -13,8 +13,6 @@ from chainslam.experiments.scoring.records import Route
 from chainslam.experiments.trial import run_trial
 from chainslam.experiments.usage import UsageError
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 @pytest.fixture(scope="module")
 def left(tmp_path_factory):

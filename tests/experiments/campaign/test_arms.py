@@ -4,8 +4,6 @@ import csv
 import json
 from dataclasses import replace
 
-import pytest
-
 from chainslam.experiments.campaign.plan import ARMS, Campaign, Trial, config_of
 from chainslam.experiments.campaign.work import Job, perform, unpack
 from chainslam.experiments.commands.cli import main
@@ -17,7 +15,6 @@ CAMPAIGN = Campaign(("paper-fig4",), ("block-ekf",), ("nearest-robot",), 1, max_
 DRIVE = Trial("paper-fig4", "nearest-robot", "", "recording", 2)
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_each_arm_uses_the_matches_that_its_name_tells(monkeypatch):
     calls = []
 

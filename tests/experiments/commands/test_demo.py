@@ -132,7 +132,6 @@ def test_no_open_asks_no_browser(done, monkeypatch, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 def test_it_leaves_a_map_and_a_report_in_which_only_the_block_diagonal_filter_is_overconfident(tmp_path, capsys):
     assert main(["demo", "--out", str(tmp_path)]) == 0
     explored, replayed, verdict = capsys.readouterr().out.splitlines()

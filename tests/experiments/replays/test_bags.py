@@ -9,8 +9,6 @@ from chainslam.experiments.commands.cli import main
 from chainslam.slam.geometry.poses import compose, inverse
 from tests.sim.logs.written_bag import PLACE, pose_at, room_bag
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 def replayed(path, out, *options):
     assert main(["replay", str(path), "--out", str(out), *options]) == 0

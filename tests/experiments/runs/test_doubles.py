@@ -72,7 +72,6 @@ def test_a_search_in_vain_ends_and_says_how_many_seeds_it_took(drives):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 def test_figure_10_shows_what_the_papers_shows(monkeypatch):
     monkeypatch.setattr(fig10, "COMPARED", ("block-ekf", "full-ekf"))
     made = fig10.reproduce(1)

@@ -20,7 +20,6 @@ from chainslam.slam.robot import MotionCommand, Odometry, Scan
 from tests.slam.association.test_place_search import CROOKED
 from tests.slam.map.test_openings import map_of
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
 HERE = np.array([1.0, 2.0, 0.5])
 ELSEWHERE = np.array([6.0, 0.0, 0.5])
 

@@ -9,7 +9,6 @@ PEOPLE = "robot.faults.people"
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize(("walking", "seed"), [(1, 1), (3, 1), (3, 2), (3, 3)])
 def test_among_people_a_run_covers_the_building_or_says_that_ends_are_left(walking, seed):
     settings = nested([(f"{PEOPLE}.walking", walking)])

@@ -10,7 +10,6 @@ from chainslam.experiments.trial import run_trial
 PLANS = Path(__file__).parents[2] / "data" / "plans"
 
 
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize("name", ["apartment", "school"])
 def test_the_first_metres_in_a_real_building_go_well(name):
     summary = run_trial(TrialConfig(str(PLANS / f"{name}.json"), max_steps=40)).summary
@@ -22,7 +21,6 @@ def test_the_first_metres_in_a_real_building_go_well(name):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize(("name", "contours"), [("apartment", 2), ("school", 3)])
 def test_a_real_building_is_explored_to_its_end(name, contours):
     config = TrialConfig(str(PLANS / f"{name}.json"), "invariant-ekf", errorless=True)

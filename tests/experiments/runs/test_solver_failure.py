@@ -9,8 +9,6 @@ from chainslam.experiments.trial import run_trial
 from chainslam.slam.backends.graph.isam import Isam
 from chainslam.slam.robot import ScannerSpec
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 @pytest.mark.parametrize("backend", ["graph", "graph-batch"])
 def test_a_run_that_no_solver_can_go_on_with_keeps_all_its_results(backend, monkeypatch):

@@ -4,14 +4,11 @@ import time
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from chainslam.experiments.scenario import TrialConfig, build
 from chainslam.experiments.trial import default_mission
 from chainslam.explore import mission
 from chainslam.slam.geometry import compiled
-
-pytestmark = pytest.mark.usefixtures("_unchecked")
 
 
 class Slow:

@@ -12,8 +12,6 @@ from chainslam.sim.worlds import World
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.mapper import Mapper
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 def explored(free, start, seed=1, errorless=True):
     world = World("drawn", shapely.orient_polygons(free), np.array(start), {})

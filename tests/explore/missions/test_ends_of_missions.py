@@ -50,7 +50,6 @@ def leaving(step, places):
     return replace(step, decision=replace(step.decision, given_up=given_up))
 
 
-@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize(
     ("limits", "outcome", "word"),
     [
@@ -70,7 +69,6 @@ def test_a_limit_ends_a_mission_at_the_first_step_that_reaches_it(limits, outcom
     assert reached[outcome.split("-")[0]]
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_the_island():
     mission, robot = steps(return_to_start=True)
     *_, last = mission
@@ -87,7 +85,6 @@ def test_a_mission_ends_where_it_began_and_its_certificate_holds_the_room_and_th
     assert certificate.unseen_m2 == pytest.approx(0.0, abs=0.02)
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_a_robot_that_cannot_drive_again_where_it_has_been_is_told_so():
     mission, _ = steps()
     way = []
@@ -107,7 +104,6 @@ def test_a_robot_that_cannot_drive_again_where_it_has_been_is_told_so():
     assert share < 0.9
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_what_a_stopped_mission_has_not_seen_yet_is_told():
     mission, _ = steps()
     *_, last = limited(mission, Limits(steps=2))
@@ -119,7 +115,6 @@ def test_what_a_stopped_mission_has_not_seen_yet_is_told():
     assert all(border.length_m >= 0.2 for border in certificate.frontiers)
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
     mission, _ = steps()
     *_, last = limited(mission, Limits(steps=2))
@@ -138,7 +133,6 @@ def test_each_border_of_unseen_floor_is_left_with_what_came_of_its_own_visits():
     assert {border.why for border in without.frontiers} == {"unseen floor was not to be visited"}
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_what_stands_and_is_no_wall_of_the_map_is_told():
     mission, _ = steps()
     *_, last = mission
@@ -159,7 +153,6 @@ def test_what_stands_and_is_no_wall_of_the_map_is_told():
         assert thing.why == words
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_a_start_that_cannot_be_reached_again_is_told():
     mission, _ = steps()
     *_, last = mission

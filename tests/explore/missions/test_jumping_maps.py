@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from chainslam.experiments.scenario import TrialConfig, build
 from chainslam.explore.limits import Limits, limited
@@ -38,7 +37,6 @@ class Jumping:
         return replace(belief, pose_world=pose, anchors=belief.anchors + moved, query=query)
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_a_mission_does_not_end_because_its_map_has_jumped():
     """At step 302 it said complete, eight open ends left, each out of reach: it believed to stand in a wall."""
     scenario = build(TrialConfig("rooms", seed=1))

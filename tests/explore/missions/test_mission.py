@@ -16,7 +16,6 @@ from chainslam.slam.evaluation.consistency import pose_errors
 from chainslam.slam.geometry.lines import distance_to_segments
 from chainslam.slam.mapper import Mapper
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 
 

@@ -13,8 +13,6 @@ from chainslam.sim.worlds import World
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.mapper import Mapper
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 def explored(door_m, turn_deg, errorless):
     """Two rooms of 2.4 m with a door between them; return the last step, the robot and how far right it came, m."""

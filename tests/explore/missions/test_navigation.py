@@ -120,7 +120,6 @@ def numbers_of(walls, faces):
     return found
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_the_robots_own_graph_of_figure_4_leads_from_wall_8_to_wall_16():
     world, faces = figure_4()
     robot = SimulatedRobot(world, 1, errorless=True)
@@ -141,7 +140,6 @@ def test_the_robots_own_graph_of_figure_4_leads_from_wall_8_to_wall_16():
         assert last.graph.edges[ids[a], ids[b]]["kind"] == last.graph.edges[ids[b], ids[a]]["kind"] == NEIGHBOUR
 
 
-@pytest.mark.usefixtures("_unchecked")
 def test_by_sequences_of_walls_the_robot_explores_figure_4(monkeypatch):
     """It goes straight to what is ahead and along walls to what is not; the floor is never asked for a way."""
 

@@ -20,7 +20,6 @@ from chainslam.sim.worlds import load
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.mapper import Mapper
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
 P0 = np.diag([0.01, 0.01, np.deg2rad(0.1)]) ** 2
 FOLLOWED = {Behaviour.APPROACH, Behaviour.FOLLOW, Behaviour.ROUND, Behaviour.REVERSE}
 

@@ -107,7 +107,6 @@ def test_a_benchmark_needs_estimators_or_rows(words, tmp_path, monkeypatch, caps
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("_unchecked")
 def test_a_try_tells_the_papers_filter_from_a_consistent_one(tmp_path, capsys):
     words = ["benchmark", "--quick", "--backend", "block-ekf", "invariant-ekf", "--out", str(tmp_path / "out")]
     assert main(words) == 0

@@ -164,6 +164,7 @@ def test_no_number_of_scans_makes_a_piece_of_a_face_known_to_better_than_any_wal
     assert least[0] > 1.1 * least[1]
 
 
+@pytest.mark.usefixtures("_unchecked")
 @pytest.mark.parametrize("backend", list(BACKENDS))
 def test_in_every_map_two_faces_become_two_walls(backend):
     """Which stay two, and are where they are stated to be; after how many scans they are told apart is chance.
