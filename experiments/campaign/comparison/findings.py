@@ -39,7 +39,7 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
         ("held", "graph", f"95 % intervals of distances hold the truth in {held}", _held),
         ("held", PAPER, "95 % intervals of distances hold the truth: how rarely", lambda row: (_held(row)[0], None)),
         *(("doubles", name, f"no more duplicate walls than the {refused} that its gate must refuse", _doubles)
-          for name in names),
+          for name in names if any(row["sightings"] for row in pooled if row["backend"] == name)),
     ]  # fmt: skip
     found = []
     for kind, backend, words, judge in claims:
