@@ -157,8 +157,10 @@ def _pooled(campaign: Campaign, rows: Sequence[Row], cells: Sequence[Row]) -> li
     found = []
     for arm, backend in _runs_in(campaign):
         outside = [c["steps_outside_band"] for c in cells if (c["arm"], c["backend"]) == (arm, backend)]
-        scores = cell_scores(select(rows, backend=backend, arm=arm))
-        found.append({"backend": backend, "arm": arm, **scores, "steps_outside_band": _mean(outside)})
+        mine = select(rows, backend=backend, arm=arm)
+        lost = next((row["reason"] for row in mine if row["status"] == "failed"), None)
+        names = {"backend": backend, "arm": arm, "lost": lost}
+        found.append({**names, **cell_scores(mine), "steps_outside_band": _mean(outside)})
     return found
 
 

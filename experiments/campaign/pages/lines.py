@@ -28,12 +28,12 @@ def _rides(campaign: Campaign, said: Row) -> tuple[str, ...]:
     told = []
     for row in said["pooled"]:
         if row["backend"] in dict(campaign.external):
-            lost = row["trials"] - row["sound"]
-            words = [f"{row['backend']}: {in_words(row)}"] if row["sound"] else [row["backend"]]
+            lost, times = row["trials"] - row["sound"], found.get(row["backend"])
+            words = [in_words(row)] if row["sound"] else []
             words += [f"path error {number(100.0 * row['ate_m']['mean'])} cm"] if row["ate_m"] else []
-            times = found.get(row["backend"])
-            words[-1] += f", {estimated(times)} times that of {BASELINE_BACKEND}" if times and times["value"] else ""
-            told.append(", ".join([*words, *([f"{lost} of {row['trials']} drives lost"] if lost else [])]))
+            words += [f"{estimated(times)} times that of {BASELINE_BACKEND}"] if times and times["value"] else []
+            words += [f"{lost} of {row['trials']} drives lost ({row.get('lost')})"] if lost else []
+            told.append(f"{row['backend']}: {', '.join(words)}")
     return (f"On the recorded drives, {'; '.join(told)}.",) if told else ()
 
 
