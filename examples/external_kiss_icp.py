@@ -1,7 +1,7 @@
 """KISS-ICP as an estimator that is a program: a scan is a cloud of points in the plane (pip install kiss-icp).
 
-KISS-ICP states no covariance. With --sigma the pose is given one that grows by a constant at each scan: a standard
-deviation of the step's position in m, and one of its heading in rad. docs/howto/external.md has the lines.
+KISS-ICP states no covariance. With --sigma one is added here, as if the errors of steps were independent, each with
+this standard deviation in x and y, m, and in heading, rad. docs/howto/external.md describes the lines.
 """
 
 import argparse

@@ -19,7 +19,8 @@ def lines_of(campaign: Campaign, said: Row) -> tuple[str, ...]:
     if is_errorless(campaign):
         runs = (f"{row['backend']} completes {row['complete']} of {row['trials']} runs" for row in rows)
         return (f"Without noise, {listed(tuple(runs))}.",)
-    return (_consistent(rows), *_rides(campaign, said), *_costs(campaign, said, rows), *_strategies(campaign, said))
+    judged = (_consistent(rows),) if rows else ()
+    return (*judged, *_rides(campaign, said), *_costs(campaign, said, rows), *_strategies(campaign, said))
 
 
 def _rides(campaign: Campaign, said: Row) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ class ExternalConfig:
 
 
 def no_map(pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"], _: Any = None) -> Backend:
-    """Return the empty map in place of a program's, which is nobody's business."""
+    """Return an empty map: an external program keeps its own, which nothing here reads."""
     return FullEkf(pose_world, pose_cov)
 
 
