@@ -22,7 +22,7 @@ ARMS = (CLOSED, "replay-own", "replay-true")
 """Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
 Replay with the true association: the algebra alone."""
 RIDES = "replay-own"
-"""The arm of programs of others."""
+"""The arm of external programs."""
 MAX_STEPS = 5000
 MOST_TRIALS = 1_000_000
 """Larger campaigns are refused: their list of trials alone would fill the memory of a small machine."""
@@ -50,10 +50,10 @@ class Campaign:
     settings: tuple[tuple[str, Any], ...] = ()
     """Settings of every trial that differ from the defaults: dotted keys of `config.json` and their values."""
     external: tuple[tuple[str, str], ...] = ()
-    """Names of those back ends that are programs of others, and the command of each."""
+    """Names of those back ends that are external programs, and the command of each."""
 
     def arms_of(self, backend: str) -> tuple[str, ...]:
-        """Return the arms in which a back end runs: a program of others has no map to explore by or to match with."""
+        """Return the arms in which a back end runs: an external program has no map to explore by or to match with."""
         return tuple(arm for arm in self.arms if backend not in dict(self.external) or arm == RIDES)
 
     @property

@@ -108,7 +108,7 @@ def compare(
     """Run many trials and return their comparison, as `chainslam compare` does.
 
     Without a `preset`, `worlds` and `backends` must be given; by default there are ten trials each, with the strategy
-    nearest-robot. `external` are programs of others that tell poses, by name, each with its command
+    nearest-robot. `external` are the commands of external programs that tell poses, by name
     (docs/howto/external.md). `scale` to `negate` are the command's options for drawings. Trials run in `jobs`
     processes, by default one for each core, or on the workers of the Dask scheduler at the address `dask`. The same
     call with the same `out` continues a campaign that was stopped. Raises UsageError for bad input.

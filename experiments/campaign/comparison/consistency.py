@@ -20,7 +20,7 @@ def consistency(row: Row) -> Row:
     The worse of pose and map decides. The factor is the mean ANEES of an overconfident estimator, the inverse of it for
     one that is too cautious, else None.
     """
-    if row.get("sound") and row.get("trace_least", 0.0) is None:  # of an estimator that is a program of others
+    if row.get("sound") and row.get("trace_least", 0.0) is None:  # of an estimator that is an external program
         return {"verdict": UNSTATED, "factor": None, "what": None}
     judged = {what: (judge(row[name]), row[name]) for name, what in SCORES.items() if row.get(name) is not None}
     for verdict in (OVERCONFIDENT, TOO_FEW, CAUTIOUS, CONSISTENT):

@@ -24,7 +24,7 @@ def lines_of(campaign: Campaign, said: Row) -> tuple[str, ...]:
 
 
 def _rides(campaign: Campaign, said: Row) -> tuple[str, ...]:
-    """Return how programs of others fare on the recorded drives, which they all get."""
+    """Return how external programs fare on the recorded drives, which they all get."""
     found = {row["first"]: row for row in said["backends"] if (row["arm"], row["measure"]) == (RIDES, "ate_m")}
     told = []
     for row in said["pooled"]:

@@ -1,4 +1,4 @@
-"""Estimators that are programs of others: they ride along on a recorded drive, and tell their pose at each scan.
+"""Estimators that are external programs: each follows a recorded drive and tells its pose at each scan.
 
 docs/howto/external.md states the lines that come and go.
 """
@@ -62,7 +62,7 @@ class Answer(msgspec.Struct):
 
 @dataclass(frozen=True)
 class ExternalConfig:
-    """Settings of programs of others."""
+    """Settings of external programs."""
 
     timeout_s: Period = 60.0
     """A program that takes longer to answer a scan is ended, and its drive is lost."""
@@ -74,7 +74,7 @@ def no_map(pose_world: Float[np.ndarray, "3"], pose_cov: Float[np.ndarray, "3 3"
 
 
 def is_external(backend: str) -> bool:
-    """Return whether a back end is a program of others."""
+    """Return whether a back end is an external program."""
     return backend in BACKENDS and bool(BACKENDS[backend].command)
 
 

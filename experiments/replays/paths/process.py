@@ -1,4 +1,4 @@
-"""A program of others that is asked line by line; whatever it does ends within the time that it is given."""
+"""An external program that is asked line by line; whatever it does ends within the time that it is given."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ LAST_S = 2.0
 
 
 class ExternalError(RuntimeError):
-    """A program of others did not do its part. The message is one line."""
+    """An external program did not do its part. The message is one line."""
 
 
 @contextmanager

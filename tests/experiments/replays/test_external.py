@@ -1,4 +1,4 @@
-"""Estimators that are programs of others: their poses are scored like ours, and whatever they do costs only them."""
+"""Estimators that are external programs: their poses are scored like ours, and whatever they do costs only them."""
 
 import csv
 import json
