@@ -13,6 +13,9 @@ import pytest
 
 from chainslam.experiments.artifacts.results import write_results
 from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT, judge
+from chainslam.experiments.campaign.merge import merge, union
+from chainslam.experiments.campaign.plan import ARMS, Campaign, command_of
+from chainslam.experiments.campaign.store import opened
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.replays.paths.external import ExternalConfig, register
 from chainslam.experiments.replays.paths.process import ExternalError, running
@@ -242,6 +245,20 @@ def test_a_campaign_has_a_column_for_each_and_a_lost_one_costs_no_other(program,
     words[words.index(f"lost={shlex.join(lost)}")] = f"other={shlex.join(lost)}"
     assert main(words) == 2
     assert "found other backends, external" in capsys.readouterr().err
+
+
+def test_merged_campaigns_have_one_program_under_a_name(tmp_path):
+    first = Campaign(("paper-fig4",), ("full-ekf", "other"), ("nearest-robot",), 1, external=(("other", "true"),))
+    second = replace(first, first_seed=2, external=(("other", "false"),))
+    for name, campaign in (("first", first), ("second", second)):
+        with opened(tmp_path / name, campaign):
+            pass
+    with pytest.raises(UsageError, match="one estimator other, found 2 of other commands"):
+        merge([tmp_path / "first", tmp_path / "second"], tmp_path / "whole")
+    plain = replace(first, backends=("full-ekf",), external=())
+    assert union([plain, first]).external == first.external
+    assert (union([plain, first]).arms_of("other"), plain.arms_of("full-ekf")) == (("replay-own",), ARMS)
+    assert "--backends full-ekf --external other=true" in command_of(first)
 
 
 def test_a_program_cannot_drive_and_needs_replays_with_its_own_matches(tmp_path, capsys):
