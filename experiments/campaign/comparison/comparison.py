@@ -158,7 +158,7 @@ def _pooled(campaign: Campaign, rows: Sequence[Row], cells: Sequence[Row]) -> li
     for arm, backend in _runs_in(campaign):
         outside = [c["steps_outside_band"] for c in cells if (c["arm"], c["backend"]) == (arm, backend)]
         mine = select(rows, backend=backend, arm=arm)
-        lost = next((row["reason"] for row in mine if row["status"] == "failed"), None)
+        lost = next((row.get("reason") for row in mine if row["status"] == "failed"), None)
         names = {"backend": backend, "arm": arm, "lost": lost}
         found.append({**names, **cell_scores(mine), "steps_outside_band": _mean(outside)})
     return found
