@@ -1,5 +1,7 @@
 """Shapes as arrays: ellipses, the model space (alpha, r), and the rows of a table that have changed."""
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -87,4 +89,4 @@ class Changes:
 
 def rounded(values: Float[np.ndarray, "..."], quantum: float) -> Int[np.ndarray, "k w"]:
     """Return rows rounded to multiples of `quantum`, one row for each entry of the first axis."""
-    return np.round(values.reshape(len(values), -1) / quantum).astype(np.int64)
+    return np.round(values.reshape(len(values), math.prod(values.shape[1:])) / quantum).astype(np.int64)

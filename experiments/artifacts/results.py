@@ -103,7 +103,8 @@ def _files(result: TrialResult, config: dict[str, Any]) -> dict[str, Callable[[]
         "map.dxf": lambda: map_dxf(drawn()["features"], told(), title),
         "map.png": lambda: _pictures().picture_of(result),
     }
-    if result.scenario.config.backend != OFFLINE:  # Nobody followed walls from scan to scan.
+    # Offline refinement follows no walls from scan to scan, and external programs keep none.
+    if result.scenario.config.backend != OFFLINE and result.summary["lines"] is not None:
         files[VISIBILITY] = lambda: json_bytes(visibility_record(last, log))
         files["visibility.png"] = lambda: _pictures().graph_png(result)
     floor = last.free_space

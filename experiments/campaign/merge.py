@@ -35,6 +35,11 @@ def merge(folders: Sequence[Path], out: Path) -> None:
         if len(values) > 1:
             words = " and ".join(sorted(values)) if name != "settings" else "campaigns that differ in them"
             raise UsageError(f"expected campaigns of one {name}, found {words}: merge others")
+    commands: dict[str, set[str | None]] = {name: set() for each in campaigns for name, _ in each.external}
+    for name, said in commands.items():
+        said |= {dict(each.external).get(name) for each in campaigns if name in each.backends}
+        if len(said) > 1:
+            raise UsageError(f"expected one estimator {name}, found {len(said)} of other commands: merge others")
     digests: dict[str, Any] = {}
     for folder in folders:
         for world, digest in read_config(folder).worlds_sha256.items():
@@ -62,7 +67,9 @@ def union(campaigns: Sequence[Campaign]) -> Campaign:
         for name in ("worlds", "backends", "strategies")
     )
     arms = tuple(arm for arm in ARMS if any(arm in campaign.arms for campaign in campaigns))
-    return replace(campaigns[0], worlds=worlds, backends=backends, strategies=strategies, arms=arms)
+    external = dict.fromkeys(each for campaign in campaigns for each in campaign.external)
+    levels = replace(campaigns[0], worlds=worlds, backends=backends, strategies=strategies, arms=arms)
+    return replace(levels, external=tuple(external))
 
 
 def in_order(found: Iterable[Trial], levels: Campaign) -> list[Trial]:

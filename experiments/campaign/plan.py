@@ -21,6 +21,8 @@ CLOSED, RECORDING = "closed", "recording"
 ARMS = (CLOSED, "replay-own", "replay-true")
 """Closed loop: what a back end does to behaviour. Replay with its own gate: what overconfidence does to matching.
 Replay with the true association: the algebra alone."""
+RIDES = "replay-own"
+"""The arm of external programs."""
 MAX_STEPS = 5000
 MOST_TRIALS = 1_000_000
 """Larger campaigns are refused: their list of trials alone would fill the memory of a small machine."""
@@ -47,6 +49,12 @@ class Campaign:
     first_seed: int = 1
     settings: tuple[tuple[str, Any], ...] = ()
     """Settings of every trial that differ from the defaults: dotted keys of `config.json` and their values."""
+    external: tuple[tuple[str, str], ...] = ()
+    """Names of those back ends that are external programs, and the command of each."""
+
+    def arms_of(self, backend: str) -> tuple[str, ...]:
+        """Return the arms in which a back end runs: an external program has no map to explore by or to match with."""
+        return tuple(arm for arm in self.arms if backend not in dict(self.external) or arm == RIDES)
 
     @property
     def seeds(self) -> range:
@@ -125,8 +133,8 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 def trials(campaign: Campaign) -> list[Trial]:
     """Return every trial in the order of the tables: world, strategy, back end, arm, seed."""
-    cells = product(campaign.worlds, campaign.strategies, campaign.backends, campaign.arms)
-    return [Trial(*cell, seed) for cell in cells for seed in campaign.seeds]
+    cells = product(campaign.worlds, campaign.strategies, campaign.backends)
+    return [Trial(*cell, arm, seed) for cell in cells for arm in campaign.arms_of(cell[2]) for seed in campaign.seeds]
 
 
 def recordings(campaign: Campaign) -> list[Trial]:
@@ -186,6 +194,12 @@ def check_campaign(campaign: Campaign) -> None:
             raise UsageError(f"expected each of the {name} once, found {doubles[0]} twice: drop one")
     for arm in campaign.arms:
         choose("arm", arm, ARMS)
+    external = dict(campaign.external)
+    if external and RIDES not in campaign.arms:
+        raise UsageError("expected replays with the estimators' own association for --external, found none: add --modes"
+                         " replay and --association own")  # fmt: skip
+    if campaign.driver in external:
+        raise UsageError(f"expected a back end as --driver, found {campaign.driver}, which maps no walls: name another")
     keys = [world_key(world) for world in campaign.worlds]
     if len(set(keys)) < len(keys):
         raise UsageError(f"expected worlds of different names, found {', '.join(keys)}: rename a file")
@@ -222,7 +236,10 @@ def command_of(campaign: Campaign) -> str:
     """Return the command that runs a campaign."""
     modes = [mode for mode in (CLOSED, "replay") if any(arm.startswith(mode) for arm in campaign.arms)]
     association = [name for name in ("own", "true") if f"replay-{name}" in campaign.arms]
-    words = ["chainslam", "compare", "--worlds", *campaign.worlds, "--backends", *campaign.backends]
+    external = dict(campaign.external)
+    backends = [name for name in campaign.backends if name not in external]
+    words = ["chainslam", "compare", "--worlds", *campaign.worlds, "--backends", *backends]
+    words += [word for name, command in external.items() for word in ("--external", f"{name}={command}")]
     words += ["--strategies", *campaign.strategies, "--trials", str(campaign.trials), "--modes", *modes]
     words += ["--association", *association] if association else []
     plain = Campaign((), (), (), 0)

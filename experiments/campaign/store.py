@@ -27,7 +27,7 @@ REMEDY = "name the folder of a campaign, as written by `compare --out`"
 MERGED = "merged"
 """Key in the config of a merged folder that holds the merged campaigns."""
 SEEDS = frozenset({"trials", "first_seed"})
-EXTENDABLE = SEEDS | {"worlds", "backends", "strategies", "arms", "worlds_sha256"}
+EXTENDABLE = SEEDS | {"worlds", "backends", "strategies", "arms", "worlds_sha256", "external"}
 """Campaigns that differ in nothing else can be merged."""
 Worlds = defstruct("Worlds", [("worlds_sha256", dict[str, str])])
 Merged = defstruct(
@@ -176,7 +176,8 @@ def _settle(folder: Path, campaign: Campaign) -> None:
             raise UsageError(f"expected an empty folder or a campaign's, found {folder} with other files: name another")
         write(path, json_bytes(now | made_with))
         return
-    different = [key for key in now["campaign"] if before.get("campaign", {}).get(key) != now["campaign"][key]]
+    said = {"external": []} | before.get("campaign", {})
+    different = [key for key in now["campaign"] if said.get(key) != now["campaign"][key]]
     different += [] if before.get("worlds_sha256") == now["worlds_sha256"] else ["worlds_sha256"]
     if different:
         raise UsageError(

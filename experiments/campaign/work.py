@@ -1,7 +1,7 @@
 """The work for one trial: a pure function of its job, wherever it runs."""
 
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import process_time
 from types import GenericAlias
@@ -25,6 +25,7 @@ from ..artifacts.presets import backend_of
 from ..artifacts.reading import parse_json
 from ..artifacts.results import log_arrays
 from ..artifacts.schema import UnfitError
+from ..replays.paths.external import is_external, without_map
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
 from ..scenario import TrialConfig, build, load_world
 from ..scoring.truth import truth_of
@@ -238,7 +239,8 @@ def _replay(job: Job) -> TrialScores:
         run, backend_of(job.trial.backend), ReplayOptions(association), observer, world,
         ear.around if ear is not None else lambda matcher: matcher, remembered(job.log),
     )  # fmt: skip
-    return _finish(job, result, observer, ear)
+    record = _finish(job, result, observer, ear)
+    return replace(record, summary=without_map(record.summary)) if is_external(job.trial.backend) else record
 
 
 def _finish(job: Job, result: TrialResult, observer: Observer, ear: InnovationEar | None) -> TrialScores:

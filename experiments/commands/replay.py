@@ -19,6 +19,7 @@ from ..library.asked import asked_source
 from ..library.earlier import scored
 from ..library.sessions import placed_log
 from ..replays.measured import check_references, held_against
+from ..replays.paths.external import register
 from ..replays.real_log import RealOptions
 from ..replays.replay import Association, ReplayOptions
 from ..replays.sources import OwnLog, RealLog
@@ -48,6 +49,9 @@ class Replay:
     backend: tuple[str, ...] = ()
     """Estimators to compare (see `chainslam backends`), each with an estimate at each step. By default full-ekf for a
     run's log, and none for a real robot's: offline refinement alone is faster and more accurate."""
+    external: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=COMMAND")] = ()
+    """An estimator of your own that is a program: it reads the scans and odometry of the log and writes poses
+    (docs/howto/external.md); may be repeated."""
     association: Association = "own"
     """Data association: the back end's own, or the true one."""
     perfect_extraction: bool = False
@@ -100,8 +104,11 @@ class Replay:
             choose("back end", name, BACKENDS, OR_OWN)
         references = read_references(self.relations, self.reference)
         source, session = self.source(), None
-        names = self.backend or (source.backend,)
+        riders = tuple(name for name, _ in register(self.external))
+        names = (*self.backend, *riders) or (source.backend,)
         if self.map is not None:
+            if riders:
+                raise UsageError("expected --external without --map, found both: leave one of them out")
             if not isinstance(source, OwnLog):
                 raise UsageError(f"expected the log of a run with the truth for --map, found {self.log}: leave it out")
             source, session = placed_log(source, self.map, names[0])

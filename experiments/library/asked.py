@@ -128,11 +128,13 @@ def asked_campaign(
     association: Sequence[str],
     driver: str,
     first_seed: int,
+    external: Sequence[tuple[str, str]] = (),
 ) -> Campaign:
     """Return a campaign; raises UsageError if something is missing.
 
     `cells` are worlds, back ends, strategies and trials, None to take them from the preset; `said` are the given
-    options among navigation, following, errorless, p0 and max_steps.
+    options among navigation, following, errorless, p0 and max_steps. `external` are names and commands of programs of
+    others, which ride along on the recorded drives.
     """
     begin = dict(PRESETS[preset]) if preset else {}
     ruling = over(nested(begin.pop("settings", ())), robot_of(robot), asked(config, settings, DECIDED))
@@ -146,9 +148,11 @@ def asked_campaign(
     missing = [f"--{name}" for name in cells if name not in chosen]
     if missing:
         raise UsageError(f"expected {', '.join(missing)} or a --preset, found none: name them")
+    chosen["backends"] = (*chosen["backends"], *(name for name, _ in external))
     arms = [arm for arm in ARMS if arm == CLOSED and CLOSED in modes]
     arms += [f"replay-{name}" for name in ("own", "true") if "replay" in modes and name in association]
     changed = differing(trial_of(ruling)) + against_methods(chosen["backends"], ruling)
     return Campaign(
-        **chosen, arms=tuple(arms), driver=driver, first_seed=first_seed, settings=tuple(sorted(dict(changed).items()))
-    )
+        **chosen, arms=tuple(arms), driver=driver, first_seed=first_seed, settings=tuple(sorted(dict(changed).items())),
+        external=tuple(external),
+    )  # fmt: skip

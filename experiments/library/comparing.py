@@ -23,6 +23,7 @@ from ..campaign.plan import check_campaign, check_parts, drawing_of, trials
 from ..campaign.plugins import register_installed
 from ..campaign.runner import on_cores, run_campaign
 from ..campaign.store import opened, read_campaigns
+from ..replays.paths.external import register
 from ..replays.replay import Association
 from ..scenario import P0, load_world
 from .asked import CampaignName, asked_campaign
@@ -83,6 +84,7 @@ def compare(
     first_seed: int = 1,
     modes: Sequence[Literal["closed", "replay"]] = ("closed", "replay"),
     association: Sequence[Association] = ("own", "true"),
+    external: Mapping[str, str] | None = None,
     driver: str = "full-ekf",
     p0: P0 = "small",
     errorless: bool = False,
@@ -106,9 +108,10 @@ def compare(
     """Run many trials and return their comparison, as `chainslam compare` does.
 
     Without a `preset`, `worlds` and `backends` must be given; by default there are ten trials each, with the strategy
-    nearest-robot. `scale` to `negate` are the command's options for drawings. Trials run in `jobs` processes, by
-    default one for each core, or on the workers of the Dask scheduler at the address `dask`. The same call with the
-    same `out` continues a campaign that was stopped. Raises UsageError for bad input.
+    nearest-robot. `external` are the commands of external programs that tell poses, by name
+    (docs/howto/external.md). `scale` to `negate` are the command's options for drawings. Trials run in `jobs`
+    processes, by default one for each core, or on the workers of the Dask scheduler at the address `dask`. The same
+    call with the same `out` continues a campaign that was stopped. Raises UsageError for bad input.
     """
     register_installed()
     home: Home | None = None
@@ -138,6 +141,7 @@ def compare(
         association=tuple(association),
         driver=driver,
         first_seed=first_seed,
+        external=register([f"{name}={command}" for name, command in (external or {}).items()], is_here=dask is None),
     )
     check_campaign(campaign)
     check_parts(campaign)

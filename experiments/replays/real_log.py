@@ -25,8 +25,9 @@ from ..scenario import OFFLINE, STRATEGY_OF_REPLAYS, OdometrySource, Scenario, T
 from ..scoring.summary import Ending, odometry_poses
 from ..trial import TrialResult
 from ..usage import UsageError
-from .looked_again import PathMapper, looked_again
 from .motion_of_scans import motion_of_scans
+from .paths.external import is_external, ride_external, without_map
+from .paths.looked_again import PathMapper, looked_again
 from .replay import OPEN_TO_REPLAYS
 from .unwitnessed import every_scan, run_unwitnessed, unwitnessed
 
@@ -147,12 +148,15 @@ def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
     scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
 
     def mission(scenario: Scenario) -> Iterator[Step]:
+        if is_external(backend):
+            return ride_external(scenario, scenario.robot, len(run.log.recording), run.cut_short, run.unread)
         heard = heard_by(run.options.odometry or run.trial.odometry, scenario.robot, scenario.config)
         make = PathMapper if backend == OFFLINE else Mapper
         mapper = make(scenario.backend, scenario.config.mission.mapper)
         return ride_mission(heard, mapper, len(run.log.recording), run.cut_short, run.unread)
 
-    return run_unwitnessed(scenario, watch, mission, run.log)
+    result = run_unwitnessed(scenario, watch, mission, run.log)
+    return replace(result, summary=without_map(result.summary)) if is_external(backend) else result
 
 
 def looked_over(run: RealRun, result: TrialResult, watch: Callable[[float], None] = lambda share: None) -> TrialResult:

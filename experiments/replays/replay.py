@@ -48,6 +48,7 @@ from ..scoring.truth import truth_of
 from ..trial import TrialResult, run_scenario
 from ..usage import UsageError
 from .oracles import PerfectExtraction, TrueAssociation, Witness, of_true_lines, true_odometry
+from .paths.external import is_external, ride_external, without_map
 
 Association = Literal["own", "true"]
 OPEN_TO_REPLAYS = ("mission", "backend_options")
@@ -217,6 +218,8 @@ def replay(
         watch(step)
 
     def mission(scenario: Scenario) -> Iterator[Step]:
+        if is_external(backend):
+            return ride_external(scenario, robot, len(recording), run.cut_short, extractor=extractor)
         rules = scenario.config.mission.mapper if oracle is None else _without_housekeeping(config.mission.mapper)
         rules = of_true_lines(rules) if options.perfect_extraction else rules
         mapper = Mapper(
@@ -228,7 +231,8 @@ def replay(
         heard = heard_by(options.odometry or config.odometry, robot, config)
         return ride_mission(heard, mapper, len(recording), run.cut_short)
 
-    return run_scenario(scenario, learn, mission)
+    result = run_scenario(scenario, learn, mission)
+    return replace(result, summary=without_map(result.summary)) if is_external(backend) else result
 
 
 def _without_housekeeping(config: MapperConfig) -> MapperConfig:

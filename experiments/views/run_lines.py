@@ -85,8 +85,10 @@ def _errs(summary: Row) -> str:
         return f"{summary['backend']}: {_untrue(summary)}"
     words = f"{summary['backend']}: pose error {number(100.0 * summary['pose_rmse_m'])} cm rms"
     if summary.get("pose_anees_from_start") is None:
-        return words
-    return f"{words}, pose ANEES {number(summary['pose_anees_from_start'])}, map ANEES {number(summary['map_anees'])}"
+        is_told = summary["lines"] is not None or summary.get("errorless")
+        return words if is_told else f"{words}, no covariance stated"
+    words += f", pose ANEES {number(summary['pose_anees_from_start'])}"
+    return words if summary["lines"] is None else f"{words}, map ANEES {number(summary['map_anees'])}"
 
 
 def _untrue(summary: Row) -> str:
@@ -96,6 +98,7 @@ def _untrue(summary: Row) -> str:
     """
     looked = summary.get("second_looks") or summary
     words = f"{number(looked['lines'])} walls, {number(looked['duplicate_lines'])} of them duplicates"
+    words = "no map" if looked["lines"] is None else words
     tail = "_smoothed" if summary.get("relations_smoothed") else ""
     relations = (summary.get(f"relations{tail}") or {}).get("at_scans", {}).get("all", {})
     if relations.get("translation_m"):

@@ -50,6 +50,8 @@ class BackendEntry:
     """Whether the pose's covariance is exactly the start's, transported along the path, plus the error since then."""
     version: str | None = None
     """Version of an estimator that is not chainslam's own, for the rows of `chainslam benchmark`."""
+    command: tuple[str, ...] = ()
+    """Words that start the program of `--external`, which tells the pose in place of this back end."""
 
     def make(
         self,

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from rich.table import Table
 
 from chainslam.experiments.artifacts.settings import record_of, trial_of
-from chainslam.experiments.replays.looked_again import surveyed
+from chainslam.experiments.replays.paths.looked_again import surveyed
 from chainslam.experiments.replays.real_log import REAL_WALLS
 from chainslam.experiments.replays.recordings import recorded
 from chainslam.experiments.scenario import TrialConfig, check, load_world

@@ -2,6 +2,7 @@
 
 import gzip
 import shutil
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 def lay_out(folder: Path) -> None:
     """Put drawings, a log with what was measured of it, a bag and the examples into a folder, by the pages' names."""
     (folder / "examples").symlink_to(ROOT / "examples")
+    (folder / ".venv").symlink_to(sys.prefix)
     shutil.copy(ROOT / "examples" / "plans" / "inkscape.svg", folder / "plan.svg")
     corners = [(0, 0), (6, 0), (6, 4), (0, 4), (0, 0)]
     (folder / "plan.dxf").write_text(dxf(corners, "A-WALL-EXTERIOR"))

@@ -23,12 +23,14 @@ SAID = {
 }
 NEEDS_ROS = {"ros_node"}
 """`test_ros_node.py` runs these without it."""
+PROGRAMS = {"external_odometry", "external_kiss_icp"}
+"""Started by `--external` (tests/experiments/replays/test_external.py); the second needs KISS-ICP."""
 NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
 pytestmark = pytest.mark.long
 
 
 def test_each_example_is_named_here():
-    assert {path.stem for path in EXAMPLES.glob("*.py")} == SAID.keys() | NEEDS_ROS
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == SAID.keys() | NEEDS_ROS | PROGRAMS
     assert len(NOTEBOOKS) == 2
 
 

@@ -72,7 +72,7 @@ def _alone(result: TrialResult, log: Log, last: Step, recorded: RecordedLog) -> 
     looked = summary.get("second_looks", summary)
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
-        f"{looked['lines']} walls, {looked['chains_closed']} closed chains",
+        *([] if looked["lines"] is None else [f"{looked['lines']} walls, {looked['chains_closed']} closed chains"]),
     ]
     return Picture(
         map=last.map,
@@ -104,10 +104,13 @@ def over_truth(
     rings = (world.free.exterior, *world.free.interiors)
     off_cm, wheels_cm = 100 * summary["pose_rmse_m"], 100 * summary["odometry_rmse_m"]
     laid_over = " aligned with the truth" if summary["map_began_step"] else ""
+    of_map = [
+        f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
+        f"coverage {100 * (summary['coverage_own_frame'] or 0.0):.1f} %{laid_over}",
+    ]
     words = [
         f"{summary['status']} after {summary['steps']} steps, {summary['path_length_m']:.1f} m",
-        f"{summary['contours_closed']} of {summary['contours_reachable']} contours closed",
-        f"coverage {100 * summary['coverage_own_frame']:.1f} %{laid_over}",
+        *([] if summary["coverage_own_frame"] is None else of_map),
         f"pose error rms {off_cm:.1f} cm (odometry alone {wheels_cm:.0f} cm)",
     ]
     noise = "errorless" if config.errorless else f"seed {config.seed}"

@@ -68,7 +68,8 @@ ESTIMATE = defstruct("ScoreOfWorlds", [("mean", float), ("low", float | None), (
 PART = defstruct(
     "BenchmarkPart",
     [
-        *((name, int) for name in ("trials", "complete", "scored", "false_matches")),
+        *((name, int) for name in ("trials", "complete", "scored")),
+        ("false_matches", int | None),
         ("step_ms", float | None),
         ("failures", many(dict[str, Any])),
         *((name, ESTIMATE | None) for name in MEANS.values()),
@@ -82,7 +83,8 @@ ROW = defstruct(
         ("estimator_version", str | None),
         ("not_citable", str | None),
         ("versions", dict[str, str]),
-        *((part, PART) for part in ARMS),
+        ("recorded", PART),
+        ("closed", PART | None),
     ],
 )
 """What a row needs for the table."""
@@ -108,10 +110,12 @@ def rows_of(benchmark: Benchmark, folder: Path, campaign: Campaign) -> list[Row]
     for name in campaign.backends:
         mine = [row for row in trials if row["backend"] == name]
         modes = {part: [row for row in mine if (row["mode"] == CLOSED) == (part == CLOSED)] for part in ARMS}
-        parts = {part: _part(by[name, arm], modes[part]) for part, arm in ARMS.items()}
+        runs_in = {part: by.get((name, arm)) for part, arm in ARMS.items()}
+        parts = {part: pooled and _part(pooled, modes[part]) for part, pooled in runs_in.items()}
         entry = BACKENDS.get(name)
         version = None if entry is None else entry.version
-        found.append({**shared, "estimator": name, "estimator_version": version, **parts})
+        names = {"estimator": name, "estimator_version": version, "external": dict(campaign.external).get(name)}
+        found.append({**shared, **names, **parts})
     return found
 
 
@@ -138,7 +142,7 @@ def read_all(paths: Sequence[Path]) -> list[Row]:
 def ranked(rows: Sequence[Row]) -> list[Row]:
     """Return rows with the most consistent first, then the more precise; those that lack runs stand below.
 
-    The recorded drives decide, by the worse of pose and map.
+    The recorded drives decide, by the worse of pose and map; of a program that keeps no map, by the pose.
     """
     return sorted(rows, key=_rank)
 
@@ -154,7 +158,8 @@ def table(rows: Sequence[Row]) -> list[list[str]]:
 
 def _rank(row: Row) -> tuple[bool, float, float, str]:
     part = row["recorded"]
-    scores = [part[name]["mean"] if part[name] else 0.0 for name in ("pose_anees", "map_anees")]
+    judged = ("pose_anees",) if row.get("external") else ("pose_anees", "map_anees")
+    scores = [part[name]["mean"] if part[name] else 0.0 for name in judged]
     off = max(abs(math.log(score)) if score > 0.0 else math.inf for score in scores)
     error = part["path_error_m"]["mean"] if part["path_error_m"] else math.inf
     return part["scored"] < part["trials"], float(np.round(off / SAME)), error, row["estimator"]
@@ -171,6 +176,12 @@ def _cells(row: Row) -> list[str]:
         _mean(recorded["path_error_m"], 100.0),
         number(recorded["false_matches"]),
         f"{recorded['scored']} of {recorded['trials']}",
+        *([NONE] * 5 if closed is None else _closed_cells(closed)),
+    ]
+
+
+def _closed_cells(closed: Row) -> list[str]:
+    return [
         _estimate(closed["pose_anees"]),
         _mean(closed["path_error_m"], 100.0),
         number(closed["false_matches"]),

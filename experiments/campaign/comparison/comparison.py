@@ -155,11 +155,19 @@ def _counts(rows: Sequence[Row]) -> dict[str, int]:
 def _pooled(campaign: Campaign, rows: Sequence[Row], cells: Sequence[Row]) -> list[Row]:
     """Return a row for each back end in each arm, over all worlds and strategies; the unit is the run."""
     found = []
-    for arm, backend in product(campaign.arms, campaign.backends):
+    for arm, backend in _runs_in(campaign):
         outside = [c["steps_outside_band"] for c in cells if (c["arm"], c["backend"]) == (arm, backend)]
-        scores = cell_scores(select(rows, backend=backend, arm=arm))
-        found.append({"backend": backend, "arm": arm, **scores, "steps_outside_band": _mean(outside)})
+        mine = select(rows, backend=backend, arm=arm)
+        lost = next((row.get("reason") for row in mine if row["status"] == "failed"), None)
+        names = {"backend": backend, "arm": arm, "lost": lost}
+        found.append({**names, **cell_scores(mine), "steps_outside_band": _mean(outside)})
     return found
+
+
+def _runs_in(campaign: Campaign) -> list[tuple[str, str]]:
+    """Return every arm with each back end that runs in it."""
+    every = product(campaign.arms, campaign.backends)
+    return [(arm, backend) for arm, backend in every if arm in campaign.arms_of(backend)]
 
 
 def _cells(rows: Sequence[Row]) -> list[Row]:
@@ -187,7 +195,8 @@ def cell_scores(rows: Sequence[Row]) -> Row:
         scores[name] = None if found is None else asdict(found) | {"median": float(np.median(list(runs.values())))}
     scores["without"] = without(sound, MEANS)
     for name in SUMS:
-        scores[name] = sum(row.get(name) or 0 for row in sound)
+        told = [value for row in sound if (value := row.get(name)) is not None]
+        scores[name] = sum(told) if told or not sound else None
     for name in ("distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"):
         found = estimate(runs_of(rows, Measure(name, False)))
         scores[name] = None if found is None else asdict(found)
@@ -220,7 +229,7 @@ def _backends(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
     """Compare every back end with the baseline, in each arm, over all strategies."""
     if BASELINE_BACKEND not in campaign.backends:
         return
-    for arm, backend in product(campaign.arms, campaign.backends):
+    for arm, backend in _runs_in(campaign):
         if backend != BASELINE_BACKEND:
             first, second = (select(rows, arm=arm, backend=name) for name in (backend, BASELINE_BACKEND))
             names = {"arm": arm, "first": backend, "second": BASELINE_BACKEND}
@@ -231,7 +240,7 @@ def _strategies(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
     """Compare every strategy with the baseline, for each back end in each arm."""
     if BASELINE_STRATEGY not in campaign.strategies:
         return
-    for arm, backend, strategy in product(campaign.arms, campaign.backends, campaign.strategies):
+    for (arm, backend), strategy in product(_runs_in(campaign), campaign.strategies):
         if strategy != BASELINE_STRATEGY:
             mine = select(rows, arm=arm, backend=backend)
             first, second = (select(mine, strategy=name) for name in (strategy, BASELINE_STRATEGY))
@@ -243,7 +252,7 @@ def _interaction(campaign: Campaign, rows: Sequence[Row]) -> Iterable[Row]:
     """Return how much more (or less) a back end gains by a strategy than the baseline back end does."""
     if BASELINE_BACKEND not in campaign.backends or BASELINE_STRATEGY not in campaign.strategies:
         return
-    for arm, backend, strategy, measure in product(campaign.arms, campaign.backends, campaign.strategies, MEASURES):
+    for (arm, backend), strategy, measure in product(_runs_in(campaign), campaign.strategies, MEASURES):
         if backend == BASELINE_BACKEND or strategy == BASELINE_STRATEGY:
             continue
         gains = []

@@ -11,6 +11,7 @@ SCORES = {"pose_anees_from_start": "pose", "map_anees": "map"}
 WITHIN = 1.5
 """Largest mean ANEES of a consistent estimator; the smallest is its inverse."""
 CONSISTENT, OVERCONFIDENT, CAUTIOUS, TOO_FEW = "consistent", "overconfident", "too cautious", "too few runs"
+UNSTATED = "no covariance stated"
 
 
 def consistency(row: Row) -> Row:
@@ -19,6 +20,8 @@ def consistency(row: Row) -> Row:
     The worse of pose and map decides. The factor is the mean ANEES of an overconfident estimator, the inverse of it for
     one that is too cautious, else None.
     """
+    if row.get("sound") and row.get("trace_least", 0.0) is None:  # of an estimator that is an external program
+        return {"verdict": UNSTATED, "factor": None, "what": None}
     judged = {what: (judge(row[name]), row[name]) for name, what in SCORES.items() if row.get(name) is not None}
     for verdict in (OVERCONFIDENT, TOO_FEW, CAUTIOUS, CONSISTENT):
         means = {what: estimate["mean"] for what, (said, estimate) in judged.items() if said == verdict}

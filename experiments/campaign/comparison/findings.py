@@ -39,14 +39,15 @@ def findings(pooled: Sequence[Row], gate: float) -> list[Row]:
         ("held", "graph", f"95 % intervals of distances hold the truth in {held}", _held),
         ("held", PAPER, "95 % intervals of distances hold the truth: how rarely", lambda row: (_held(row)[0], None)),
         *(("doubles", name, f"no more duplicate walls than the {refused} that its gate must refuse", _doubles)
-          for name in names),
+          for name in names if any(row["sightings"] is not None for row in pooled if row["backend"] == name)),
     ]  # fmt: skip
     found = []
     for kind, backend, words, judge in claims:
         told = {}
         for arm in arms if backend in names else ():
-            if of[backend, arm]["sound"] and not (kind in MATCHING and arm == "replay-true"):
-                numbers, holds = judge(of[backend, arm])
+            row = of.get((backend, arm))
+            if row and row["sound"] and not (kind in MATCHING and arm == "replay-true"):
+                numbers, holds = judge(row)
                 told[arm] = {"found": numbers, "holds": holds}
         if told:
             found.append({"kind": kind, "claim": words, "backend": backend, "arms": told})

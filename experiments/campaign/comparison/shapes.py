@@ -58,7 +58,7 @@ LATER = ("pose_anees_from_start", "nis", "nis_in_band", "path_length_m")
 """Means that not all comparisons have."""
 CELL = _object(
     "Cell", _ARM, [("backend", str), ("without", dict[str, int])],
-    _of(int, "trials", "complete", "sound", *SUMS),
+    _of(int, "trials", "complete", "sound"), _of(int | None, *SUMS),
     _of(_MEAN | None, *(name for name in MEANS if name not in LATER)), [(name, _MEAN | None, None) for name in LATER],
     _of(ESTIMATE | None, "distances_in_95", "trace_below", "missed_share", "doubles_beyond_gate"),
     _of(NUMBER, "trace_least", "bound_margin", "steps_outside_band"),

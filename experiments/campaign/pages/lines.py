@@ -6,19 +6,36 @@ from typing import Any
 from ...scoring.statistics import FEW_RUNS
 from ...views.numbers import estimated, listed, number
 from ..comparison.comparison import BASELINE_BACKEND, BASELINE_STRATEGY
-from ..comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT, TOO_FEW
-from ..plan import CLOSED, Campaign, is_errorless
+from ..comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT, TOO_FEW, in_words
+from ..plan import CLOSED, RIDES, Campaign, is_errorless
 
 Row = dict[str, Any]
 
 
 def lines_of(campaign: Campaign, said: Row) -> tuple[str, ...]:
-    """Return the lines, three at most, from the campaign's `comparison.json`."""
-    rows = [row for row in said["pooled"] if row["arm"] == deciding_arm(campaign)]
+    """Return the lines, four at most, from the campaign's `comparison.json`."""
+    external = dict(campaign.external)
+    rows = [row for row in said["pooled"] if row["arm"] == deciding_arm(campaign) and row["backend"] not in external]
     if is_errorless(campaign):
         runs = (f"{row['backend']} completes {row['complete']} of {row['trials']} runs" for row in rows)
         return (f"Without noise, {listed(tuple(runs))}.",)
-    return (_consistent(rows), *_costs(campaign, said, rows), *_strategies(campaign, said))
+    judged = (_consistent(rows),) if rows else ()
+    return (*judged, *_rides(campaign, said), *_costs(campaign, said, rows), *_strategies(campaign, said))
+
+
+def _rides(campaign: Campaign, said: Row) -> tuple[str, ...]:
+    """Return how external programs fare on the recorded drives, which they all get."""
+    found = {row["first"]: row for row in said["backends"] if (row["arm"], row["measure"]) == (RIDES, "ate_m")}
+    told = []
+    for row in said["pooled"]:
+        if row["backend"] in dict(campaign.external):
+            lost, times = row["trials"] - row["sound"], found.get(row["backend"])
+            words = [in_words(row)] if row["sound"] else []
+            words += [f"path error {number(100.0 * row['ate_m']['mean'])} cm"] if row["ate_m"] else []
+            words += [f"{estimated(times)} times that of {BASELINE_BACKEND}"] if times and times["value"] else []
+            words += [f"{lost} of {row['trials']} drives lost ({row.get('lost')})"] if lost else []
+            told.append(f"{row['backend']}: {', '.join(words)}")
+    return (f"On the recorded drives, {'; '.join(told)}.",) if told else ()
 
 
 def deciding_arm(campaign: Campaign) -> str:

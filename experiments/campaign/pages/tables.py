@@ -49,7 +49,7 @@ def _only_mean(name: str, scale: float = 1.0) -> Callable[[Row], str]:
 
 
 def _each_run(name: str) -> Callable[[Row], str]:
-    return lambda row: number(row[name] / row["sound"] if row["sound"] else None)
+    return lambda row: number(row[name] / row["sound"] if row["sound"] and row[name] is not None else None)
 
 
 def _value(name: str, scale: float = 1.0) -> Callable[[Row], str]:

@@ -58,16 +58,8 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
         END: scorer.at(end),
     }
     shift, turn = rpe(log.estimated_world, log.true_world, RPE_STEPS) if len(log) > RPE_STEPS else (None, None)
-    traces = np.trace(log.estimated_cov, axis1=1, axis2=2)
-    start_cov = result.scenario.start_cov
-    margins = bound_margins(log.estimated_world, log.estimated_cov, start_cov)
-    below = np.flatnonzero(margins < -ROUNDING)
     summary |= {
-        "trace_least": float(traces.min() / np.trace(start_cov)),
-        "trace_below": float(np.mean(traces < (1.0 - ROUNDING) * np.trace(start_cov))),
-        "bound_margin": float(margins.min()),
-        "bound_first_m": float(log.path_length_m[below[0]]) if len(below) else None,
-        "bound_worst_m": float(log.path_length_m[margins.argmin()]) if len(below) else None,
+        **_bound_scores(log, result.scenario.start_cov),
         "ate_m": ate(log.estimated_world, log.true_world),
         "ate_aligned_m": ate(log.estimated_world, log.true_world, align=True),
         "rpe_m": shift,
@@ -88,6 +80,27 @@ def record_of(result: TrialResult, observer: Observer, ear: InnovationEar | None
         summary["nis_mean"] = ear.mean()
         summary["nis_whiteness"] = ear.whiteness()
     return TrialScores(summary, arrays)
+
+
+def _bound_scores(log: Log, start_cov: Float[np.ndarray, "3 3"]) -> dict[str, float | None]:
+    """Return how far the stated covariance falls below that of the start, and below the bound; None if it is unstated.
+
+    docs/concepts/consistency.md, "The bound".
+    """
+    names = ("trace_least", "trace_below", "bound_margin", "bound_first_m", "bound_worst_m")
+    traces = np.trace(log.estimated_cov, axis1=1, axis2=2)
+    if not np.all(np.isfinite(traces)):
+        return dict.fromkeys(names)
+    margins = bound_margins(log.estimated_world, log.estimated_cov, start_cov)
+    below = np.flatnonzero(margins < -ROUNDING)
+    values = (
+        float(traces.min() / np.trace(start_cov)),
+        float(np.mean(traces < (1.0 - ROUNDING) * np.trace(start_cov))),
+        float(margins.min()),
+        float(log.path_length_m[below[0]]) if len(below) else None,
+        float(log.path_length_m[margins.argmin()]) if len(below) else None,
+    )
+    return dict(zip(names, values, strict=True))
 
 
 @dataclass(frozen=True)
@@ -118,7 +131,7 @@ class _Scorer:
             "heading_error_rad": float(abs(wrap(log.estimated_world[k, 2] - true_pose[2]))),
             "pose_nees": _or_none(self.nees[k]),
             "pose_anees_so_far": _or_none(np.mean(self.nees[: k + 1]) / 3.0),
-            "pose_trace": float(np.trace(log.estimated_cov[k])),
+            "pose_trace": _or_none(np.trace(log.estimated_cov[k])),
             "coverage": self.coverage(moment),
             "wall_rmse_m": off,
             "wall_shape_m": shape,

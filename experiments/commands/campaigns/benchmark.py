@@ -3,7 +3,9 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from ...artifacts.files import write
 from ...campaign.comparison.benchmark import CURRENT, QUICK, read_all, rows_of, table
@@ -26,6 +28,9 @@ class Benchmark:
 
     backend: tuple[str, ...] = ()
     """Estimators (see `chainslam backends`), or your own by --plugin."""
+    external: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=COMMAND")] = ()
+    """An estimator of your own that is a program (docs/howto/external.md); it runs on the recorded drives only. May be
+    repeated."""
     quick: bool = False
     """Run two worlds and two seeds, as a try; such rows are marked as not citable."""
     jobs: int | None = None
@@ -37,7 +42,7 @@ class Benchmark:
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError before anything is computed."""
-        if bool(self.table) == bool(self.backend):
+        if bool(self.table) == bool(self.backend or self.external):
             given = "both" if self.table else "neither"
             raise UsageError(f"expected either --backend B or --table FILE, found {given}: name one of them")
         if self.table:
@@ -49,7 +54,8 @@ class Benchmark:
         out = Path("results") / fixed.name if self.out is None else self.out
         command = Compare(
             out=out, worlds=fixed.worlds, backends=self.backend, strategies=(fixed.strategy,), trials=fixed.seeds,
-            association=("own",), driver=fixed.driver, p0=fixed.p0, max_steps=fixed.max_steps, jobs=self.jobs,
+            external=self.external, association=("own",), driver=fixed.driver, p0=fixed.p0,
+            max_steps=fixed.max_steps, jobs=self.jobs,
         )  # fmt: skip
         status = command.run()
         if status:

@@ -32,6 +32,7 @@ from ...campaign.runner import missing, on_cores, run_campaign
 from ...campaign.store import opened
 from ...library.asked import CampaignName, asked_campaign
 from ...library.echo import campaign_line, echo_world
+from ...replays.paths.external import register
 from ...replays.replay import Association
 from ...scenario import P0, load_world
 from ...terminal.answers import found
@@ -70,6 +71,9 @@ class Compare:
     """Closed loop, or one recording for each world, strategy and seed that is replayed through all back ends."""
     association: tuple[Association, ...] = ("own", "true")
     """Data association of the replays: the back end's own, the true one, or each in turn."""
+    external: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=COMMAND")] = ()
+    """An estimator of your own that is a program: it reads scans and odometry of the recorded drives and writes poses
+    (docs/howto/external.md); may be repeated."""
     driver: str = "full-ekf"
     """Back end that drives the recordings."""
     p0: P0 = "small"
@@ -127,6 +131,7 @@ class Compare:
             association=self.association,
             driver=self.driver,
             first_seed=self.first_seed,
+            external=register(self.external, is_here=self.dask is None),
         )
 
     def _is_given(self, name: str) -> bool:

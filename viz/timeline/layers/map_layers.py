@@ -147,7 +147,7 @@ class GoalLayer:
             self._out.points(f"{self._world}/goal", when, counts, places)
             self._out.points(f"{self._world}/goal/name", when, counts, places, labels=labels)
         walls = [_to_follow(block, at) for at in range(len(block))]
-        chosen = self._follow.changed([np.column_stack([ids, ends.reshape(-1, 4)]) for ids, ends in walls])
+        chosen = self._follow.changed([np.column_stack([ids, ends.reshape(len(ids), 4)]) for ids, ends in walls])
         if chosen:
             counts = np.array([len(walls[at][0]) for at in chosen])
             ends = np.concatenate([walls[at][1] for at in chosen])

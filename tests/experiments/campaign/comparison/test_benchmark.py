@@ -1,6 +1,7 @@
 """The benchmark: what its version fixes, the rows that it leaves, and their order in a table."""
 
 import json
+import sys
 from dataclasses import asdict, replace
 from hashlib import sha256
 
@@ -71,6 +72,27 @@ def test_each_estimator_has_a_row_that_says_what_it_may_be_used_for(folder):
             assert row[part]["step_ms"] > 0
             assert row[part]["failures"] == []
         assert row["closed"]["complete"] == 0
+
+
+def test_a_program_has_a_row_of_its_recorded_drives_alone_and_stands_in_the_table(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(benchmark, "QUICK", TINY)
+    program = tmp_path / "still.py"
+    program.write_text(
+        "import sys\nsys.stdin.readline()\nfor line in sys.stdin:\n"
+        '    print(\'{"pose": [0, 0, 0], "covariance": [1, 0, 0, 1, 0, 1]}\', flush=True)\n'
+    )
+    command = f"{sys.executable} {program}"
+    words = ["benchmark", "--quick", "--jobs", "1", "--external", f"still={command}", "--out", str(tmp_path / "out")]
+    try:
+        assert main(words) == 0
+    finally:
+        BACKENDS.pop("still", None)
+    (row,) = [json.loads(line) for line in (tmp_path / "out" / "rows.jsonl").read_text().splitlines()]
+    assert (row["estimator"], row["external"], row["closed"]) == ("still", command, None)
+    assert row["recorded"]["pose_anees"]["mean"] < 1.0  # it states a metre
+    assert (row["recorded"]["map_anees"], row["recorded"]["false_matches"]) == (None, None)
+    assert "| `still` (not citable) |" in capsys.readouterr().out
+    assert main(["report", str(tmp_path / "out")]) == 0
 
 
 def test_rows_of_several_files_are_one_table(folder, tmp_path, capsys):

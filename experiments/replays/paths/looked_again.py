@@ -21,13 +21,13 @@ from chainslam.slam.mapper import Mapper
 from chainslam.slam.odometry.scan_matching import returns_within
 from chainslam.slam.robot import Scan
 
-from ..scenario import OFFLINE, TrialConfig
-from ..scoring.records import Log
-from ..scoring.without_truth.certificate import certificate_record
-from ..scoring.without_truth.doubles import doubles
-from ..scoring.without_truth.smoothing import Smoothed
-from ..scoring.without_truth.unwitnessed import summarise_unwitnessed
-from ..trial import TrialResult
+from ...scenario import OFFLINE, TrialConfig
+from ...scoring.records import Log
+from ...scoring.without_truth.certificate import certificate_record
+from ...scoring.without_truth.doubles import doubles
+from ...scoring.without_truth.smoothing import Smoothed
+from ...scoring.without_truth.unwitnessed import summarise_unwitnessed
+from ...trial import TrialResult
 
 
 class PathMapper(Mapper):

@@ -1,0 +1,1 @@
+"""What finds the path of a recorded drive without a back end: offline refinement, and external programs."""
