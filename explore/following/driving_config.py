@@ -17,7 +17,7 @@ class DrivingConfig:
     """Smallest distance kept between the body and any return, on a short step as little as there is before it ..."""
     clear_share: Share = 0.1
     """... and more by this share of the step."""
-    wide_m: Size = 0.1
+    wide_m: Size = 0.05
     """Where the body has less room than this a step costs more, up to four times as much."""
     step_cost_m: Size = 0.05
     """What a step costs besides the way of the faster wheel."""
