@@ -114,9 +114,11 @@ class SecondLooksConfig:
     least_sightings: Number = 3
     """Smallest number of observations of a wall."""
     floor_rad: Spread = float(np.deg2rad(0.5))
-    """Standard deviation added to each observed direction, since no real wall is straight."""
+    """Standard deviation added to each observed direction, since no real wall is straight. The stated covariance has
+    the scatter of the errors instead."""
     floor_m: Deviation = 0.02
-    """Standard deviation added to each observed offset, since no real wall is straight."""
+    """Standard deviation added to each observed offset, since no real wall is straight. The stated covariance has the
+    scatter of the errors instead."""
     understated: Factor = 4.0
     """Divisor of the covariance that scan matching states, since that is larger than the error."""
     doubt: Sigmas = 2.0
