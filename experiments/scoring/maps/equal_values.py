@@ -82,15 +82,15 @@ def classes(
 
 def imposed(
     values: Float[np.ndarray, " n"], H: Float[np.ndarray, "n s"], cov: Float[np.ndarray, "s s"],
-    of: Int[np.ndarray, " n"], tolerance: float,
+    of: Int[np.ndarray, " n"], noise: Float[np.ndarray, "n n"],
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, "s s"]]:  # fmt: skip
     """Return the correction of a state once its values are equal class by class, and its covariance then.
 
-    `H` is the derivative of the values by the state, and values of a class lie within half a period of each other. Each
-    may be off its class by the tolerance: one Kalman update, in Joseph's form.
+    `H` is the derivative of the values by the state, and values of a class lie within half a period of each other. By
+    how much they may be off their class is the covariance `noise`. This is one Kalman update, in Joseph's form.
     """
     C = _contrasts(of)
-    J, R = C @ H, tolerance**2 * C @ C.T
+    J, R = C @ H, C @ np.where(of[:, None] == of, noise, 0.0) @ C.T
     K = np.linalg.solve(J @ cov @ J.T + R, J @ cov).T
     rest = np.eye(len(cov)) - K @ J
     conditioned = rest @ cov @ rest.T + K @ R @ K.T
@@ -115,7 +115,7 @@ def _askew(off: np.ndarray, var: np.ndarray, scale: Scale) -> np.ndarray:
 
 
 def _grown(values: np.ndarray, cov: np.ndarray, scale: Scale, law: _Law) -> Int[np.ndarray, " n"]:
-    """Return classes that grew from seeds: the surest values join first, at most twice as many at a time."""
+    """Return classes that grew from seeds one by one: the surest values join first, as many as there are at most."""
     of, tried = np.full(len(values), ALONE), np.zeros(len(values), dtype=bool)
     pairs = scale.off(values[:, None] - values)
     own = np.diag(cov)
@@ -130,30 +130,30 @@ def _grown(values: np.ndarray, cov: np.ndarray, scale: Scale, law: _Law) -> Int[
         if support[seed] < LIKELY:
             break
         tried[free[seed]] = True
-        grown = of.copy()
-        grown[free[seed]] = of.max(initial=ALONE) + 1
+        label = int(of.max(initial=ALONE)) + 1
+        grown = np.where(np.arange(len(values)) == free[seed], label, ALONE)
         while True:
-            nearest, probability, _ = _judged(values, cov, scale, law, grown, float(support[seed]))
-            joining = np.flatnonzero((grown == ALONE) & (probability > LIKELY))
+            _, probability, _ = _judged(values, cov, scale, law, grown, float(support[seed]))
+            joining = np.flatnonzero((of == ALONE) & (grown == ALONE) & (probability > LIKELY))
             if not len(joining):
                 break
-            most = max(int((grown == grown.max()).sum()), 1)
-            surest = joining[np.argsort(-probability[joining], kind="stable")[:most]]
-            grown[surest] = nearest[surest]
-        of = _without(values, cov, scale, law, grown, LIKELY)
-    return of
+            most = int((grown == label).sum())
+            grown[joining[np.argsort(-probability[joining], kind="stable")[:most]]] = label
+        of = np.maximum(of, _without(values, cov, scale, law, grown, LIKELY))
+    return _without(values, cov, scale, law, of, LIKELY)
 
 
 def _without(
     values: np.ndarray, cov: np.ndarray, scale: Scale, law: _Law, of: np.ndarray, least: float
 ) -> Int[np.ndarray, " n"]:
-    """Return the classes without the values that are less probable, the least probable first."""
+    """Return the classes without the values that are less probable; of these the least probable quarter leaves first."""
     of = of.copy()
     while (of >= 0).any():
         probability = np.where(of >= 0, _judged(values, cov, scale, law, of)[1], np.inf)
-        if probability.min() >= least:
+        unsure = np.flatnonzero(probability < least)
+        if not len(unsure):
             break
-        of[probability.argmin()] = ALONE
+        of[unsure[np.argsort(probability[unsure], kind="stable")[: len(unsure) // 4 + 1]]] = ALONE
     return of
 
 

@@ -25,11 +25,11 @@ from .survey import FACES_OVERLAP_M, LONG_M, THICKEST_M, Survey, survey
 
 QUARTER = 0.5 * np.pi
 DIRECTIONS = Scale(
-    tuple(np.deg2rad([0.01, 0.02, 0.05, 0.1, 0.2]).tolist()), tuple(np.deg2rad([0.5, 1.0, 2.0, 4.0, 8.0]).tolist()),
+    tuple(np.deg2rad([0.01, 0.02, 0.05, 0.1]).tolist()), tuple(np.deg2rad([0.5, 1.0, 2.0, 4.0, 8.0]).tolist()),
     QUARTER, is_periodic=True,
 )  # fmt: skip
-"""Drawn walls are square to 0.01 degrees, built ones to 0.2: DIN 18202 allows 6 mm on 1 m and 12 mm on 6 m. In drawings
-of schools, what is not square is so by 0.5 to 15 degrees."""
+"""Drawn walls are square to 0.01 degrees, built ones to 0.1: DIN 18202 allows 8 mm on 3 m, which is 0.15 degrees. In
+drawings of schools, what is not square is so by 0.5 to 15 degrees."""
 PLACES_M = (0.0005, 0.001, 0.002, 0.005)
 STEPS_M = (0.01, 0.02, 0.04, 0.08, 0.16)
 """Walls that are nearly collinear, or nearly as thick, differ by so much: a skirting, a pilaster, a layer of bricks."""
@@ -94,7 +94,7 @@ def structure_of(faces: Faces, tolerance_rad: float | None = None) -> Structure:
     found = [
         Hypothesis(by_turn[int(quarters[row]) % 2], (row, first), *told) for row, first, told in _told(turned, longest)
     ]
-    result, collinear = _collinear(_with(faces, alpha - QUARTER * quarters, H, turned), turned.of, quarters)
+    result, collinear = _collinear(_with(faces, alpha - QUARTER * quarters, H, turned), turned, quarters)
     result, thick = _thick(result)
     likely = [each for each in (*found, *collinear, *thick) if each.probability >= TOLD]
     order = list(Relation)
@@ -141,48 +141,58 @@ def _told(found: Classes, longest: dict[int, int]) -> list[tuple[int, int, tuple
     ]  # fmt: skip
 
 
-def _with(faces: Faces, values: Float[np.ndarray, " n"], H: Float[np.ndarray, "n s"], found: Classes) -> Faces:
+def _with(
+    faces: Faces, values: Float[np.ndarray, " n"], H: Float[np.ndarray, "n s"], found: Classes,
+    lean: Float[np.ndarray, "n n"] | float = 0.0,
+) -> Faces:  # fmt: skip
     if not (found.of >= 0).any():
         return faces
-    correction, cov = imposed(values, H, faces.cov, found.of, found.tolerance)
+    noise = found.tolerance**2 * np.eye(len(values)) + lean
+    correction, cov = imposed(values, H, faces.cov, found.of, noise)
     means = faces.means + correction[POSE:].reshape(-1, 2)
     return replace(faces, means=means, cov=cov, pose_world=faces.pose_world + correction[:POSE])
 
 
-def _collinear(
-    faces: Faces, of: Int[np.ndarray, " n"], quarters: Float[np.ndarray, " n"]
-) -> tuple[Faces, list[Hypothesis]]:
-    """Impose that walls of one direction and one side, some metres apart along it, are on one line."""
+def _collinear(faces: Faces, turned: Classes, quarters: Float[np.ndarray, " n"]) -> tuple[Faces, list[Hypothesis]]:
+    """Impose that walls of one direction and one side, some metres apart along it, are on one line.
+
+    The line itself leans by as much as the directions of walls may.
+    """
     found: list[Hypothesis] = []
-    for k, quarter in sorted({(int(k), int(q) % 4) for k, q in zip(of, quarters, strict=True) if k >= 0}):
-        rows = np.flatnonzero((of == k) & (quarters % 4 == quarter))
+    for k, quarter in sorted({(int(k), int(q) % 4) for k, q in zip(turned.of, quarters, strict=True) if k >= 0}):
+        rows = np.flatnonzero((turned.of == k) & (quarters % 4 == quarter))
         if len(rows) < 2:
             continue
-        places, H = _places(faces, rows)
+        places, arms, H = _places(faces, rows)
+        lean = turned.tolerance**2 * np.outer(arms, arms)
         scale = Scale(PLACES_M, STEPS_M, max(float(np.ptp(places)), 1.0))
-        equal = classes(places, H @ faces.cov @ H.T, scale)
+        equal = classes(places, H @ faces.cov @ H.T + lean, scale)
         found += [
             Hypothesis(Relation.COLLINEAR, (int(rows[j]), int(rows[first])), *told)
             for j, first, told in _told(equal, _longest(equal, faces.lengths_m[rows]))
         ]
-        faces = _with(faces, places, H, equal)
+        faces = _with(faces, places, H, equal, lean)
     return faces, found
 
 
-def _places(faces: Faces, rows: Int[np.ndarray, " m"]) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m s"]]:
-    """Return how far the middles of parallel walls are along their mean normal, with the derivatives by the state."""
+def _places(
+    faces: Faces, rows: Int[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, "m s"]]:
+    """Return where the middles of parallel walls are across their mean direction and along it, from the mean of all,
+    and the derivative of the former by the state.
+    """
     alpha, d = faces.means[rows].T
-    turn = float(np.angle(np.mean(np.exp(1j * alpha))))
+    turn = np.angle(np.mean(np.exp(1j * alpha)))
     along = faces.extents[rows].mean(axis=1)
     middles = faces.anchors[rows] + d[:, None] * normals(alpha) + along[:, None] * directions(alpha)
     middles -= middles.mean(axis=0)
-    n = normals(np.array(turn))
+    n, arms = normals(turn), middles @ directions(turn)
     H = np.zeros((len(rows), POSE + 2 * len(faces)))
-    H[:, POSE + 2 * rows] = (middles @ directions(np.array(turn)))[:, None] / len(rows)
+    H[:, POSE + 2 * rows] = arms[:, None] / len(rows)
     mine = np.arange(len(rows))
     H[mine, POSE + 2 * rows] += (d[:, None] * directions(alpha) - along[:, None] * normals(alpha)) @ n
     H[mine, POSE + 2 * rows + 1] = normals(alpha) @ n
-    return middles @ n, H
+    return middles @ n, arms, H
 
 
 def _thick(faces: Faces) -> tuple[Faces, list[Hypothesis]]:

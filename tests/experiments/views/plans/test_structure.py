@@ -76,7 +76,7 @@ def test_an_imposed_relation_is_a_measurement_of_it():
     root = chance.normal(size=(12, 15))
     cov, H, values = root @ root.T, chance.normal(size=(6, 12)), chance.normal(size=6)
     of, tolerance = np.array([0, 0, -1, 3, 0, 3]), 0.2
-    correction, after = imposed(values, H, cov, of, tolerance)
+    correction, after = imposed(values, H, cov, of, tolerance**2 * np.eye(6))
     C = np.array([[-1, 1, 0, 0, 0, 0], [-1, 0, 0, 0, 1, 0], [0, 0, 0, -1, 0, 1]], dtype=float)
     J, weight = C @ H, np.linalg.inv(tolerance**2 * C @ C.T)
     dense = np.linalg.inv(np.linalg.inv(cov) + J.T @ weight @ J)
@@ -95,7 +95,7 @@ def test_the_directions_of_a_regular_building_become_twice_as_sure_and_stay_true
         mine = found.of >= 0
         first = values[np.flatnonzero(mine)[0]]
         correction, after = imposed(
-            first + DIRECTIONS.off(values - first), np.eye(WALLS), cov, found.of, found.tolerance
+            first + DIRECTIONS.off(values - first), np.eye(WALLS), cov, found.of, found.tolerance**2 * np.eye(WALLS)
         )
         off = DIRECTIONS.off(values + correction - deviations - 0.3)
         squared.append(off @ np.linalg.solve(after, off) / WALLS)
