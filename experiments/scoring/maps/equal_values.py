@@ -24,6 +24,9 @@ MOST_SHARE = 0.98
 COUNTS = np.array([1.0, 0.5, 0.5])
 """As how many values the prior of the three shares counts."""
 ROUNDS = 4
+CAUTION = 2.0
+"""The variance of equal values is taken to be so many standard deviations above its mean: too small a tolerance makes a
+map overconfident, too large a one costs some precision."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,7 @@ def _grown(values: np.ndarray, cov: np.ndarray, scale: Scale, law: _Law) -> Int[
 def _without(
     values: np.ndarray, cov: np.ndarray, scale: Scale, law: _Law, of: np.ndarray, least: float
 ) -> Int[np.ndarray, " n"]:
-    """Return the classes without the values that are less probable; of these the least probable quarter leaves first."""
+    """Return the classes without the values that are less probable; a quarter of these leaves at a time."""
     of = of.copy()
     while (of >= 0).any():
         probability = np.where(of >= 0, _judged(values, cov, scale, law, of)[1], np.inf)
@@ -237,6 +240,8 @@ def _learned(
     if tolerance is None and (of >= 0).any():
         tried = np.array(scale.tolerances)
         log = np.array([_fitted(values, cov, scale, each, of).log_density for each in tried])
-        weight = np.exp(log - log.max())
-        law = law._replace(tolerance=float(np.sqrt(weight @ tried**2 / weight.sum())))
+        weight = np.exp(log - log.max()) / np.exp(log - log.max()).sum()
+        mean = float(weight @ tried**2)
+        spread = float(np.sqrt(weight @ (tried**2 - mean) ** 2))
+        law = law._replace(tolerance=min(float(np.sqrt(mean + CAUTION * spread)), scale.tolerances[-1]))
     return law._replace(shares=shares)

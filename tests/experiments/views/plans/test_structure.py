@@ -89,8 +89,8 @@ def test_the_directions_of_a_regular_building_become_twice_as_sure_and_stay_true
     ratios, squared = [], []
     for seed in range(15):
         chance = np.random.default_rng([seed, 3])
-        deviations = np.deg2rad(0.02) * chance.standard_normal(WALLS)
-        values, cov = drawn_directions(chance, deviations)
+        deviations = np.deg2rad([0.02, 0.05][seed % 2]) * chance.standard_normal(WALLS)
+        values, cov = drawn_directions(chance, deviations, most_deg=1.0)
         found = classes(values, cov, DIRECTIONS)
         mine = found.of >= 0
         first = values[np.flatnonzero(mine)[0]]
@@ -102,7 +102,7 @@ def test_the_directions_of_a_regular_building_become_twice_as_sure_and_stay_true
         common = np.deg2rad(0.1) ** 2
         ratios.append(np.median(np.sqrt((np.diag(after)[mine] - common) / (np.diag(cov)[mine] - common))))
     assert np.median(ratios) < 0.5
-    assert 0.8 < np.mean(squared) < 1.15
+    assert 0.7 < np.mean(squared) < 1.15
 
 
 def twelve_rooms():
