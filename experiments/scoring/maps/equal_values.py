@@ -174,9 +174,9 @@ def _judged(
     labels, row, counts = np.unique(of[mine], return_inverse=True, return_counts=True)
     fit = _fitted(values, cov, scale, law.tolerance, of)
     known = counts[row] > 1
-    each, near = _posterior(fit.inside[known, None], fit.inside_var[known, None], (counts[row] - 1.0)[known, None],
-                            scale, law)  # fmt: skip
-    equal[mine[known]], askew[mine[known]] = each[:, 0], near
+    each, near = _posterior(fit.inside, fit.inside_var, counts - np.eye(len(labels))[row], scale, law)
+    equal[mine] = np.where(known, each[np.arange(len(mine)), row], 0.0)
+    askew[mine] = np.where(known, near, 0.0)
     if len(others):
         weight = np.maximum(counts, np.where(np.arange(len(labels)) == len(labels) - 1, support, 0.0))
         each, askew[others] = _posterior(fit.outside, fit.outside_var, weight, scale, law)
@@ -198,9 +198,9 @@ def _posterior(
 class _Fit(NamedTuple):
     """Values against classes, with variances that leave out the tolerance of the value itself."""
 
-    inside: Float[np.ndarray, " m"]
-    """How far each value of a class is from what all others say of the class."""
-    inside_var: Float[np.ndarray, " m"]
+    inside: Float[np.ndarray, "m k"]
+    """How far each value of a class is from what all others say of its class, and about how far from the others."""
+    inside_var: Float[np.ndarray, "m k"]
     outside: Float[np.ndarray, "r k"]
     """How far each other value is from each class."""
     outside_var: Float[np.ndarray, "r k"]
@@ -221,11 +221,14 @@ def _fitted(values: np.ndarray, cov: np.ndarray, scale: Scale, tolerance: float,
     weight = np.maximum(np.diag(Q), TINY)
     cross = cov[np.ix_(others, mine)]
     U = np.eye(len(first)) - (cross @ A)[:, None, :]
-    off = scale.off((values[others] - cross @ (Q @ y))[:, None] - G @ (A.T @ y))
+    centres = G @ (A.T @ y)
+    off = scale.off((values[others] - cross @ (Q @ y))[:, None] - centres)
     var = (np.diag(cov)[others] - np.vecdot(cross, cross @ W))[:, None] + np.einsum("rka,ab,rkb->rk", U, G, U)
+    apart_var = np.diag(G)[:, None] + np.diag(G) - 2.0 * G
+    inside = scale.off((Q @ y / weight)[:, None] + (centres[:, None] - centres)[row])
+    inside_var = np.maximum(1.0 / weight - tolerance**2, 0.0)[:, None] + apart_var[row]
     log_density = 0.5 * (np.linalg.slogdet(W)[1] + np.linalg.slogdet(G)[1] - y @ Q @ y)
-    return _Fit(Q @ y / weight, np.maximum(1.0 / weight - tolerance**2, 0.0), off, np.maximum(var, 0.0),
-                float(log_density))  # fmt: skip
+    return _Fit(inside, inside_var, off, np.maximum(var, 0.0), float(log_density))
 
 
 def _learned(
