@@ -33,7 +33,7 @@ BUILT: dict[str, Callable[[World], World]] = {
     "as drawn": as_drawn,
     "walls off by 0.1 degrees (sigma)": partial(as_masons_do, sigma_deg=0.1),
     "walls turned by 0.5 to 3 degrees": partial(with_turned, least_deg=0.5, most_deg=3.0),
-    "sheared by 1.5 degrees": partial(sheared, degrees=1.5),
+    "skewed by 1.5 degrees": partial(sheared, degrees=1.5),
 }
 Pair = tuple[float, float]
 HOMES = ("plans", "plans-masons", "plans-skewed", "plans-sheared")
