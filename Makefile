@@ -222,9 +222,9 @@ dimensions: setup
 
 .PHONY: structure
 
-# Are walls taken for square, collinear or equally thick that are not, and what do sure relations do to a map? 20 apartments, as drawn and askew.
+# Are walls taken for square, collinear or equally thick that are not, and what do sure relations do to a map? 12 apartments, as drawn and askew.
 structure: setup
-	$(BIN)/python -m studies.plans.structure --plans $(PLANS) --runs results
+	$(BIN)/python -m studies.plans.structure --plans $(PLANS) --count 12 --runs results
 
 .PHONY: sessions
 
