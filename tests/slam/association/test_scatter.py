@@ -1,6 +1,6 @@
 """The scatter of sightings about walls: what is estimated from errors of known size and correlation."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -65,6 +65,20 @@ def test_errors_of_known_correlation_are_counted_so_often(correlation):
     assert np.mean([each.shared for each in found]) == pytest.approx(wanted, rel=0.15)
 
 
+def test_what_errors_of_different_walls_have_in_common_does_not_count():
+    """Walls of two sightings each: the second of one and the first of the next are equal, those of one wall are not."""
+    rng = np.random.default_rng(63)
+    errors = np.concatenate([rng.standard_normal(1), np.repeat(rng.standard_normal(1999), 2), rng.standard_normal(1)])
+    assert scatter(errors, np.ones(4000), np.repeat(np.arange(2000), 2), CONFIG.doubt).shared < 1.15
+
+
+def test_from_fewer_than_thirty_pairs_no_correlation_is_estimated():
+    for walls, known in ((29, False), (30, True)):
+        owner = np.concatenate([np.repeat(np.arange(walls), 2), 1000 + np.arange(200)])
+        errors = np.concatenate([np.ones(2 * walls), np.tile([1.0, -1.0], 100)])
+        assert (scatter(errors, np.ones(len(errors)), owner, CONFIG.doubt).shared > 1.1) == known
+
+
 def test_correlation_across_walls_does_not_count():
     rng = np.random.default_rng(55)
     errors = correlated(rng, 0.9)
@@ -101,6 +115,32 @@ def test_variances_after_it_are_those_of_the_errors_times_how_often_they_are_cou
     at, sightings, owner = seen(np.random.default_rng(58), 4000, 0.01, 0.005, 0.6)
     scattered, config = as_scattered(at, sightings, owner, CONFIG)
     assert np.hypot(scattered.sigma_m, config.floor_m) == pytest.approx(0.005 * 2.0, rel=0.2)
+
+
+def test_the_variance_is_the_same_in_whatever_order_the_sightings_stand():
+    """Three walls seen in turn: one scan after the other, or all of a wall side by side."""
+    at, sightings, _ = seen(np.random.default_rng(62), 3000, 0.01, 0.005, 0.8)
+    owner = np.repeat(np.arange(3), 1000)
+    three = replace(
+        at,
+        **{
+            field.name: np.repeat(getattr(at, field.name), 3, axis=0)
+            for field in fields(at)
+            if len(getattr(at, field.name)) == 1
+        },
+    )
+    order = np.argsort(np.tile(np.arange(1000), 3), kind="stable")
+    shuffled = Sightings(*(getattr(sightings, field.name)[order] for field in fields(sightings)))
+    one, again = as_scattered(three, sightings, owner, CONFIG), as_scattered(three, shuffled, owner[order], CONFIG)
+    assert again[1].floor_m == pytest.approx(one[1].floor_m, rel=1e-9)
+    np.testing.assert_allclose(again[0].sigma_m, one[0].sigma_m[order], rtol=1e-9)
+    assert one[1].floor_m > 0.005 * 2.0
+
+
+def test_directions_too_are_counted_as_often_as_they_err_together():
+    at, sightings, owner = seen(np.random.default_rng(64), 4000, 0.01, 0.005, 0.6)
+    scattered, config = as_scattered(at, sightings, owner, CONFIG)
+    assert np.hypot(scattered.sigma_rad, config.floor_rad) == pytest.approx(0.01 * 2.0, rel=0.2)
 
 
 def test_what_was_assumed_before_decides_nothing():
