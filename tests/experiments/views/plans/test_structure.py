@@ -9,7 +9,8 @@ from shapely.affinity import affine_transform
 from shapely.geometry.polygon import orient
 
 from chainslam.experiments.scoring.maps.equal_values import classes, imposed
-from chainslam.experiments.views.plans.structure import DIRECTIONS, Relation, structure_of
+from chainslam.experiments.usage import UsageError
+from chainslam.experiments.views.plans.structure import DIRECTIONS, Relation, structure_of, structured_at
 
 from .buildings import drawn_from, mapped, two_rooms
 
@@ -148,3 +149,9 @@ def test_a_map_without_walls_has_no_structure():
     empty = replace(plan, ids=plan.ids[:0], means=plan.means[:0], anchors=plan.anchors[:0], extents=plan.extents[:0],
                     cov=plan.cov[:3, :3], chains=(), closed=())  # fmt: skip
     assert structure_of(empty).hypotheses == ()
+
+
+@pytest.mark.parametrize(("tolerance_deg", "found"), [(0.0, "tolerance"), (0.51, "tolerance"), (0.5, "map.npz")])
+def test_a_tolerance_that_would_take_askew_walls_for_square_is_refused(tmp_path, tolerance_deg, found):
+    with pytest.raises(UsageError, match=found):
+        structured_at(tmp_path, tolerance_deg)
