@@ -220,6 +220,12 @@ dimensions: setup
 	$(BIN)/python -m studies.plans.dimensions --plans $(PLANS) --runs results/plans
 	$(BIN)/python -m studies.plans.as_built --plans $(PLANS) --runs results/plans
 
+.PHONY: structure
+
+# Are walls taken for square, collinear or equally thick that are not, and what do sure relations do to a map? 12 apartments, as drawn and askew.
+structure: setup
+	$(BIN)/python -m studies.plans.structure --plans $(PLANS) --count 12 --runs results
+
 .PHONY: sessions
 
 # Does a second session find its place in the map of the first, and is the map of both consistent? 40 apartments.

@@ -22,8 +22,10 @@ def _interruptible():
 WHOLE_RUNS = [
     Path(__file__).parent / place
     for place in (
-        "explore/missions", "library", "studies", "experiments/artifacts", "experiments/campaign",
-        "experiments/commands", "experiments/replays", "experiments/runs", "experiments/test_range_errors_of_runs.py",
+        "explore/missions", "explore/floor/test_fence.py", "library", "studies", "experiments/artifacts",
+        "experiments/campaign", "experiments/commands", "experiments/replays", "experiments/runs",
+        "experiments/terminal", "experiments/test_range_errors_of_runs.py", "experiments/views/test_pictures.py",
+        "experiments/views/test_player.py", "experiments/views/test_run_page.py", "experiments/views/test_timelines.py",
     )
 ]  # fmt: skip
 """Tests whose time goes into whole runs: the parts of a run are tested with shape checks elsewhere."""

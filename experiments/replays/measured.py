@@ -12,7 +12,7 @@ from ..artifacts.trajectories import estimated_path, smoothed_path
 from ..scoring.records import Log
 from ..scoring.without_truth.normalised import FAULTS, normalised_path, normalised_relations, pair_covs_of
 from ..scoring.without_truth.references import References, scored_by
-from ..scoring.without_truth.relations import SAME_TIME_S, interpolated, paired_poses
+from ..scoring.without_truth.relations import SAME_TIME_S, interpolated, paired_poses, same_scan_s
 from ..scoring.without_truth.smoothing import rows_of_steps
 from ..trial import TrialResult
 from ..usage import UsageError
@@ -100,8 +100,9 @@ def held_against(result: TrialResult, references: References) -> TrialResult:
 
 def _normalised(result: TrialResult, log: Log, references: References) -> dict[str, Any]:
     scores: dict[str, Any] = {}
-    time_s = _time_of_steps(result, log)
-    path = normalised_path(references, time_s, log.estimated_world, log.estimated_cov)
+    time_s, recorded = _time_of_steps(result, log), result.recorded
+    within_s = same_scan_s(time_s if recorded is None else recorded.scan_time_s)
+    path = normalised_path(references, time_s, log.estimated_world, log.estimated_cov, within_s)
     if path is not None:
         scores["reference_normalised"] = path
     backend = result.scenario.backend
@@ -109,12 +110,14 @@ def _normalised(result: TrialResult, log: Log, references: References) -> dict[s
         scanner = result.scenario.config.robot.scanner
         try:
             poses, pair_covs = pair_covs_of(backend, scanner, rows_of_steps(log.unstated_motion))
-            scores["relations_normalised"] = normalised_relations(references.relations, time_s, poses, pair_covs)
+            scores["relations_normalised"] = normalised_relations(
+                references.relations, time_s, poses, pair_covs, within_s
+            )
         except FAULTS:
             scores["relations_normalised"] = None
     smoothed = result.smoothed
     if references.relations is not None and smoothed is not None and smoothed.pair_covs is not None:
-        told = normalised_relations(references.relations, time_s, smoothed.poses_world, smoothed.pair_covs)
+        told = normalised_relations(references.relations, time_s, smoothed.poses_world, smoothed.pair_covs, within_s)
         scores["relations_smoothed_normalised"] = told
     return scores
 

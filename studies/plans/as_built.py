@@ -16,8 +16,8 @@ from rich.table import Table
 from chainslam.experiments.scenario import load_world
 from chainslam.experiments.scoring.maps.measurements import Z_95
 from chainslam.experiments.terminal.console import plain_console
-from chainslam.experiments.views.plans.alignment import align
-from chainslam.experiments.views.plans.built import Finding, Verdict, compare
+from chainslam.experiments.views.plans.against.alignment import align
+from chainslam.experiments.views.plans.against.built import Finding, Verdict, compare
 from chainslam.experiments.views.plans.faces import read_faces
 from chainslam.slam.geometry.lines import directions, normals, through
 

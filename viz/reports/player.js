@@ -264,7 +264,7 @@ function play(root) {
     if (at === last()) show(0);
     let position = at, before = performance.now();
     const next = now => {
-      position += (now - before) / 1000 * film.steps.length / SECONDS;
+      position += Math.max(now - before, 0) / 1000 * film.steps.length / SECONDS; // a frame may be older than the key
       before = now;
       if (Math.floor(position) !== at) show(Math.floor(position));
       if (at < last()) playing = requestAnimationFrame(next); else go(false);

@@ -19,8 +19,8 @@ from ...scoring.maps.measurements import Z_95
 from ...terminal.answers import found
 from ...terminal.console import plain_console, say
 from ...usage import UsageError
-from ...views.plans.alignment import align, saw_through
-from ...views.plans.built import Comparison, Finding, Verdict, compare
+from ...views.plans.against.alignment import align, saw_through
+from ...views.plans.against.built import Comparison, Finding, Verdict, compare
 from ...views.plans.faces import Faces, read_faces, read_solid
 
 PICTURES = ("svg", "pdf", "png")

@@ -16,8 +16,19 @@ from ...terminal.answers import found
 from ...terminal.console import plain_console
 from ...usage import UsageError
 from ...views.plans.faces import END_SIGMA_M
-from ...views.plans.records import HEAD, ROUGH, dimension_record, dimension_rows, direction_record, named
-from ...views.plans.survey import survey_at
+from ...views.plans.records import (
+    HEAD,
+    RELATED,
+    ROUGH,
+    dimension_record,
+    dimension_rows,
+    direction_record,
+    named,
+    structure_record,
+    structure_rows,
+)
+from ...views.plans.structure import needs_structure, structured_at
+from ...views.plans.survey import Survey, survey_at
 
 
 @dataclass(frozen=True)
@@ -28,9 +39,20 @@ class Measure:
     """Folder of a run."""
     corners: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="CORNER")] = ()
     """Two corners, by their ids in map.geojson."""
+    structure: bool = False
+    """List which walls are parallel, square, collinear or equally thick, how probable each is, and the dimensions once
+    the sure ones are imposed."""
+    tolerance_deg: Annotated[float | None, tyro.conf.arg(metavar="DEGREES")] = None
+    """Standard deviation of such walls from square; by default it is estimated from the map."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for names that are no corners."""
+        needs_structure(self.structure, self.tolerance_deg)
+        if self.structure and self.corners:
+            raise UsageError("expected no corners with --structure, found some: leave out one of the two")
+        if self.structure:
+            _list_structure(self.folder, self.tolerance_deg)
+            return 0
         mapped = read_corners(self.folder)
         if len(self.corners) not in (0, 2):
             raise UsageError(f"expected two corners or none, found {len(self.corners)}: name two from the list")
@@ -55,10 +77,6 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         rooms=[_room_record(mapped, room) for room in mapped.rooms],
     )
     measured = survey_at(folder)
-    found(
-        dimensions=[dimension_record(measured, name, each) for name, each in named(measured)],
-        main_direction=direction_record(measured),
-    )
     corners = Table(title=f"corners of {folder}{_estimator(folder)}", title_justify="left")
     for title in ("corner", "x m", "y m", "sigma mm", "walls", "chain"):
         corners.add_column(title, justify="right")
@@ -72,9 +90,32 @@ def _list(mapped: MappedCorners, folder: Path) -> None:
         _list_chains(mapped, console)
     else:
         print("no chain is closed")
-    dimensions = Table(title="dimensions, `chainslam plan` draws them", title_justify="left")
-    for title in HEAD:
-        dimensions.add_column(title, justify="right" if title == HEAD[1] else "left")
+    _list_dimensions(measured, console, "dimensions, `chainslam plan` draws them")
+
+
+def _list_structure(folder: Path, tolerance_deg: float | None) -> None:
+    structure, measured = structured_at(folder, tolerance_deg)
+    found(structure=structure_record(structure))
+    console = plain_console(width=None)
+    relations = Table(title=f"relations of walls{_estimator(folder)}", title_justify="left")
+    for title in RELATED:
+        relations.add_column(title, justify="right" if title == "probability" else "left")
+    for row in structure_rows(structure):
+        relations.add_row(*row)
+    if structure.hypotheses:
+        console.print(relations)
+    print(structure.words)
+    _list_dimensions(measured, console, "dimensions with the sure relations")
+
+
+def _list_dimensions(measured: Survey, console: Console, title: str) -> None:
+    found(
+        dimensions=[dimension_record(measured, name, each) for name, each in named(measured)],
+        main_direction=direction_record(measured),
+    )
+    dimensions = Table(title=title, title_justify="left")
+    for name in HEAD:
+        dimensions.add_column(name, justify="right" if name == HEAD[1] else "left")
     for row in dimension_rows(measured):
         dimensions.add_row(*row)
     console.print(dimensions)

@@ -13,7 +13,8 @@ from ...terminal.answers import found
 from ...terminal.console import say
 from ...usage import UsageError
 from ...views.plans.layout import sheet_of
-from ...views.plans.records import plan_geojson
+from ...views.plans.records import plan_geojson, structure_record
+from ...views.plans.structure import needs_structure, structured_at
 from ...views.plans.survey import Survey, survey_at
 
 Layer = Literal["furniture", "clutter", "open-ends"]
@@ -30,6 +31,10 @@ class Plan:
     """A file to write, may be repeated; `plan.svg` in the folder if none is named."""
     show: tuple[Layer, ...] = ()
     """Layers to draw that are off otherwise: furniture, clutter (short chains that stand alone), open-ends."""
+    structure: bool = False
+    """Make walls square, parallel, collinear and equally thick where the map shows with 99 % that they are."""
+    tolerance_deg: Annotated[float | None, tyro.conf.arg(metavar="DEGREES")] = None
+    """Standard deviation of such walls from square; by default it is estimated from the map."""
 
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for no map, or another ending."""
@@ -39,8 +44,15 @@ class Plan:
                 raise UsageError(
                     f"expected a file ending in {', '.join(WRITERS)}, found {file.name}: choose one of these"
                 )
-        measured = survey_at(self.folder)
+        needs_structure(self.structure, self.tolerance_deg)
         title = self.folder.resolve().name
+        if self.structure:
+            structure, measured = structured_at(self.folder, self.tolerance_deg)
+            title += ", with structure"
+            found(structure=structure_record(structure))
+            say(structure.words)
+        else:
+            measured = survey_at(self.folder)
         end = cut_short(self.folder)
         notes = (WORDS, *([f"the run ended early: {end}"] if end else []))
         for file in files:
@@ -55,7 +67,7 @@ class Plan:
         found(files=[str(file) for file in files], **counts)
         say(
             ", ".join(f"{value} {name}" for name, value in counts.items())
-            + f"; chainslam measure {self.folder} lists them"
+            + f"; chainslam measure {self.folder}{' --structure' if self.structure else ''} lists them"
         )
         return 0
 

@@ -10,7 +10,7 @@ from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
 from ...scoring.trajectories import alignment_of_paths, moved, rms
 from ...scoring.without_truth.relation_noise import relation_covs, sigmas_of_relations
-from ...scoring.without_truth.relations import Relations, between, nearest_rows
+from ...scoring.without_truth.relations import Relations, between, nearest_rows, same_scan_s
 from ...usage import UsageError
 from .against import paired
 from .draws import LEVELS, Score, score
@@ -162,16 +162,17 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
     """
     frame, checked, covs = stated.frame or options.error or DEFAULT, check(stated), stated.planar
     assert covs is not None
+    within_s = same_scan_s(stated.time_s)
     (first, near), (second, also) = (
-        nearest_rows(stated.time_s, asked) for asked in (relations.first_s, relations.second_s)
+        nearest_rows(stated.time_s, asked, within_s) for asked in (relations.first_s, relations.second_s)
     )
     # The first pose of a graph is the frame of the others, and its covariance is zero.
     usable = checked.usable | (stated.pair_covs is not None)
     chosen = np.flatnonzero(near & also & (first != second) & usable[first] & usable[second])
     if len(chosen) < LEAST:
         raise UsageError(
-            f"expected at least {LEAST} relations between poses of {stated.name} within 10 ms, found {len(chosen)} of"
-            f" {len(relations.motions)}: use those of this drive, on the same clock"
+            f"expected at least {LEAST} relations between poses of {stated.name} within {1e3 * within_s:.3g} ms, found"
+            f" {len(chosen)} of {len(relations.motions)}: use those of this drive, on the same clock"
         )
     chosen = chosen[np.argsort(relations.first_s[chosen], kind="stable")]
     taken, poses = relations.take(chosen), stated.poses_world

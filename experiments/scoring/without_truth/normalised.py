@@ -23,7 +23,7 @@ from .relation_noise import (
     sigmas_of_path,
     sigmas_of_relations,
 )
-from .relations import Relations, between, nearest_rows
+from .relations import SAME_TIME_S, Relations, between, nearest_rows
 from .smoothing import PairCovs
 
 DOF = 3
@@ -32,15 +32,19 @@ FAULTS = (RuntimeError, ValueError, IndexError)
 
 
 def normalised_relations(
-    relations: Relations, time_s: Float[np.ndarray, " n"], poses_world: Float[np.ndarray, "n 3"], pair_covs: PairCovs
+    relations: Relations,
+    time_s: Float[np.ndarray, " n"],
+    poses_world: Float[np.ndarray, "n 3"],
+    pair_covs: PairCovs,
+    within_s: float = SAME_TIME_S,
 ) -> dict[str, Any]:
-    """Return the normalised errors of the relations whose times are both those of poses, to 10 ms.
+    """Return the normalised errors of the relations whose times are both those of poses, to `within_s`.
 
     `pair_covs` returns the joint covariance of the errors of two poses, given their rows. The error of the relation
     itself is added.
     """
     own = sigmas_of_relations(relations)
-    first, second, chosen = _at_poses(relations, time_s)
+    first, second, chosen = _at_poses(relations, time_s, within_s)
     motions = between(poses_world[first], poses_world[second])
     covs = relation_covs(motions, pair_covs(first, second))
     left, covs = between(chosen.motions, motions), covs if own is None else covs + own.cov
@@ -54,8 +58,11 @@ def normalised_path(
     time_s: Float[np.ndarray, " n"],
     poses_world: Float[np.ndarray, "n 3"],
     covs: Float[np.ndarray, "n 3 3"],
+    within_s: float = SAME_TIME_S,
 ) -> dict[str, Any] | None:
     """Return the normalised errors of poses against a reference, both relative to the first pose that they share.
+
+    They share those whose times differ by no more than `within_s`.
 
     The stated covariance of a pose is taken for that of its error since then, since the first pose of a drive is its
     frame. The error of the reference is estimated from relations a minute and more apart; without any it counts as
@@ -64,8 +71,8 @@ def normalised_path(
     if references.path is None:
         return None
     reference_s, reference_world = references.path
-    own = _error_of(references)
-    rows, near = nearest_rows(reference_s, time_s)
+    own = _error_of(references, within_s)
+    rows, near = nearest_rows(reference_s, time_s, within_s)
     at = np.flatnonzero(near)
     if not len(at):
         return {"measured": _record(own), "all": _score(np.zeros((0, DOF)), np.zeros((0, DOF, DOF)))}
@@ -90,19 +97,21 @@ def pair_covs_of(
 
 
 def _at_poses(
-    relations: Relations, time_s: Float[np.ndarray, " n"]
+    relations: Relations, time_s: Float[np.ndarray, " n"], within_s: float
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"], Relations]:
-    (first, near), (second, also) = (nearest_rows(time_s, asked) for asked in (relations.first_s, relations.second_s))
+    (first, near), (second, also) = (
+        nearest_rows(time_s, asked, within_s) for asked in (relations.first_s, relations.second_s)
+    )
     chosen = near & also & (first != second)
     return first[chosen], second[chosen], relations.take(chosen)
 
 
-def _error_of(references: References) -> Sigmas | None:
+def _error_of(references: References, within_s: float) -> Sigmas | None:
     """Return the error of a reference path, estimated from relations; None if there are none between its poses."""
     if references.path is None or references.relations is None:
         return None
     time_s, poses_world = references.path
-    first, second, chosen = _at_poses(references.relations.take(references.relations.far), time_s)
+    first, second, chosen = _at_poses(references.relations.take(references.relations.far), time_s, within_s)
     motions = between(poses_world[first], poses_world[second])
     return sigmas_of_path(motions, between(chosen.motions, motions), sigmas_of_relations(references.relations))
 

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from chainslam.slam.geometry.poses import wrap
 
 SAME_TIME_S = 0.01
-"""Times closer than this belong to one scan."""
+"""Times closer than this belong to one scan, unless scans were written closer together."""
 FAR_S = 60.0
 """Relations over a longer time measure the global consistency of a map; shorter ones measure the odometry."""
 
@@ -47,14 +47,24 @@ def between(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -
     return np.column_stack([c * dx + s * dy, c * dy - s * dx, wrap(second[:, 2] - first[:, 2])])
 
 
+def same_scan_s(scan_time_s: Float[np.ndarray, " s"]) -> float:
+    """Return how close two times of one scan are: 10 ms, or half the smallest gap between scans if that is less.
+
+    A computer that was busy stamps several scans within a millisecond or two, and a log may hold only some of them:
+    the nearest scan is then another one, taken elsewhere.
+    """
+    gaps = np.diff(np.unique(scan_time_s))
+    return min(SAME_TIME_S, 0.5 * float(gaps.min(initial=2.0 * SAME_TIME_S)))
+
+
 def nearest_rows(
-    time_s: Float[np.ndarray, " s"], asked_s: Float[np.ndarray, " m"]
+    time_s: Float[np.ndarray, " s"], asked_s: Float[np.ndarray, " m"], within_s: float = SAME_TIME_S
 ) -> tuple[Int[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Return the row of the nearest time to each requested one, and whether it is within 10 ms; times ascend."""
+    """Return the row of the nearest time to each requested one, and whether it is so near; times ascend."""
     after = np.clip(np.searchsorted(time_s, asked_s), 0, len(time_s) - 1)
     before = np.maximum(after - 1, 0)
     rows = np.where(np.abs(time_s[before] - asked_s) <= np.abs(time_s[after] - asked_s), before, after)
-    return rows, np.abs(time_s[rows] - asked_s) <= SAME_TIME_S
+    return rows, np.abs(time_s[rows] - asked_s) <= within_s
 
 
 def interpolated(
@@ -78,12 +88,13 @@ def relation_errors(
 def errors_at_scans(
     time_s: Float[np.ndarray, " s"], poses_world: Float[np.ndarray, "s 3"], relations: Relations
 ) -> tuple[Relations, Float[np.ndarray, "k 2"]]:
-    """Return the relations whose times are both those of scans, to 10 ms, and their errors (m, rad).
+    """Return the relations whose times are both those of scans, as `same_scan_s` has it, and their errors (m, rad).
 
-    Poses are those at the relation's own times, since scans may be 3 ms apart where they are written in bursts.
+    The path has a pose for each scan of the log.
     """
-    both = nearest_rows(time_s, relations.first_s)[1] & nearest_rows(time_s, relations.second_s)[1]
-    return errors_between_scans(time_s, poses_world, relations.take(both), SAME_TIME_S)
+    within_s = same_scan_s(time_s)
+    both = np.all([nearest_rows(time_s, each, within_s)[1] for each in (relations.first_s, relations.second_s)], axis=0)
+    return errors_between_scans(time_s, poses_world, relations.take(both), within_s)
 
 
 def errors_between_scans(

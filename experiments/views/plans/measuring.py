@@ -10,7 +10,7 @@ from itertools import count
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions, normals
@@ -98,14 +98,24 @@ def value_of(faces: Faces, dimension: Dimension) -> Measured:
 
 
 def across(faces: Faces, kind: Kind, first: int, second: int, at_world: Float[np.ndarray, "2"]) -> Measured:
-    """Return how far apart two walls are at a point: e = d + n·(c - p) of each, and de = t·(c - p) dalpha + dd."""
+    """Return how far apart two walls are at a point."""
+    total, gradient = apart(faces, kind, first, second, at_world)
+    return Measured(total, float(np.sqrt(max(gradient @ faces.cov @ gradient, 0.0))))
+
+
+def apart(
+    faces: Faces, kind: Kind, first: int, second: int, at_world: Float[np.ndarray, "2"]
+) -> tuple[float, Float[np.ndarray, " s"]]:
+    """Return how far apart two walls are at a point, e = d + n·(c - p) of each, with its derivative by the state:
+    de = t·(c - p) dalpha + dd.
+    """
     sign = -1.0 if kind is Kind.THICKNESS else 1.0
     gradient, total = np.zeros(POSE + 2 * len(faces)), 0.0
     for row in (first, second):
         arm = faces.anchors[row] - at_world
         total += sign * _off(faces, row, at_world)
         gradient[POSE + 2 * row : POSE + 2 * row + 2] += sign * directions(faces.means[row, 0]) @ arm, sign
-    return Measured(total, float(np.sqrt(max(gradient @ faces.cov @ gradient, 0.0))))
+    return total, gradient
 
 
 def area_of(faces: Faces, rings: Sequence[Sequence[Node]]) -> Measured:
@@ -134,9 +144,13 @@ def _quarter(rad: np.ndarray | float) -> Any:
     return wrap(4.0 * np.asarray(rad)) / 4.0
 
 
-def main_direction(faces: Faces) -> Measured:
-    """Return the direction (rad, from -45 to 45 degrees) of most of the walls modulo 90 degrees, by their lengths."""
-    phi, share = commonest(faces.means[:, 0], faces.lengths_m)
+def main_direction(faces: Faces, among: Bool[np.ndarray, " n"] | None = None) -> Measured:
+    """Return the direction (rad, from -45 to 45 degrees) of most of the walls modulo 90 degrees, by their lengths.
+
+    Only those walls count that are `among` some; all by default.
+    """
+    lengths = faces.lengths_m if among is None else np.where(among, faces.lengths_m, 0.0)
+    phi, share = commonest(faces.means[:, 0], lengths)
     gradient = np.zeros(POSE + 2 * len(faces))
     gradient[POSE::2] = share / max(float(share.sum()), 1e-12)
     return Measured(phi, float(np.sqrt(max(gradient @ faces.cov @ gradient, 0.0))))

@@ -13,9 +13,11 @@ from ...artifacts.files import stamp
 from ...artifacts.maps.geojson import FRAME, LOCAL_METRES
 from .layout import loose, sheet_of, words
 from .measuring import Dimension, Kind
+from .structure import Structure
 from .survey import Survey
 
 HEAD = ("dimension", "value and 95 % interval", "walls")
+RELATED = ("relation", "walls", "probability", "used")
 ROUGH = "*"
 """Marks a dimension to an end that is no corner."""
 SHOWN = 6
@@ -57,6 +59,27 @@ def dimension_rows(found: Survey) -> list[tuple[str, ...]]:
         value = f"{words(each.measured, 3)} {each.unit}{'' if each.is_firm else ROUGH}"
         rows.append((name, value, walls if len(each.walls) <= SHOWN else f"{len(each.walls)} walls"))
     return rows
+
+
+def structure_record(found: Structure) -> dict[str, Any]:
+    """Return the relations of walls as data."""
+    return {
+        "tolerance_deg": float(np.rad2deg(found.tolerance_rad)),
+        "hypotheses": [
+            {"relation": str(each.relation), "walls": found.faces.ids[list(each.walls)],
+             "probability": each.probability, "used": each.is_used}
+            for each in found.hypotheses
+        ],
+    }  # fmt: skip
+
+
+def structure_rows(found: Structure) -> list[tuple[str, ...]]:
+    """Return the rows of the table of relations."""
+    return [
+        (str(each.relation), ", ".join(map(str, found.faces.ids[list(each.walls)].tolist())),
+         f"{each.probability:.4f}", "yes" if each.is_used else "no")
+        for each in found.hypotheses
+    ]  # fmt: skip
 
 
 def plan_geojson(found: Survey, title: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from jaxtyping import Bool
 from shapely.geometry.base import BaseGeometry
 
 from chainslam.slam.geometry.lines import normals
@@ -46,11 +47,13 @@ class Survey:
     rooms: tuple[Room, ...]
     dimensions: tuple[Dimension, ...]
     """All of them, by kind."""
+    square: Bool[np.ndarray, " n"] | None = None
+    """Which walls surely have the main direction or are square to it; None where that is not known."""
 
     @cached_property
     def direction(self) -> Measured:
         """Main direction of the walls, rad."""
-        return main_direction(self.faces)
+        return main_direction(self.faces, self.square)
 
     @property
     def openings(self) -> list[Gap]:

@@ -114,9 +114,9 @@ class SecondLooksConfig:
     least_sightings: Number = 3
     """Smallest number of observations of a wall."""
     floor_rad: Spread = float(np.deg2rad(0.5))
-    """Standard deviation added to each observed direction, since no real wall is straight."""
+    """Standard deviation added to each observed direction in the solution, since no real wall is straight."""
     floor_m: Deviation = 0.02
-    """Standard deviation added to each observed offset, since no real wall is straight."""
+    """Standard deviation added to each observed offset in the solution, since no real wall is straight."""
     understated: Factor = 4.0
     """Divisor of the covariance that scan matching states, since that is larger than the error."""
     doubt: Sigmas = 2.0

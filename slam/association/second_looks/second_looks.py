@@ -20,6 +20,7 @@ from .config import SecondLooksConfig
 from .landmarks import Sightings, associated, firm, joined
 from .loop_search import LoopSearch
 from .refuted import NO_RAYS, Rays, refuted
+from .scatter import as_scattered
 from .solve import begun, normal_equations, solved, without_lines
 from .submaps import Returns
 from .walls import blocks_at, inverse_at, merged, spans, surveyed
@@ -87,7 +88,10 @@ def _with_walls(
     rays: Rays = NO_RAYS,
     goes_on: Callable[[float], bool] = to_the_end,
 ) -> Survey:
-    """Return poses and walls after all rounds of association and solution; at last, duplicate walls are one."""
+    """Return poses and walls after all rounds of association and solution; at last, duplicate walls are one.
+
+    The information is that of sightings which scatter as much as their errors at the solution.
+    """
     c, drive = config.closures, search.drive.links(config.doubt, config)
     unknowns = without_lines(settled(search.poses, search.drive, search.closures, config))
     seen, of = sightings, np.zeros(0, dtype=np.int64)
@@ -107,6 +111,8 @@ def _with_walls(
         kept = held(search.closures, unknowns.poses, c)
         links = [drive, closure_links(kept, config.doubt, c)]
         unknowns = solved(begun(unknowns.poses, seen, of), links, seen, of, config)
-    information, _ = normal_equations(unknowns, links, seen, of, config)
+    # The path stays: where sightings of other walls are among them, their errors are no guide to better weights.
+    scattered, by = as_scattered(unknowns, seen, of, config)
+    information, _ = normal_equations(unknowns, links, scattered, of, by)
     walls, joint = surveyed(unknowns, information, seen, of, config)
     return Survey(unknowns.poses, walls, joint, len(kept), information)

@@ -188,6 +188,11 @@ def test_a_program_that_reads_nothing_and_fills_its_standard_error_is_ended_too(
         deaf.ask(b" " * 1_000_000 + b"\n")
 
 
+def test_of_a_line_without_an_end_no_more_is_read_than_an_answer_may_have(program):
+    with running(program("while True: os.write(1, b'x' * 100_000)"), 20.0) as endless:
+        assert len(endless.ask(b"{}\n")) == 65_536
+
+
 def test_a_program_that_does_not_start_is_told(made, tmp_path):
     broken = tmp_path / "broken"
     broken.write_text("#!/no/such/interpreter\n")

@@ -7,8 +7,6 @@ import pytest
 from chainslam.experiments.commands.cli import COMMANDS, main
 from chainslam.experiments.terminal import answers
 
-pytestmark = pytest.mark.usefixtures("_unchecked")
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):

@@ -110,6 +110,10 @@ def test_a_drive_without_noise_has_no_nees(tmp_path):
     assert (run["anees"], run["in_band"], run["nees"]) == (None, None, [None] * 5)
 
 
+def test_a_long_drive_has_no_more_than_two_hundred_pictures():
+    assert 150 < len(shown_steps(12_345)) <= 200
+
+
 def test_few_steps_are_shown_and_the_last_always():
     assert shown_steps(0) == []
     assert shown_steps(3) == [0, 1, 2]

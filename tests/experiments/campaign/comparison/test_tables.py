@@ -193,6 +193,8 @@ def test_the_tables_of_a_campaign_hold_each_trial_once_cell_by_cell(tmp_path):
     def of(trial):
         made = run(nees[trial.backend, trial.seed])
         names = {"backend": trial.backend, "seed": trial.seed, "reason": "done", "pose_anees": 1.0}
+        matches = ("matches_true", "matches_missed", "matches_false", "duplicate_lines", "merges", "false_merges")
+        names |= dict.fromkeys(matches, 1)
         return TrialScores(made.summary | names, made.arrays)
 
     write_tables(tmp_path, Campaign(("w",), backends, ("nearest-robot",), 2, arms=("closed",)), trials, of)

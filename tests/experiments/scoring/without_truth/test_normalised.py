@@ -138,3 +138,16 @@ def test_nothing_at_the_times_of_poses_leaves_null(graphs):
         assert score["anees"] is None
     assert relations["measured"]["sigma_m"] is not None
     assert normalised_path(References(), late, online, covs) is None
+
+
+def test_the_scan_beside_one_that_is_missing_is_not_taken_for_it(graphs):
+    graph, online, covs, true = graphs[0]
+    path, pair_covs = pair_covs_of(graph, ScannerSpec(), ALL)
+    relations = relations_of(true, 0)
+    late = 10.0 * ALL + np.where(ALL % 2, 0.002, 0.0)
+    even = np.all(np.stack([relations.first_s, relations.second_s]) % 20.0 == 0.0, axis=0)
+    told = normalised_relations(relations, late, path, pair_covs, 0.001)["all"]
+    assert 0 < told["count"] == np.count_nonzero(even) < len(even)
+    assert normalised_relations(relations, late, path, pair_covs)["all"]["count"] == len(even)
+    reference = References(path=(10.0 * ALL, true))
+    assert normalised_path(reference, late, online, covs, 0.001)["all"]["count"] == STEPS // 2

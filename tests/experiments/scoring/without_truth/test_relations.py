@@ -14,6 +14,7 @@ from chainslam.experiments.scoring.without_truth.relations import (
     nearest_rows,
     paired_poses,
     relation_errors,
+    same_scan_s,
 )
 
 
@@ -104,3 +105,30 @@ def test_ate_is_that_of_evo_for_paths_of_other_times(counts):
         ape = metrics.APE(metrics.PoseRelation.translation_part)
         ape.process_data((second, first))
         assert ate(*mine, align=align) == pytest.approx(ape.get_statistic(metrics.StatisticsType.rmse), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("times", "within_s"),
+    [
+        ([], 0.01),
+        ([5.0], 0.01),
+        ([0.0, 0.0, 0.0], 0.01),
+        ([0.0, 0.2, 0.4], 0.01),
+        ([0.0, 0.2, 0.201, 0.5], 0.0005),
+        ([0.201, 0.0, 0.5, 0.2], 0.0005),
+    ],
+)
+def test_times_of_one_scan_are_nearer_than_any_two_scans(times, within_s):
+    assert same_scan_s(np.array(times)) == pytest.approx(within_s)
+
+
+def test_a_scan_of_a_burst_that_the_log_left_out_has_no_pose():
+    # Four scans are stamped within 3 ms, though the robot goes on by 0.1 m from each to the next.
+    times = np.concatenate([np.arange(4) * 1e-3 + each for each in (0.0, 1.0, 2.0)])
+    path = np.column_stack([0.1 * np.arange(12), np.zeros((12, 2))])
+    first, second = np.triu_indices(12, 1)
+    relations = Relations(times[first], times[second], path[second] - path[first])
+    kept = np.delete(np.arange(12), [2, 5, 8])
+    at, errors = errors_at_scans(times[kept], path[kept], relations)
+    assert len(at.first_s) == 9 * 8 / 2
+    np.testing.assert_allclose(errors, 0.0, atol=1e-12)

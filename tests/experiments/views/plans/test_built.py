@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from chainslam.experiments.usage import UsageError
-from chainslam.experiments.views.plans.alignment import align, saw_through
-from chainslam.experiments.views.plans.built import Verdict, compare
+from chainslam.experiments.views.plans.against.alignment import align, saw_through
+from chainslam.experiments.views.plans.against.built import Verdict, compare
 from chainslam.slam.geometry.poses import inverse
 
 from .buildings import drawn_from, edges, mapped, two_rooms

@@ -7,8 +7,8 @@ import pytest
 import shapely
 from shapely.geometry.polygon import orient
 
-from chainslam.experiments.views.plans.alignment import align
-from chainslam.experiments.views.plans.built import Verdict, compare
+from chainslam.experiments.views.plans.against.alignment import align
+from chainslam.experiments.views.plans.against.built import Verdict, compare
 from chainslam.experiments.views.plans.measuring import Kind, commonest, value_of
 from chainslam.experiments.views.plans.openings import gaps
 from chainslam.experiments.views.plans.survey import survey

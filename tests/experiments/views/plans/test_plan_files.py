@@ -89,6 +89,32 @@ def test_measure_tells_dimensions_as_data(folder, capsys):
     assert told["main_direction"]["value_deg"] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_sure_relations_are_told_as_data_and_imposed_where_asked(folder, tmp_path, capsys):
+    assert main(["measure", str(folder), "--structure", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {each["relation"] for each in told["structure"]["hypotheses"] if each["used"]} >= {"parallel", "right angle"}
+    assert all(each["probability"] >= 0.99 for each in told["structure"]["hypotheses"] if each["used"])
+    assert main(["measure", str(folder), "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    sigmas = [[each["sigma_m"] for each in all_["dimensions"] if each["kind"] == "length"] for all_ in (told, plain)]
+    assert np.median(np.divide(*sigmas)) < 1.0
+    path = tmp_path / "plan.geojson"
+    assert main(["plan", str(folder), "--structure", "--out", str(path)]) == 0
+    assert "with structure" in json.loads(path.read_text())["name"]
+    assert main(["measure", str(folder), "--structure"]) == 0
+    assert "right angle" in capsys.readouterr().out
+
+
+def test_a_tolerance_alone_or_too_large_and_corners_with_structure_are_refused(folder, capsys):
+    for words in (["--tolerance-deg", "0.1"], ["--structure", "--tolerance-deg", "2"]):
+        assert main(["plan", str(folder), *words]) == 2
+        assert main(["measure", str(folder), *words]) == 2
+    assert main(["measure", str(folder), "0", "1", "--structure"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 5
+    assert all(line.startswith("chainslam: expected") for line in said)
+
+
 def test_a_map_is_checked_against_a_drawing_file(folder, tmp_path, capsys):
     picture = tmp_path / "check.svg"
     words = ["check", str(folder), str(folder / "drawing.geojson"), "--start", "0.5", "0.5", "--at", "0", "0", "0"]

@@ -11,9 +11,9 @@ from shapely.geometry.base import BaseGeometry
 from chainslam.slam.geometry.lines import directions, normals, through
 from chainslam.slam.geometry.poses import to_robot, to_world, wrap
 
-from ...usage import UsageError
-from .faces import Faces
-from .measuring import commonest, main_direction
+from ....usage import UsageError
+from ..faces import Faces
+from ..measuring import commonest, main_direction
 
 SHORT_M = 0.3
 """Shorter walls and faces are not compared: their direction is not known well enough to tell which is which."""

@@ -16,10 +16,10 @@ from chainslam.slam.estimation.backend import POSE
 from chainslam.slam.geometry.lines import directions
 from chainslam.slam.geometry.numerics import TINY
 
-from ...scoring.maps.measurements import Measured
-from ...usage import UsageError
+from ....scoring.maps.measurements import Measured
+from ....usage import UsageError
+from ..faces import Faces
 from .alignment import SHORT_M, Sighting, look, off_design, offsets
-from .faces import Faces
 
 FLOOR_M = 0.2e-3
 """What lines of the map err by besides their noise."""

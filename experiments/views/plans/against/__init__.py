@@ -1,0 +1,1 @@
+"""A map against the drawing of its building."""
