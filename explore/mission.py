@@ -21,6 +21,7 @@ from .goal import GivenUp
 from .goals.decider import Driver
 from .goals.explorer import Explorer
 from .goals.explorer_config import ExplorerConfig
+from .goals.first_turns import FirstTurns
 from .goals.homing import Homing, HomingConfig
 from .goals.later_session import LaterSession
 from .goals.lost import Lost, LostConfig
@@ -66,7 +67,7 @@ def explore_mission(
 
     def explorer() -> Driver:
         start, following = mapper.belief.pose_world[:2].copy(), config.explorer.following
-        explorer = Explorer(strategy, start, config.explorer)
+        explorer = FirstTurns(Explorer(strategy, start, config.explorer), following.driving)
         inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
         return Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
 

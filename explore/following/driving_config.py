@@ -14,9 +14,9 @@ class DrivingConfig:
     horizon: Factor = 3.0
     """Whole steps are planned so many of the longest far."""
     clear_m: Distance = 0.004
-    """Smallest distance kept between the body and any return, on a short step as little as there is before it ..."""
+    """Smallest distance between the body and any return; a short step may leave as little as there is before it."""
     clear_share: Share = 0.1
-    """... and more by this share of the step."""
+    """This share of the length of a step is kept in addition."""
     wide_m: Size = 0.05
     """Where the body has less room than this a step costs more, up to four times as much."""
     step_cost_m: Size = 0.05

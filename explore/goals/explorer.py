@@ -13,6 +13,7 @@ from chainslam.slam.robot import MotionCommand
 
 from ..following.driving import spin
 from ..following.end_errand import EndErrand
+from ..following.paper_errand import PaperErrand
 from ..following.ping_pong import WallErrand
 from ..following.surroundings import Surroundings
 from ..following.wall_following import Errand, PlaceErrand
@@ -26,7 +27,6 @@ from ..survey.round_things import is_round
 from .decider import Decision
 from .explorer_config import ExplorerConfig
 from .ledger import Event, Key, Ledger
-from .paper_errand import PaperErrand
 from .second_tries import SecondTries
 from .sweep import Sweep
 
@@ -47,10 +47,6 @@ class _Task:
     def doing(self) -> str:
         """What the robot is about and why, in words."""
         return f"{self.errand.doing} ({self.choice.reason})"
-
-
-FIRST_TURNS = 4
-"""A mission begins with so many turns on the spot: where on the body the scanner sits shows in turns alone."""
 
 
 class Explorer:
@@ -82,21 +78,21 @@ class Explorer:
         # Asked once: what a protocol asks of a class takes longer than most strategies.
         self._watchful = strategy if isinstance(strategy, Watchful) else None
 
-    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
-        """Return what to do next; at the end, which ends are left."""
+    def watch(self, around: Surroundings) -> None:
+        """Take note of a step's surroundings; `decide` does so itself."""
         self._step += 1
         if self._watchful is not None:
             self._watchful.watch(around)
         self._tries.watch(around)
+
+    def decide(self, around: Surroundings, chains: tuple[Chain, ...], graph: nx.DiGraph[int]) -> Decision:
+        """Return what to do next; at the end, which ends are left."""
+        self.watch(around)
         ends = {(end.wall, end.side): end for chain in chains for end in chain.open_ends}
         self._tries.take_up_moved(ends)
         self._keep_within(around, ends)
         self._abandon(around, ends)
-        command = (
-            spin(around, 1.0, self._config.following.driving)
-            if self._step < FIRST_TURNS
-            else self._command(around, chains, ends, graph)
-        )
+        command = self._command(around, chains, ends, graph)
         given_up, task = self._ledger.given_up, self._task
         if command is not None:
             if task is None:

@@ -17,8 +17,7 @@ from ..following.surroundings import Surroundings
 from ..following.wall_following import FollowingConfig, PlaceErrand
 from ..goal import Goal
 from ..planning.sight import cells_within
-from .decider import Decision
-from .explorer import Explorer
+from .decider import Decider, Decision
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Homing:
     """An explorer that ends where it started; everything else is left to the explorer itself."""
 
     def __init__(
-        self, explorer: Explorer, start_world: Float[np.ndarray, 2], config: HomingConfig, following: FollowingConfig
+        self, explorer: Decider, start_world: Float[np.ndarray, 2], config: HomingConfig, following: FollowingConfig
     ) -> None:
         self._explorer, self._start, self._config, self._following = explorer, start_world, config, following
         self._way: PlaceErrand | None = None

@@ -30,10 +30,6 @@ OF_THE_PAPER = {
     "explorer.following.paths.standoff_m": 0.35,
     "explorer.following.paths.escape_m": 0.3,
     "explorer.following.driving.radius_m": 0.2,
-    "explorer.following.driving.narrow_m": 0.55,
-    "explorer.following.driving.fits_m": 0.425,
-    "explorer.following.driving.obstructed_m": 0.17,
-    "explorer.following.driving.slow_m": 0.05,
     "explorer.following.viewpoints.standoff_m": 0.35,
     "explorer.following.viewpoints.close_m": 0.25,
     "free_space.body_m": 0.2,
@@ -72,14 +68,8 @@ def test_what_follows_from_the_papers_robot_is_to_the_last_bit_what_it_was(key):
 def test_every_length_grows_with_the_body_or_the_step(key):
     mission = TrialConfig("", robot=RobotConfig(radius_m=0.3, step_m=0.04)).mission
     assert value_of(mission, key) != OF_THE_PAPER[key]
-    wider = (
-        0.2
-        if key.endswith((".narrow_m", ".fits_m"))
-        else 0.05
-        if key.endswith((".touched_m", "aim_m", "back_m"))
-        else 0.1
-    )
-    if not key.endswith((".step_m", ".slow_m")):
+    wider = 0.05 if key.endswith((".touched_m", "aim_m", "back_m")) else 0.1
+    if not key.endswith(".step_m"):
         assert value_of(mission, key) == pytest.approx(OF_THE_PAPER[key] + wider)
 
 

@@ -125,8 +125,10 @@ def test_a_map_is_a_world_again_and_explored_again(explored, world, name):
     assert len(again.free.interiors) == 1
     assert again.free.area == pytest.approx(world.free.area, rel=0.05)
     if name == "map.yaml":
-        # The picture lies in the map's own frame; faces stand where the cells that were hit begin.
-        assert again.free.exterior.hausdorff_distance(world.free.exterior) < 0.1
+        # The picture lies in the map's own frame; faces stand where the cells that were hit begin. Beams five
+        # metres away lie two cells apart, so that a corner may be cut off between two of them.
+        assert again.free.exterior.hausdorff_distance(world.free.exterior) < 0.15
+        assert again.free.symmetric_difference(world.free).area < 0.05 * world.free.area
     else:
         assert len(again.faces) == 8
         np.testing.assert_allclose(again.start[2], world.start[2], atol=1e-4)

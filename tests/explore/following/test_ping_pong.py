@@ -11,7 +11,6 @@ from chainslam.explore.floor.free_space import FreeSpace
 from chainslam.explore.following.ping_pong import WallErrand
 from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.following.wall_following import FollowingConfig
-from chainslam.explore.goals import explorer as explorer_module
 from chainslam.explore.goals.explorer import Explorer
 from chainslam.explore.goals.explorer_config import ExplorerConfig
 from chainslam.explore.strategies.nearest_robot import NearestRobot
@@ -83,8 +82,7 @@ def test_a_wall_that_is_gone_is_not_followed(scene_of):
     assert "999" in errand.trouble
 
 
-def test_an_end_that_nothing_could_be_seen_of_is_tried_again_when_the_floor_there_is_known(scene_of, look, monkeypatch):
-    monkeypatch.setattr(explorer_module, "FIRST_TURNS", 0)
+def test_an_end_that_nothing_could_be_seen_of_is_tried_again_when_the_floor_there_is_known(scene_of, look):
     scene = scene_of(0, 0)
     gaps = np.hypot(*np.moveaxis(scene.faces[None] - scene.places[:, None, None], -1, 0)).min(axis=2)
     row, far = np.unravel_index(int(np.argmax(gaps)), gaps.shape)

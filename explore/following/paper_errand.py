@@ -13,14 +13,14 @@ import numpy as np
 from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
 from chainslam.slam.robot import MotionCommand
 
-from ..following.behaviour import Behaviour
-from ..following.surroundings import Surroundings
-from ..following.wall_follower import WallFollower
-from ..following.wall_following import FollowingConfig
 from ..planning.lanes import lanes_of
 from ..planning.paths import Planner
 from ..planning.visibility_graph import followed_wall
 from ..planning.wall_routes import sequence
+from .behaviour import Behaviour
+from .surroundings import Surroundings
+from .wall_follower import WallFollower
+from .wall_following import FollowingConfig
 
 
 class PaperErrand:

@@ -7,10 +7,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from chainslam.explore.following import paper_errand
+from chainslam.explore.following.paper_errand import PaperErrand
 from chainslam.explore.following.surroundings import Surroundings
 from chainslam.explore.following.wall_following import FollowingConfig
-from chainslam.explore.goals import paper_errand
-from chainslam.explore.goals.paper_errand import PaperErrand
 from chainslam.slam.map.chains import HEAD, TAIL, OpenEnd
 from chainslam.slam.robot import MotionCommand, Scan
 
