@@ -72,7 +72,7 @@ def explore_mission(
         return Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
 
     driver = LaterSession(explorer, recorded) if recorded else explorer()
-    return _mission(robot, mapper, driver, floor)
+    return driven_mission(robot, mapper, driver, floor)
 
 
 def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "", unread: str = "") -> Iterator[Step]:
@@ -81,7 +81,7 @@ def ride_mission(robot: Robot, mapper: Mapper, scans: int, cut_short: str = "", 
     `cut_short` says in words what ended its drive early, and `unread` why most of its log was not read: such a run has
     failed. Nobody plans, so nobody keeps the free floor.
     """
-    return _mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot), cut_short, unread), None)
+    return driven_mission(robot, mapper, ReplayDriver(scans, LostConfig(mapper.config.robot), cut_short, unread), None)
 
 
 def _working_s() -> float:
@@ -89,7 +89,8 @@ def _working_s() -> float:
     return time.thread_time() - compiling_s()
 
 
-def _mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
+def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMemory | None) -> Iterator[Step]:
+    """Map what a robot senses while somebody drives it, and yield each step; without `floor` nobody keeps it."""
     spec = mapper.config.robot
     graph, recent, lost = VisibilityGraph(), AccumulatedReturns(spec), LostReturns(spec.scanner)
     free_space = FreeSpace() if floor is None else floor.free_space
