@@ -13,8 +13,8 @@ class DrivingConfig:
     robot: RobotSpec = of_robot()
     horizon: Factor = 3.0
     """Whole steps are planned so many of the longest far."""
-    clear_m: Distance = 0.004
-    """Smallest distance between the body and any return; a short step may leave as little as there is before it."""
+    clear_m: Distance = 0.008
+    """Smallest distance between the body and any return; a short step may leave half, if no more was there."""
     clear_share: Share = 0.1
     """This share of the length of a step is kept in addition."""
     wide_m: Size = 0.05

@@ -15,6 +15,8 @@ WALK_CELLS = 6
 """Where the field leads on from a place is told over so many cells."""
 NARROW = 3.0
 """Where there is no room beside the body a step costs so many times more."""
+EXCUSED = 0.5
+"""A short step keeps at least this share of its clearance from what it comes nearer to, by however little it began."""
 MOST = 3000
 """A search looks at so many poses at most."""
 
@@ -28,8 +30,8 @@ class Motions(NamedTuple):
     clear_m: Float[np.ndarray, " a"]
     """Between the body and all returns on the way of each ..."""
     is_short: Bool[np.ndarray, " a"]
-    """... or as little as there is before, where a step is short and no turn on the spot, on which wheels slip aside;
-    what is nearer still, by noise, it comes no nearer to."""
+    """... or as little as there is before, but at least half, where a step is short and no turn on the spot, on which
+    wheels slip aside; what is nearer still, by noise, it comes no nearer to."""
     wide_m: float
     """Where there is less room than this a step costs more, up to four times as much."""
     horizon_m: float
@@ -135,7 +137,7 @@ def step_room_m(
 ) -> float:
     """Return the clearance on a step, -inf where the step is not safe; `now_m` is that before it."""
     c, s, least, is_short = math.cos(pose[2]), math.sin(pose[2]), motions.wide_m, motions.is_short[a]
-    asked_m = min(motions.clear_m[a], max(now_m, 0.0)) if is_short else motions.clear_m[a]
+    asked_m = motions.clear_m[a] * (min(max(now_m / motions.clear_m[a], EXCUSED), 1.0) if is_short else 1.0)
     for k in range(motions.places.shape[1] - 1, -1, -1):  # what is in the way mostly is so at the end
         px, py, turn = motions.places[a, k]
         x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
