@@ -67,8 +67,8 @@ __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Audit", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
     "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
-    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UnseenFloor", "UsageError", "WheelSpec",
-    "World", "__version__", "audit", "check_backend", "compare", "explore", "load", "replay", "unseen_floor",
+    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UnseenFloor", "UsageError",
+    "WheelSpec", "World", "__version__", "audit", "check_backend", "compare", "explore", "load", "replay", "unseen_floor",
 ]  # fmt: skip
 
 
