@@ -68,7 +68,8 @@ __all__ = [
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
     "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
     "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UnseenFloor", "UsageError",
-    "WheelSpec", "World", "__version__", "audit", "check_backend", "compare", "explore", "load", "replay", "unseen_floor",
+    "WheelSpec", "World", "__version__", "audit", "check_backend", "compare", "explore", "load", "replay",
+    "unseen_floor",
 ]  # fmt: skip
 
 
