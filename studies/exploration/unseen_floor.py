@@ -31,8 +31,8 @@ EVERY = 10
 """Steps between two grids of a run."""
 TIMES = 12
 """Grids of each run that count, evenly spaced from the first to the last."""
-EDGES = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0])
-"""Classes of reach, the last without an end."""
+EDGES = np.array([0.0, 0.2, 0.5, 1.0])
+"""Classes of reach in the table, the last without an end."""
 
 
 @dataclass(frozen=True)
@@ -106,32 +106,22 @@ def _reaches(rows: Sequence[Row]) -> tuple[Float[np.ndarray, " n"], Float[np.nda
 
 def _bound(rows: Sequence[Row]) -> Bound:
     """Return the bound by some runs."""
-    return calibrated(*_reaches(rows), len(rows), EDGES)
+    return calibrated(*_reaches(rows), len(rows))
 
 
 def table(rows: Sequence[Row], bound: Bound) -> Table:
     """Return how often the bound holds, in each class of reach and in all."""
     reach, share = _reaches(rows)
-    told = np.array(bound.share)[np.searchsorted(bound.reach, reach)]
+    told = bound.share(reach)
     shown = Table(title=f"{len(rows)} runs, bound by {bound.runs} others", title_justify="left")
-    for column in ("border over the root of seen floor", "grids", "holds", "unseen, median", "bound"):
+    for column in ("border over the root of seen floor", "grids", "holds", "unseen, median", "bound, median"):
         shown.add_column(column, justify="right")
-    classes = np.searchsorted(bound.reach, reach)
-    ends = [f"up to {edge:g}" for edge in bound.reach] + ["more"]
-    for each, words in enumerate(ends):
-        here = classes == each
+    classes = np.searchsorted(EDGES, reach)
+    parts = [(f"up to {edge:g}" if edge else "none", classes == k) for k, edge in enumerate(EDGES)]
+    for words, here in (*parts, ("more", classes == len(EDGES)), ("all", classes >= 0)):
         if here.any():
-            holds = f"{100 * np.mean(share[here] <= told[here]):.1f} %"
-            shown.add_row(
-                words,
-                str(here.sum()),
-                holds,
-                f"{100 * np.median(share[here]):.2f} %",
-                f"{100 * bound.share[each]:.1f} %",
-            )
-    shown.add_section()
-    holds = f"{100 * np.mean(share <= told):.1f} %"
-    shown.add_row("all", str(len(reach)), holds, f"{100 * np.median(share):.2f} %", "")
+            shares = np.mean(share[here] <= told[here]), np.median(share[here]), np.median(told[here])
+            shown.add_row(words, str(here.sum()), *(f"{100 * each:.1f} %" for each in shares))
     return shown
 
 

@@ -43,12 +43,18 @@ class UnseenFloor:
 
 
 class Bound(Struct):
-    """The calibration: up to each reach, the largest share of unseen over seen floor at 95 %."""
+    """The calibration: unseen over seen floor at 95 %, which grows with the root of the reach."""
 
-    reach: list[float]
-    share: list[float]
+    closed: float
+    """Where there is no border."""
+    open: float
+    """Where there is one, of the root of the reach."""
     runs: int
     """Number of runs that it comes from."""
+
+    def share(self, reach: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Return the largest share of unseen over seen floor."""
+        return np.asarray(np.where(reach > 0.0, np.maximum(self.open * np.sqrt(reach), self.closed), self.closed))
 
 
 def unseen_floor(
@@ -62,9 +68,8 @@ def unseen_floor(
     """
     seen_m2, frontier_m = frontier_of(grid, cell_m, robot_rc, radius_m)
     told = UnseenFloor(0.0, seen_m2, frontier_m)
-    bound = calibration()
-    share = bound.share[min(int(np.searchsorted(bound.reach, told.reach)), len(bound.share) - 1)]
-    return UnseenFloor(share * seen_m2, seen_m2, frontier_m)
+    share = calibration().share(np.array([told.reach]))
+    return UnseenFloor(float(share[0]) * seen_m2, seen_m2, frontier_m)
 
 
 def unseen_now(step: Step) -> UnseenFloor | None:
@@ -119,14 +124,13 @@ def calibration() -> Bound:
     return decode(files(__package__).joinpath(TABLE).read_bytes(), type=Bound)
 
 
-def calibrated(
-    reach: Float[np.ndarray, " n"], share: Float[np.ndarray, " n"], runs: int, edges: Float[np.ndarray, " e"]
-) -> Bound:
-    """Return the conformal bound in classes of reach, of which larger ones have no smaller bound."""
-    classes = np.searchsorted(edges, reach)
-    bounds = []
-    for each in range(len(edges) + 1):
-        found = np.sort(share[classes == each])
-        rank = int(np.ceil(CONFIDENCE * (len(found) + 1))) - 1
-        bounds.append(float(found[rank]) if rank < len(found) else np.inf)
-    return Bound(edges.tolist(), np.maximum.accumulate(bounds).tolist(), runs)
+def calibrated(reach: Float[np.ndarray, " n"], share: Float[np.ndarray, " n"], runs: int) -> Bound:
+    """Return the conformal bound by the reaches and shares of some grids."""
+    is_open = reach > 0.0
+    return Bound(_quantile(share[~is_open]), _quantile(share[is_open] / np.sqrt(reach[is_open])), runs)
+
+
+def _quantile(values: Float[np.ndarray, " n"]) -> float:
+    """Return what the next value of their kind does not exceed with 95 %; infinite for fewer than 19."""
+    rank = int(np.ceil(CONFIDENCE * (len(values) + 1)))
+    return float(np.sort(values)[rank - 1]) if rank <= len(values) else np.inf

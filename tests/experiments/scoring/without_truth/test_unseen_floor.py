@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from chainslam.experiments.scoring.without_truth import unseen_floor as module
-from chainslam.experiments.scoring.without_truth.unseen_floor import (
-    Bound,
-    calibrated,
-    calibration,
-    frontier_of,
-    unseen_floor,
-)
+from chainslam.experiments.scoring.without_truth.unseen_floor import calibrated, calibration, frontier_of, unseen_floor
 
 CELL_M = 0.1
 
@@ -63,33 +56,31 @@ def test_a_robot_that_stands_on_no_free_floor_is_told():
 
 def test_the_stored_bound_grows_with_the_border_and_is_finite():
     bound = calibration()
-    assert len(bound.share) == len(bound.reach) + 1
-    assert np.all(np.diff(bound.reach) > 0.0)
-    assert np.all(np.diff(bound.share) >= 0.0)
-    assert np.all(np.isfinite(bound.share))
+    assert 0.0 < bound.closed < bound.open < np.inf
     assert bound.runs >= 80
-    assert unseen_floor(CLOSED, CELL_M, (12, 12), 0.2).at_most_m2 == pytest.approx(bound.share[0] * 3.0)
-    assert unseen_floor(OPEN, CELL_M, (12, 12), 0.2).at_most_m2 > unseen_floor(CLOSED, CELL_M, (12, 12), 0.2).at_most_m2
+    shares = bound.share(np.array([0.0, 1e-9, 0.25, 1.0]))
+    assert shares.tolist() == [bound.closed, bound.closed, 0.5 * bound.open, bound.open]
+    closed, opened = (unseen_floor(each, CELL_M, (12, 12), 0.2) for each in (CLOSED, OPEN))
+    assert closed.at_most_m2 == pytest.approx(bound.closed * 3.0)
+    assert opened.at_most_m2 == pytest.approx(bound.open * np.sqrt(opened.frontier_m / np.sqrt(3.0)) * 3.0)
 
 
 @pytest.mark.parametrize("skew", [0.3, 1.5])
-def test_a_bound_from_other_values_of_their_kind_holds_with_95_percent_or_more(skew, monkeypatch):
-    rng, edges = np.random.default_rng(5), np.array([0.3, 0.6])
+def test_a_bound_from_other_values_of_their_kind_holds_with_95_percent_or_more(skew):
+    rng, held = np.random.default_rng(5), []
 
     def drawn(count):
-        reach = rng.uniform(0.0, 1.0, count)
-        return reach, reach * rng.lognormal(-1.0, skew, count)
+        reach = np.maximum(rng.uniform(-0.5, 1.0, count), 0.0)
+        return reach, (reach + 0.01) * rng.lognormal(-1.0, skew, count)
 
-    held = []
     for _ in range(200):
-        bound = calibrated(*drawn(150), 150, edges)
+        bound = calibrated(*drawn(150), 150)
         reach, share = drawn(50)
-        held.append(np.mean(share <= np.array(bound.share)[np.searchsorted(bound.reach, reach)]))
-    assert 0.95 <= np.mean(held) <= 0.985
+        held.append(np.mean(share <= bound.share(reach)))
+    assert 0.945 <= np.mean(held) <= 0.975
 
 
-def test_a_class_of_too_few_values_has_no_bound():
-    bound = calibrated(np.full(18, 0.5), np.linspace(0.0, 1.0, 18), 18, np.array([0.3]))
-    assert isinstance(bound, Bound)
-    assert bound.share == [np.inf, np.inf]
-    assert module.CONFIDENCE == 0.95
+def test_too_few_values_have_no_bound():
+    bound = calibrated(np.repeat([0.0, 0.5], 18), np.linspace(0.0, 1.0, 36), 36)
+    assert (bound.closed, bound.open) == (np.inf, np.inf)
+    assert np.isfinite(calibrated(np.repeat([0.0, 0.5], 19), np.linspace(0.0, 1.0, 38), 38).open)
