@@ -1,8 +1,12 @@
 """Exploration as an environment of Gymnasium (docs/howto/policies.md): `import chainslam.gym` registers it."""
 
-import gymnasium
+from chainslam.experiments.usage import need
 
-from chainslam.experiments.library.environment import FREE, OCCUPIED, UNKNOWN, Exploration
+need("gymnasium")
+
+import gymnasium  # noqa: E402
+
+from chainslam.experiments.library.environment import FREE, OCCUPIED, UNKNOWN, Exploration  # noqa: E402
 
 __all__ = ["FREE", "OCCUPIED", "UNKNOWN", "Exploration"]
 

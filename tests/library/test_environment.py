@@ -1,6 +1,9 @@
 """The environment of Gymnasium, and that its reward cannot be raised by an untrue covariance."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -19,6 +22,7 @@ from chainslam.slam.estimation.backend import Belief, Joint
 from chainslam.slam.geometry.lines import normals
 from chainslam.slam.map.stochastic_map import StochasticMap
 
+ROOT = Path(__file__).parents[2]
 RANGE_M = RobotConfig().lidar.range_max_m
 SIGMAS = np.array([0.002, 0.006])
 
@@ -158,6 +162,12 @@ def test_several_at_once_by_gymnasiums_own_vectors():
     _, rewards, *_ = with_two.step(np.zeros((2, 2), dtype=np.float32))
     assert rewards.shape == (2,)
     with_two.close()
+
+
+def test_without_gymnasium_the_way_to_it_is_told():
+    words = "import sys; sys.modules['gymnasium'] = None; import chainslam.gym"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, cwd=ROOT)
+    assert "pip install 'chainslam[gym]'" in done.stderr
 
 
 def test_a_step_without_an_episode_and_bad_input_are_told():
