@@ -74,7 +74,7 @@ pythons: $(UV)
 
 # What an installation takes on disk, without extras and with each, MB.
 sizes: $(UV)
-	for extra in none campaign ros view all; do $(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/size && \
+	for extra in none campaign ros view all gym; do $(UV) venv --quiet --clear --python $(PYTHON) $(INSTALLED)/size && \
 	    $(UV) pip install --quiet --python $(INSTALLED)/size --compile-bytecode --link-mode copy -e ".[$$(echo $$extra | sed s/none//)]" && \
 	    echo $$extra: $$(du -sm $(INSTALLED)/size | cut -f1) || exit; done
 

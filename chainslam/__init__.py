@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from chainslam.experiments.library.running import explore, replay
     from chainslam.experiments.library.runs import Map, Run
     from chainslam.experiments.scoring.keys import Steps, Summary
+    from chainslam.experiments.scoring.without_truth.unseen_floor import UnseenFloor, unseen_floor
     from chainslam.experiments.usage import UsageError
     from chainslam.explore.step import Step
     from chainslam.explore.strategies import STRATEGIES, Choice, Situation, Strategy, StrategyEntry
@@ -37,6 +38,7 @@ _PLACES = {
     "chainslam.experiments.library.comparing": ("Comparison", "compare", "load"),
     "chainslam.experiments.library.runs": ("Map", "Run"),
     "chainslam.experiments.scoring.keys": ("Steps", "Summary"),
+    "chainslam.experiments.scoring.without_truth.unseen_floor": ("UnseenFloor", "unseen_floor"),
     "chainslam.experiments.usage": ("UsageError",),
     "chainslam.explore.step": ("Step",),
     "chainslam.explore.strategies": ("STRATEGIES", "Choice", "Situation", "Strategy", "StrategyEntry"),
@@ -65,8 +67,9 @@ __all__ = [
     "BACKENDS", "READERS", "STRATEGIES", "WORLDS", "Audit", "Backend", "BackendEntry", "Belief", "Choice", "Comparison",
     "DrawingOptions", "Failure", "Joint", "Map", "MotionCommand", "Observations", "Odometry", "Robot", "RobotError",
     "RobotSpec", "Run", "Scan", "ScannerSpec", "Situation", "StaleBeliefError", "Step", "SteppedRobot", "Steps",
-    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UsageError", "WheelSpec", "World",
-    "__version__", "audit", "check_backend", "compare", "explore", "load", "replay",
+    "Strategy", "StrategyEntry", "StreamingRobot", "Summary", "TimedScan", "Twist", "UnseenFloor", "UsageError",
+    "WheelSpec", "World", "__version__", "audit", "check_backend", "compare", "explore", "load", "replay",
+    "unseen_floor",
 ]  # fmt: skip
 
 

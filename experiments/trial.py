@@ -30,6 +30,7 @@ from .scoring.summary import Ending, run_keys, summarise
 from .scoring.truth import truth_of
 from .scoring.without_truth.certificate import certificate_record
 from .scoring.without_truth.smoothing import Smoothed, smooth
+from .scoring.without_truth.unseen_floor import unseen_now
 from .usage import UsageError
 
 
@@ -90,7 +91,7 @@ def run_scenario(scenario: Scenario, watch: Callable[[Step], None], mission: Mis
     way_world = log.estimated_world[:, :2]
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, way_world)
     summary = summarise(scenario, log, recorder.votes, last, recorder.joint, ending, recorder.sketches)
-    summary |= {"certificate": certificate_record(certificate)}
+    summary |= {"certificate": certificate_record(certificate, unseen_now(last))}
     smoothed = smooth(scenario.backend, last.map, log.unstated_motion, scenario.config.robot.scanner)
     return TrialResult(scenario, ending, log, recorder.votes, last, recorder.joint, certificate, summary, smoothed)
 

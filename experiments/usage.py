@@ -13,6 +13,7 @@ EXTRAS = {
     **dict.fromkeys(("distributed", "dask", "pyarrow"), "pip install 'chainslam[campaign]'"),
     "gtsam": "there is no wheel for some systems, so choose another --backend",
     "rerun": "pip install 'chainslam[view]'",
+    "gymnasium": "pip install 'chainslam[gym]'",
     "rosbags": "pip install 'chainslam[ros]'",
 }
 """What to do if an optional package is missing."""

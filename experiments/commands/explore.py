@@ -26,6 +26,7 @@ from ..library.asked import SETTLED, asked_trial, continued, refuse_settled
 from ..library.driving import Finished, Watch, begin, go_on
 from ..library.echo import echo_world, expected_steps, run_line
 from ..scenario import DRIVER, HAS_GTSAM, P0, OdometrySource, Scenario, TrialConfig, check, load_world
+from ..scoring.without_truth.unseen_floor import unseen_words
 from ..terminal.answers import found
 from ..terminal.console import say, written
 from ..terminal.interrupts import first_interrupt_waits
@@ -176,7 +177,7 @@ class Explore:
         recordings.append(recording)
         steps = sum(expected_steps(world, trial.max_steps)) / 2
         try:
-            with progress(world.name, steps) as show, first_interrupt_waits() as stop_if_asked:
+            with progress(world.name, steps, unseen_words) as show, first_interrupt_waits() as stop_if_asked:
 
                 def watch(step: Step) -> None:
                     show(step)

@@ -15,6 +15,7 @@ from ..scenario import STRATEGY_OF_REPLAYS, Scenario, TrialConfig, check, make_b
 from ..scoring.records import Log, Recorder
 from ..scoring.without_truth.certificate import certificate_record
 from ..scoring.without_truth.smoothing import smooth
+from ..scoring.without_truth.unseen_floor import unseen_now
 from ..scoring.without_truth.unwitnessed import (
     NoVotes,
     UnwitnessedRecord,
@@ -82,7 +83,7 @@ def run_unwitnessed(
     log, last, explorer = recorder.log(), recorder.last, scenario.config.mission.explorer
     certificate = certify(last, ending.outcome, explorer.following.paths, explorer.sweep, log.estimated_world[:, :2])
     summary: dict[str, Any] = summarise_unwitnessed(scenario, log, votes, last, ending)
-    summary |= {"certificate": certificate_record(certificate)}
+    summary |= {"certificate": certificate_record(certificate, unseen_now(last))}
     smoothed = smooth(scenario.backend, last.map, log.unstated_motion, scenario.config.robot.scanner)
     log_of_robot = recorded or _own_log(log)
     return TrialResult(scenario, ending, log, votes, last, recorder.joint, certificate, summary, smoothed, log_of_robot)

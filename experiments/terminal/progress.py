@@ -24,21 +24,25 @@ from .console import plain_console, say
 
 ALMOST = 0.95
 """A run that takes longer than expected stays at this share of its bar."""
+MORE_STEPS = 50
+"""What else is told may take longer than a step."""
 EVERY_S = 10.0
 """In a file there is a line so often."""
 
 
 @contextmanager
-def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step], None]]:
+def progress(
+    title: str, steps: float | None = None, more: Callable[[Step], str] = lambda step: ""
+) -> Iterator[Callable[[Step], None]]:
     """Show steps on standard error while the block runs; quiet where that is not a terminal.
 
-    `steps` is how many are expected; without it no time left is told.
+    `steps` is how many are expected; without it no time left is told. `more` says what else is told, every 50 steps.
     """
     with bar_of(title, steps, TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True))) as (bar, task):
-        curved, returns = 0, 0
+        curved, returns, also = 0, 0, ""
 
         def watch(step: Step) -> None:
-            nonlocal curved, returns
+            nonlocal curved, returns, also
             done = step.index + 1
             if done <= SCANS:
                 curved, returns = curved + curved_beams(step.scan, step.segments), returns + returns_of_scan(step.scan)
@@ -46,7 +50,9 @@ def progress(title: str, steps: float | None = None) -> Iterator[Callable[[Step]
                 bar.console.print(words)
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
             clock = timedelta(seconds=int(step.time_s))
-            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, robot clock {clock}"
+            if step.index % MORE_STEPS == 0:
+                also = more(step)
+            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends{also}, robot clock {clock}"
             bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from chainslam.experiments.campaign.comparison import benchmark
+
 from ..logs import matched_drives, study, surveys
 from ..paper import following, following_tables, page
 from ..robots import apartments, bumps, faults
@@ -44,6 +46,7 @@ PLANS, LOGS = _of("apartments", "schools-whole", "schools"), partial(study.store
 FOLLOWING, FAULTS = partial(last, following.ROWS, following.NAMES), partial(last, faults.ROWS, faults.NAMES)
 SOURCES: Mapping[str, Source] = {
     "benchmark-estimators": Source("make rivals", benchmarks.estimators, RIVALS),
+    "benchmark-leaderboard": Source("make leaderboard", benchmark.table, _of("leaderboard", each="estimator")),
     "benchmark-exploration": Source("make apartments schools-whole schools", benchmarks.exploration, PLANS),
     "benchmark-paper": Source("make paper", benchmarks.figures, DRIVES),
     "benchmark-logs": Source("make logs", benchmarks.logs, LOGS),

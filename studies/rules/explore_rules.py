@@ -15,8 +15,8 @@ DRIVING = (
            "share < 1.0 and «np.any(around.free_space.unknown_at(end[:2] + rim))»",
            "False", "steps onto floor not seen yet are short"),
     Switch("driving.excused", "explore.following.motion_kernels",
-           "asked_m = «min(motions.clear_m[a], max(now_m, 0.0)) if is_short else motions.clear_m[a]»",
-           "motions.clear_m[a]", "a short step may leave as little room as there is"),
+           "motions.clear_m[a] * «(min(max(now_m / motions.clear_m[a], EXCUSED), 1.0) if is_short else 1.0)»",
+           "1.0", "a short step may leave as little room as there is, and half of its clearance at least"),
     Switch("driving.second_scan", "explore.following.end_errand", "super()._arrived()\n        return «True»",
            "False", "an end is looked at by two scans from each place"),
 )  # fmt: skip

@@ -6,8 +6,10 @@ import shapely
 
 from chainslam.explore.certificate import Certificate, ClosedContour, LeftFrontier, LeftObstacle, LeftOpen
 
+from .unseen_floor import UnseenFloor
 
-def certificate_record(certificate: Certificate) -> dict[str, Any]:
+
+def certificate_record(certificate: Certificate, floor: UnseenFloor | None = None) -> dict[str, Any]:
     """Return a certificate as it stands in summary.json; areas in m^2, null where no free space was kept."""
     unseen = certificate.frontiers
     return {
@@ -41,6 +43,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         ],
         "floor_m2": certificate.floor_m2,
         "unseen_m2": certificate.unseen_m2,
+        "unseen_at_most_m2": None if floor is None else floor.at_most_m2,
         "reachable_way": certificate.reachable_way,
     }
 

@@ -1,0 +1,179 @@
+"""The environment of Gymnasium, and that its reward cannot be raised by an untrue covariance."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import chainslam.gym  # noqa: F401 (registers the environment)
+from chainslam.experiments.library.environment import CELL_M, FREE, OCCUPIED, Exploration
+from chainslam.experiments.scoring.maps.coverage import sample
+from chainslam.experiments.scoring.maps.information import WRONG_SHARE, Ruler, thinned
+from chainslam.experiments.scoring.truth import truth_of
+from chainslam.experiments.usage import UsageError
+from chainslam.sim.robot import RobotConfig
+from chainslam.sim.worlds import load
+from chainslam.slam.estimation.backend import Belief, Joint
+from chainslam.slam.geometry.lines import normals
+from chainslam.slam.map.stochastic_map import StochasticMap
+
+ROOT = Path(__file__).parents[2]
+RANGE_M = RobotConfig().lidar.range_max_m
+SIGMAS = np.array([0.002, 0.006])
+
+
+def truth():
+    world = load("paper-fig4")
+    return truth_of(world, RobotConfig())
+
+
+def map_of(truth, errors, cov, extents=None):
+    """Return a map with a wall for each true face, wrong by `errors` (alpha rad, d m), which states `cov` of each."""
+    faces, count = truth.faces, len(truth.faces)
+    anchors = faces.mean(axis=1)
+    half = 0.5 * np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+    alpha = truth.lines[:, 0] + errors[:, 0]
+    d = truth.lines[:, 1] - np.vecdot(normals(truth.lines[:, 0]), anchors) + errors[:, 1]
+    means = np.stack([alpha, d], axis=-1)
+    whole = np.eye(3 + 2 * count) * 1e-6
+    whole[3:, 3:] = np.kron(np.eye(count), cov)
+    mean = np.concatenate([np.zeros(3), means.ravel()])
+
+    def query(ids):
+        keep = np.concatenate([np.arange(3), (3 + 2 * ids[:, None] + np.arange(2)).ravel()])
+        return Joint(mean[keep], whole[np.ix_(keep, keep)], anchors[ids])
+
+    belief = Belief(np.zeros(3), np.eye(3) * 1e-6, np.arange(count), anchors, means, query)
+    no = np.zeros(count, dtype=bool)
+    extents = np.stack([-half, half], axis=-1) if extents is None else extents
+    return StochasticMap(belief, extents, np.full(count, 5), no, no)
+
+
+def ruler_of(truth):
+    return Ruler(thinned(sample(truth), 5), RANGE_M)
+
+
+def test_a_true_covariance_earns_most():
+    true, rng = truth(), np.random.default_rng(3)
+    ruler, earned = ruler_of(true), {}
+    for factor in (0.1, 0.4, 1.0, 2.5, 10.0):
+        draws = [rng.standard_normal((len(true.faces), 2)) * SIGMAS for _ in range(30)]
+        maps = [map_of(true, errors, factor * np.diag(SIGMAS**2)) for errors in draws]
+        earned[factor] = np.mean([ruler.measure(each).nat_m for each in maps])
+    assert max(earned, key=earned.get) == 1.0
+    assert earned[0.1] < earned[0.4] < earned[1.0] > earned[2.5] > earned[10.0]
+
+
+def test_an_exact_map_earns_the_density_at_its_mean_along_the_whole_contour():
+    true = truth()
+    ruler, cov = ruler_of(true), np.diag([0.0, 0.01**2])
+    found = ruler.measure(map_of(true, np.zeros((len(true.faces), 2)), cov))
+    nats = np.log(RANGE_M * (1.0 - WRONG_SHARE) / (np.sqrt(2.0 * np.pi) * 0.01) + WRONG_SHARE)
+    assert found.coverage == pytest.approx(1.0, abs=0.01)
+    assert found.nat_m == pytest.approx(nats * ruler.samples.length_m.sum(), rel=0.01)
+
+
+def test_a_sure_mistake_costs_no_more_than_what_is_never_sure():
+    true = truth()
+    wrong = np.tile([0.0, 0.2], (len(true.faces), 1))
+    found = ruler_of(true).measure(map_of(true, wrong, np.diag([1e-12, 1e-12])))
+    assert found.nat_m == pytest.approx(np.log(WRONG_SHARE) * sample(true).length_m.sum() * found.coverage, rel=0.02)
+
+
+def test_what_is_tentative_or_beyond_its_extent_earns_nothing():
+    true = truth()
+    walls = map_of(true, np.zeros((len(true.faces), 2)), np.diag(SIGMAS**2))
+    nothing = replace(walls, tentative=np.ones(len(walls), dtype=bool))
+    assert ruler_of(true).measure(nothing).nat_m == 0.0
+    half = map_of(true, np.zeros((len(true.faces), 2)), np.diag(SIGMAS**2), walls.extents * [[1.0, 0.0]])
+    assert 0.45 < ruler_of(true).measure(half).coverage < 0.6
+
+
+@pytest.fixture(scope="module")
+def env():
+    return Exploration("paper-fig4", max_steps=40)
+
+
+@pytest.mark.filterwarnings("ignore:.*Box observation space")
+def test_it_is_an_environment(env):
+    check_env(env, skip_render_check=True)
+
+
+def test_episodes_repeat_by_their_seed_and_their_rewards_add_up(env):
+    episodes = []
+    for _ in range(2):
+        observation, info = env.reset(seed=7)
+        rewards, rng, gained = [], np.random.default_rng(1), info["information_nat_m"]
+        over = False
+        while not over:
+            observation, reward, terminated, over, info = env.step(rng.uniform([0.0, -0.5], [0.4, 0.5]))
+            rewards.append(reward)
+            assert not terminated
+        assert len(rewards) == 40
+        touched = 10.0 * info["contacts"]
+        assert sum(rewards) == pytest.approx(info["information_nat_m"] - gained - 0.1 * 40 - touched)
+        episodes.append((rewards, observation))
+    assert episodes[0][0] == episodes[1][0]
+    for name, value in episodes[0][1].items():
+        np.testing.assert_array_equal(value, episodes[1][1][name])
+    assert env.reset(seed=8)[0]["ranges"].tolist() != env.reset(seed=7)[0]["ranges"].tolist()
+
+
+def test_the_floor_lies_ahead_to_the_right_of_the_picture_and_left_at_its_top(env):
+    observation, _ = env.reset(seed=1)
+    floor, ranges = observation["floor"], observation["ranges"]
+    middle = len(floor) // 2
+    bearings = np.linspace(-np.pi, np.pi, len(ranges), endpoint=False)
+    hits = 0
+    for bearing, reach in zip(bearings, ranges, strict=True):
+        row, column = middle - 0.5 - reach * np.sin(bearing) / CELL_M, middle - 0.5 + reach * np.cos(bearing) / CELL_M
+        if 2 < row < len(floor) - 3 and 2 < column < len(floor) - 3:
+            row, column = round(row), round(column)
+            assert np.any(floor[row - 1 : row + 2, column - 1 : column + 2] == OCCUPIED)
+            hits += 1
+    assert hits > 50
+    assert np.all(floor[middle - 1 : middle + 1, middle - 1 : middle + 1] == FREE)
+
+
+def test_a_robot_that_pushes_against_a_wall_pays():
+    env = Exploration("paper-fig4", max_steps=100, touch_cost=1000.0)
+    env.reset(seed=1)
+    rewards = [env.step(np.array([1.0, 0.0]))[1] for _ in range(60)]
+    assert min(rewards) < -900.0
+
+
+def test_random_buildings_differ_from_episode_to_episode():
+    env = Exploration(max_steps=2)
+    env.reset(seed=1)
+    first = env._ruler.samples.length_m.sum()
+    env.reset()
+    assert env._ruler.samples.length_m.sum() != first
+
+
+def test_several_at_once_by_gymnasiums_own_vectors():
+    with_two = gymnasium.make_vec("chainslam/Exploration-v0", num_envs=2, vectorization_mode="sync", world="paper-fig4")
+    observations, _ = with_two.reset(seed=3)
+    assert observations["ranges"].shape[0] == 2
+    _, rewards, *_ = with_two.step(np.zeros((2, 2), dtype=np.float32))
+    assert rewards.shape == (2,)
+    with_two.close()
+
+
+def test_without_gymnasium_the_way_to_it_is_told():
+    words = "import sys; sys.modules['gymnasium'] = None; import chainslam.gym"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, cwd=ROOT)
+    assert "pip install 'chainslam[gym]'" in done.stderr
+
+
+def test_a_step_without_an_episode_and_bad_input_are_told():
+    with pytest.raises(UsageError, match="no-such-world"):
+        Exploration("no-such-world")
+    with pytest.raises(UsageError, match="expected"):
+        Exploration("paper-fig4", backend="no-such-back-end")
+    with pytest.raises(RuntimeError, match="reset"):
+        Exploration("paper-fig4").step(np.zeros(2))
