@@ -30,9 +30,11 @@ class Audit:
     """Reference trajectories, in place of the truth; exact without --reference-sigma."""
     relations: Path | None = None
     """Measured relations between poses, t1 t2 x y z roll pitch yaw, in place of the truth."""
+    space: Literal["plane", "space"] = "plane"
+    """Audit x, y and heading, or all six axes of poses with position, quaternion and a 6 x 6 covariance."""
     error: Literal["additive", "body", "world"] | None = None
-    """Frame of the stated covariances: additive error of x, y, heading (used if not given), or log(est^-1 true) in the
-    body frame, or log(true est^-1) in the world frame."""
+    """Frame of the stated covariances: additive error of x, y, heading (used if not given; in space of x y z and the
+    turns about these fixed axes), or log(est^-1 true) in the body frame, or log(true est^-1) in the world frame."""
     align: Literal["none", "start", "all"] = "none"
     """Bring the first pose to the true one before comparing, or the whole path nearest to the true path."""
     reference_sigma: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="M RAD")] = None
@@ -49,9 +51,9 @@ class Audit:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for bad input."""
         audited = audit(
-            self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations, error=self.error,
-            align=self.align, reference_sigma=self.reference_sigma, nearest=self.nearest, topic=self.topic,
-            truth_topic=self.truth_topic,
+            self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations, space=self.space,
+            error=self.error, align=self.align, reference_sigma=self.reference_sigma, nearest=self.nearest,
+            topic=self.topic, truth_topic=self.truth_topic,
         )  # fmt: skip
         found(**audited.record())
         for line in audited.verdict:

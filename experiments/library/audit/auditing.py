@@ -17,9 +17,9 @@ from ...artifacts.run_folder import prepare
 from ...scoring.without_truth.references import read_relations
 from ...usage import UsageError
 from .audited import Align, Audited, Options, audited, audited_relations
-from .bags import read_poses
-from .graphs import is_graph, read_graph
-from .stated import Frame, Stated, read_folder, read_text
+from .reading.bags import read_poses
+from .reading.graphs import is_graph, read_graph
+from .reading.stated import Frame, Space, Stated, in_space, read_folder, read_text
 from .verdicts import Pair, Pooled, compare, pool
 from .words import lines, pooled_line
 
@@ -92,6 +92,7 @@ def audit(
     truth: Paths = (),
     reference: Paths = (),
     relations: str | Path | None = None,
+    space: Space = "plane",
     error: Frame | None = None,
     align: Align = "none",
     reference_sigma: tuple[float, float] | None = None,
@@ -103,13 +104,15 @@ def audit(
 
     `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
     (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
-    estimators. `relations` is a file of measured relations between poses. `error` is the frame that the covariances are
+    estimators. `relations` is a file of measured relations between poses. `space` "space" audits all six axes of poses
+    with position and quaternion, in place of x, y and heading. `error` is the frame that the covariances are
     stated in: "additive" (the default), "body" or "world". `nearest` takes the nearest true pose within so many
     seconds, which is otherwise interpolated. Raises UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
     given: dict[str, Any] = {
         "truth": true, "reference": references, "relations": [] if relations is None else [relations],
+        "space": [] if space == "plane" else [space],
         "error": [] if error is None else [error], "align": [] if align == "none" else [align],
         "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],
         "topic": [] if topic is None else [topic], "truth-topic": [] if truth_topic is None else [truth_topic],
@@ -118,7 +121,7 @@ def audit(
     asked = ["chainslam", "audit", *map(str, paths)]
     asked += [word for name, values in given.items() if values for word in (f"--{name}", *map(str, values))]
     options = Options(error, align, reference_sigma, nearest)
-    stated = _named([read(path, topic) for path in paths])
+    stated = _named([read(path, topic, space=space) for path in paths])
     if relations is not None:
         measured = read_relations(Path(relations))
         found = tuple(audited_relations(each, measured, options) for each in stated)
@@ -128,7 +131,7 @@ def audit(
         raise UsageError(
             f"expected one truth for all or one for each of {len(paths)} trajectories, found {len(known)}: correct it"
         )
-    truths = [read(path, truth_topic, needs_covariance=False) for path in known]
+    truths = [read(path, truth_topic, False, space) for path in known]
     every = truths if len(truths) == len(stated) else truths * len(stated)
     found = tuple(audited(each, against, options) for each, against in zip(stated, every, strict=True))
     estimators = {each.estimator for each in stated} - {None}
@@ -137,13 +140,15 @@ def audit(
     return Audit(found, None, _pairs(found, every), tuple(asked))
 
 
-def read(path: Path, topic: str | None = None, needs_covariance: bool = True) -> Stated:
+def read(path: Path, topic: str | None = None, needs_covariance: bool = True, space: Space = "plane") -> Stated:
     """Read a trajectory of whatever format; raises UsageError."""
     if is_graph(path):
-        return read_graph(path)
-    if is_bag(path):
-        return read_poses(path, topic, needs_covariance)
-    return read_folder(path) if path.is_dir() else read_text(path)
+        found = read_graph(path)
+    elif is_bag(path):
+        found = read_poses(path, topic, needs_covariance)
+    else:
+        found = read_folder(path) if path.is_dir() else read_text(path)
+    return in_space(found, needs_covariance) if space == "space" else found
 
 
 def _paths(given: Paths) -> list[Path]:
@@ -156,6 +161,8 @@ def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
     against = [f"--{name}" for name in ("truth", "reference", "relations") if given[name]]
     if len(against) > 1:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
+    if given["space"] and given["relations"]:
+        raise UsageError("expected --relations without --space, found both: relations are audited in the plane")
     sigma = given["reference-sigma"]
     if sigma and (not given["reference"] or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):
         found = f"{sigma[0]:g} {sigma[1]:g}" if given["reference"] else "no reference"

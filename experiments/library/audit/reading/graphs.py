@@ -17,9 +17,9 @@ from chainslam.sim.logs.archive import regular
 from chainslam.slam.evaluation.consistency import chi2_band
 from chainslam.slam.geometry.poses import J, turned, wrap
 
-from ...scoring.without_truth.relations import between
-from ...usage import UsageError
-from ...views.numbers import number
+from ....scoring.without_truth.relations import between
+from ....usage import UsageError
+from ....views.numbers import number
 from .stated import MOST_BYTES, Stated, symmetric
 
 VERTEX, EDGE, FIX = "VERTEX_SE2", "EDGE_SE2", "FIX"
