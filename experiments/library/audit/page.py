@@ -125,7 +125,7 @@ def _curves(found: Sequence[Audited]) -> tuple[PagePicture, ...]:
         rows = _thinned(len(each.time_s))
         band = np.tile(np.array(chi2_band(each.errors.shape[1]))[:, None], len(rows))
         nees = np.maximum(each.nees[rows], 1e-6)
-        curves.append(NeesCurve(each.name, each.time_s[rows] - found[0].time_s[0], nees, band, None, _colour(rank)))
+        curves.append(NeesCurve(each.name, each.time_s[rows] - found[0].time_s[0], nees, band, None, colour(rank)))
     words = "NEES of the pose, with the band in which it lies in 95 % of the poses of a consistent estimate"
     return (PagePicture(saved(draw_nees(curves, "time (s)"), "svg"), words),)
 
@@ -136,7 +136,7 @@ def _section(each: Audited, rank: int) -> Section:
     scale = np.repeat([1.0, degrees(1.0)], [len(sigmas[0, part]) for part in parts(sigmas.shape[1])])
     names = AXES[each.frame] if each.turn == "heading" else AXES_IN_SPACE[each.frame]
     figure = draw_stated_errors(
-        each.time_s[rows] - each.time_s[0], scale * each.errors[rows], scale * sigmas, names, _colour(rank)
+        each.time_s[rows] - each.time_s[0], scale * each.errors[rows], scale * sigmas, names, colour(rank)
     )
     words = "Errors, and the intervals in which 95 % of them lie if the covariances are right"
     pictures = (PagePicture(saved(figure, "svg"), words),)
@@ -163,7 +163,8 @@ def _lags(each: Audited) -> PageTable:
     }, each.lags, note if any(lag.is_bound for lag in each.lags) else "")  # fmt: skip
 
 
-def _colour(rank: int) -> str:
+def colour(rank: int) -> str:
+    """Return the colour of the curve of a rank."""
     return palette.of_rank(TURNS[rank % len(TURNS)])
 
 

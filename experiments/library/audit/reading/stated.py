@@ -25,6 +25,8 @@ PLANE_TO_SPACE = (0, 1, 5)
 """Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
 UNIT = 0.02
 """Largest difference of a quaternion's length from 1."""
+TRUTH = "trajectory_true.tum"
+"""The true poses in the folder of a run."""
 TILTED = "the robot tilts, and only x, y and yaw are audited"
 TILTED_RAD = 0.2
 """A robot that is tilted by more does not move in the plane."""
@@ -108,7 +110,7 @@ def read_folder(folder: Path) -> Stated:
     """Read the poses, covariances and truth of a run of ours; raises UsageError."""
     if not (folder / "steps.csv").is_file():
         raise UsageError(f"expected a trajectory, found {folder} without steps.csv: name a file, or a run's folder")
-    summary, truth = read_summary(folder), folder / "trajectory_true.tum"
+    summary, truth = read_summary(folder), folder / TRUTH
     return replace(
         read_text(folder / "steps.csv"),
         name=folder.resolve().name,
@@ -120,7 +122,7 @@ def read_folder(folder: Path) -> Stated:
 
 def read_text(path: Path) -> Stated:
     """Read a trajectory in the TUM format, as `t x y theta`, or as CSV with a header; raises UsageError."""
-    header, rows = _table(path)
+    header, rows = table(path)
     if header is None:
         time_s, poses, covs, notes, spatial = _by_place(path, rows)
     else:
@@ -233,7 +235,7 @@ def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarra
     return np.asarray(wrap(heading))
 
 
-def _table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
+def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
     """Return the header of a text file, if it has one, and its numbers; raises UsageError."""
     expected = f"expected a trajectory ({FORMATS}; or CSV with named columns)"
     try:
