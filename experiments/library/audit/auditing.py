@@ -45,7 +45,7 @@ class Audit:
     asked: tuple[str, ...]
     """The words of the command that makes it."""
     without_truth: tuple[Inner, ...] = ()
-    """What runs, graphs or relations tell of themselves."""
+    """What runs, graphs or relations show without a truth."""
 
     @property
     def verdict(self) -> list[str]:
@@ -120,13 +120,13 @@ def audit(
 
     `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
     (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
-    estimators. `relations` is a file of measured relations between poses; without a trajectory
-    its triangles are audited. A run's folder without a truth tells of its innovations, a graph of its loop closures;
-    `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of two
-    halves of the data. `space` "space" audits all six axes of poses
-    with position and quaternion, in place of x, y and heading. `error` is the frame that the covariances are
-    stated in: "additive" (the default), "body" or "world". `nearest` takes the nearest true pose within so many
-    seconds, which is otherwise interpolated. Raises UsageError for bad input.
+    estimators. `relations` is a file of measured relations between poses; without a trajectory its triangles are
+    audited. Without a truth, the innovations of a run's folder and the loop closures of a graph are audited;
+    `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of
+    two halves of the data. `space` "space" audits all six axes of poses with position and quaternion, in place of x,
+    y and heading. `error` is the frame that the covariances are stated in: "additive" (the default), "body" or
+    "world". `nearest` takes the nearest true pose within so many seconds, which is otherwise interpolated. Raises
+    UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
     given: dict[str, Any] = {

@@ -1,6 +1,7 @@
 """Innovations of a run of ours: each scan against its prediction by the map and the odometry before it."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -8,7 +9,7 @@ from jaxtyping import Float, Int
 from chainslam.slam.estimation.gates import gate_level
 
 from ....artifacts.files import CONFIG
-from ....artifacts.saved import read_trial
+from ....artifacts.reading import read_plain, told
 from ....usage import UsageError
 from ..draws import autocorrelation
 from ..reading.stated import table
@@ -43,10 +44,21 @@ def innovations(folder: Path) -> Inner:
     squared, whole = squared[used], dof[used].astype(np.int64)
     left = len(rows) - len(used)
     notes = (f"{left} of {len(rows)} scans localised the robot by no match",) if left else ()
-    gate = read_trial(folder / CONFIG).mission.mapper.matching.gate
     return Inner(
-        folder.resolve().name, TOLD, time_s[used], squared, whole, (), effective_dof(squared, whole), notes, gated(gate)
+        folder.resolve().name, TOLD, time_s[used], squared, whole, (), effective_dof(squared, whole), notes,
+        gated(_gate(folder / CONFIG)),
     )  # fmt: skip
+
+
+def _gate(path: Path) -> float:
+    """Return the probability of the gate that a run had, whatever version wrote its settings; raises UsageError."""
+    with told(path, "keep a run's files together, or repeat the run"):
+        found: Any = read_plain(path)
+    for key in ("trial", "mission", "mapper", "matching", "gate"):
+        found = found.get(key) if isinstance(found, dict) else None
+    if not isinstance(found, float) or not 0.0 < found < 1.0:
+        raise UsageError(f"expected the gate of the matching in {path}, found {str(found)[:40]}: repeat the run")
+    return found
 
 
 def gated(gate: float) -> float:

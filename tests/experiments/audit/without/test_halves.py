@@ -9,7 +9,7 @@ from chainslam.experiments.library.audit.auditing import audit
 from chainslam.experiments.library.audit.verdicts import TOO_FEW
 from chainslam.experiments.usage import UsageError
 
-from ..written import tum
+from ..written import in_space, tum
 
 COV = np.array([[0.04, 0.01, 0.0], [0.01, 0.02, 0.001], [0.0, 0.001, 0.003]])
 T = 0.1 * np.arange(400)
@@ -58,6 +58,19 @@ def test_covariances_that_are_none_are_left_out(tmp_path):
     table[10:13, 8:] = 0.0
     np.savetxt(paths[1], table)
     assert audit(paths, halves=True).trajectories[0].pose.count == 397
+
+
+def test_halves_in_space_have_the_same_errors(tmp_path):
+    paths = []
+    for seed, name in enumerate(("a", "b")):
+        table = np.loadtxt(half(tmp_path / name, seed))
+        wide = in_space(np.tile(COV, (len(T), 1, 1)))
+        wide[:, [2, 3, 4], [2, 3, 4]] = 0.1
+        upper = np.triu_indices(6)
+        np.savetxt(tmp_path / name, np.column_stack([table[:, :8], wide[:, upper[0], upper[1]]]), fmt="%.17g")
+        paths.append(tmp_path / name)
+    flat, found = (audit(paths, halves=True, space=each).trajectories[0] for each in ("plane", "space"))
+    assert 6.0 * found.pose.anees == pytest.approx(3.0 * flat.pose.anees, rel=1e-6)
 
 
 def test_other_than_two_are_refused(tmp_path):

@@ -60,7 +60,15 @@ def test_what_has_no_innovations_is_refused_in_one_line(run, tmp_path):
     bare = tmp_path / "bare"
     bare.mkdir()
     (bare / "steps.csv").write_text("time_s,x_m,y_m,heading_rad\n0,0,0,0\n")
+    cut = tmp_path / "cut"
+    shutil.copytree(run, cut)
+    (cut / "config.json").write_text('{"trial": {"mission": 1}}')
+    lost = tmp_path / "lost"
+    shutil.copytree(run, lost)
+    (lost / "config.json").unlink()
     for path, told in (
+        (cut, "expected the gate of the matching in .* found None"),
+        (lost, "expected config.json as this version writes it"),
         (tmp_path / "a.tum", "expected the folder of a run or a g2o graph for --without-truth"),
         (bare, "found no nis"),
     ):
