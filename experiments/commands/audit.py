@@ -29,14 +29,22 @@ class Audit:
     reference: tuple[Path, ...] = ()
     """Reference trajectories, in place of the truth; exact without --reference-sigma."""
     relations: Path | None = None
-    """Measured relations between poses, t1 t2 x y z roll pitch yaw, in place of the truth."""
+    """Measured relations between poses, t1 t2 x y z roll pitch yaw, in place of the truth; without a trajectory,
+    whether their triangles close."""
+    without_truth: bool = False
+    """Judge the innovations of a run's folder or the loop closures of a g2o graph, although there is a truth; without
+    one this is done unasked. It cannot judge the pose itself."""
+    halves: bool = False
+    """Compare two trajectories of one drive that were estimated from two halves of its data, without any truth."""
+    space: Literal["plane", "space"] = "plane"
+    """Audit x, y and heading, or all six axes of poses with position, quaternion and a 6 x 6 covariance."""
     error: Literal["additive", "body", "world"] | None = None
-    """Frame of the stated covariances: additive error of x, y, heading (used if not given), or log(est^-1 true) in the
-    body frame, or log(true est^-1) in the world frame."""
+    """Frame of the stated covariances: additive error of x, y, heading (used if not given; in space of x y z and the
+    turns about these fixed axes), or log(est^-1 true) in the body frame, or log(true est^-1) in the world frame."""
     align: Literal["none", "start", "all"] = "none"
     """Bring the first pose to the true one before comparing, or the whole path nearest to the true path."""
     reference_sigma: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="M RAD")] = None
-    """Standard deviations of a reference's position and heading."""
+    """Standard deviations of a reference's position and heading, or of relations without a trajectory."""
     nearest: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Take the nearest true pose within so many seconds, instead of interpolating between poses at most 1 s apart."""
     topic: str | None = None
@@ -49,9 +57,9 @@ class Audit:
     def run(self) -> int:
         """Run the command and return its exit status; raises UsageError for bad input."""
         audited = audit(
-            self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations, error=self.error,
-            align=self.align, reference_sigma=self.reference_sigma, nearest=self.nearest, topic=self.topic,
-            truth_topic=self.truth_topic,
+            self.trajectories, truth=self.truth, reference=self.reference, relations=self.relations,
+            without_truth=self.without_truth, halves=self.halves, space=self.space, error=self.error, align=self.align,
+            reference_sigma=self.reference_sigma, nearest=self.nearest, topic=self.topic, truth_topic=self.truth_topic,
         )  # fmt: skip
         found(**audited.record())
         for line in audited.verdict:

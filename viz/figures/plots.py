@@ -60,10 +60,11 @@ class NeesCurve:
 
 
 @own_look()
-def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)") -> Figure:
+def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)", what: str = "NEES of the pose") -> Figure:
     """Return the NEES of estimators on a logarithmic axis, with the band of a consistent one.
 
-    `along` names what it is drawn against. It is as wide as a phone's screen, so that its letters can be read there.
+    `along` names what it is drawn against, `what` what is drawn. It is as wide as a phone's screen, so that its letters
+    can be read there.
     """
     figure, axes = _figure("", NARROW)
     longest = max(curves, key=lambda curve: curve.path_m[-1])
@@ -77,7 +78,7 @@ def draw_nees(curves: Sequence[NeesCurve], along: str = "path length (m)") -> Fi
     axes.fill_between([], [], [], color=palette.SOLID, linewidth=0, label="95 % band")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    _label(axes, along, "NEES of the pose")
+    _label(axes, along, what)
     return figure
 
 

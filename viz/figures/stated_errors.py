@@ -12,7 +12,8 @@ from . import own_look
 
 IN_95 = 1.959963984540054
 """Half the width of a normal distribution's 95 % interval, in standard deviations."""
-SIZE = (6.4, 4.6)
+SIZE, OF = (6.4, 4.6), 3
+"""Of so many errors; with more it is higher."""
 
 
 @own_look()
@@ -27,7 +28,8 @@ def draw_stated_errors(
 
     `names` say what each error is, and its unit. Nothing is drawn across gaps much longer than the others.
     """
-    figure = Figure(figsize=SIZE, dpi=150, facecolor=palette.PAGE, layout="constrained")
+    height = SIZE[1] * max(len(names) / OF, 1.0)
+    figure = Figure(figsize=(SIZE[0], height), dpi=150, facecolor=palette.PAGE, layout="constrained")
     FigureCanvasAgg(figure)
     steps = np.diff(time_s)
     breaks = np.flatnonzero(steps > 20.0 * np.median(steps)) + 1 if len(steps) else np.zeros(0, dtype=np.int64)

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ...scoring.without_truth.relations import SAME_TIME_S, interpolated, nearest_rows
+from ...scoring.without_truth.relations import SAME_TIME_S, nearest_rows
 from ...usage import UsageError
-from .stated import Stated
+from .geometry.kinds import geometry_of
+from .reading.stated import Stated
 
 GAP_S = 1.0
 """Longer gaps of the truth are not interpolated."""
@@ -20,7 +21,7 @@ CLOCKS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}
 class Paired:
     """The true poses at the times of a trajectory, NaN where they are unknown."""
 
-    poses_world: Float[np.ndarray, "n 3"]
+    poses_world: Float[np.ndarray, "n p"]
     known: Bool[np.ndarray, " n"]
     note: str
 
@@ -44,7 +45,7 @@ def paired(stated: Stated, truth: Stated, nearest_s: float | None = None) -> Pai
         after = np.clip(np.searchsorted(known_s, asked), 0, len(known_s) - 1)
         before = np.maximum(after - 1, 0)
         known = (known_s[before] <= asked) & (asked <= known_s[after]) & (known_s[after] - known_s[before] <= GAP_S)
-        poses, words = interpolated(known_s, truth.poses_world, asked), "interpolated"
+        poses, words = geometry_of(truth.poses_world).interpolated(known_s, truth.poses_world, asked), "interpolated"
         if np.count_nonzero(near) > 2 * np.count_nonzero(known):
             return paired(stated, truth, SAME_TIME_S)
     if not np.any(known):

@@ -8,14 +8,14 @@ from jaxtyping import Float, Int
 
 from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
-from ...scoring.trajectories import alignment_of_paths, moved, rms
-from ...scoring.without_truth.relation_noise import relation_covs, sigmas_of_relations
+from ...scoring.trajectories import rms
+from ...scoring.without_truth.relation_noise import sigmas_of_relations
 from ...scoring.without_truth.relations import Relations, between, nearest_rows, same_scan_s
 from ...usage import UsageError
 from .against import paired
 from .draws import LEVELS, Score, score
-from .errors import errors, motion_at_start, moved_covs, since_start, to_frame
-from .stated import Frame, Stated
+from .geometry.kinds import geometry_of, parts, since_start
+from .reading.stated import Frame, Stated
 from .suspicions import check, definite, hints, order_hint
 from .verdicts import Verdict, judge
 
@@ -24,10 +24,10 @@ LAGS = (1, 10, 100)
 LEAST = 10
 """Poses that an audit needs."""
 DEFAULT: Frame = "additive"
-KNOWN_START = np.diag([1e-8, 1e-8, 1e-10])
-"""Of the pose relative to the start: the covariance of a start that is known, as `--p0 zero` has it."""
+KNOWN_START = (1e-8, 1e-10)
+"""Of position and rotation relative to the start: the variances of a start that is known, as `--p0 zero` has it."""
+ADDITIVE = {3: "additive error of x, y and heading", 6: "additive error of x y z and the turns about these axes"}
 IN_WORDS = {
-    "additive": "additive error of x, y and heading",
     "body": "error in the body frame, log(est^-1 true)",
     "world": "error in the world frame, log(true est^-1)",
 }
@@ -64,11 +64,13 @@ class Audited:
     name: str
     frame: Frame
     time_s: Float[np.ndarray, " n"]
-    errors: Float[np.ndarray, "n 3"]
-    covs: Float[np.ndarray, "n 3 3"]
+    errors: Float[np.ndarray, "n d"]
+    """Along d axes: 3 in the plane, 6 in space."""
+    covs: Float[np.ndarray, "n d d"]
     pose: Score
     position: Score
     heading: Score
+    """In space: of the whole rotation."""
     from_start: float | None
     """ANEES relative to the start."""
     lags: tuple[Lag, ...]
@@ -84,27 +86,44 @@ class Audited:
         return nees(self.errors, self.covs)
 
     @property
+    def error_in_words(self) -> str:
+        """The definition of the error."""
+        return IN_WORDS.get(self.frame) or ADDITIVE[self.errors.shape[1]]
+
+    @property
+    def turn(self) -> str:
+        """What the rotation is called: the heading in the plane."""
+        return "heading" if self.errors.shape[1] == 3 else "rotation"
+
+    @property
     def verdict(self) -> Verdict:
         """The verdict on the whole pose."""
         return judge(self.pose.anees, self.pose.low, self.pose.high, self.pose.dof, self.is_bound)
 
     def record(self) -> dict[str, Any]:
         """Return all figures, by name."""
-        verdict = self.verdict
+        verdict, turn = self.verdict, self.turn
+        position, rotation = parts(self.errors.shape[1])
         sigmas = np.sqrt(np.mean(np.einsum("nii->ni", self.covs), axis=0))
         return {
             "file": self.name, "verdict": verdict.words, "factor": verdict.factor,
             "factor_interval": verdict.factor_interval, "error": self.frame, "is_lower_bound": self.is_bound,
-            **_figures(self.pose), "position": _figures(self.position), "heading": _figures(self.heading),
+            **_figures(self.pose), "position": _figures(self.position), turn: _figures(self.heading),
             "anees_from_start": self.from_start,
-            "rms_position_m": rms(np.hypot(*self.errors[:, :2].T)), "rms_heading_rad": rms(self.errors[:, 2]),
-            "stated_position_m": float(np.hypot(*sigmas[:2])), "stated_heading_rad": float(sigmas[2]),
+            "rms_position_m": _size(self.errors[:, position]), f"rms_{turn}_rad": _size(self.errors[:, rotation]),
+            "stated_position_m": float(np.linalg.norm(sigmas[position])),
+            f"stated_{turn}_rad": float(np.linalg.norm(sigmas[rotation])),
             "lags": [
-                {"steps": lag.steps, "rms_position_m": lag.error_m, "rms_heading_rad": lag.error_rad,
+                {"steps": lag.steps, "rms_position_m": lag.error_m, f"rms_{turn}_rad": lag.error_rad,
                  "is_lower_bound": lag.is_bound, **_figures(lag.score)} for lag in self.lags
             ],
             "notes": list(self.notes), "hints": list(self.hints),
         }  # fmt: skip
+
+
+def _size(errors: Float[np.ndarray, "n d"]) -> float:
+    """Return the rms length of errors."""
+    return rms(np.linalg.norm(errors, axis=1))
 
 
 def _figures(of: Score) -> dict[str, Any]:
@@ -120,7 +139,7 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
     frame = stated.frame or options.error or DEFAULT
     checked, at = check(stated), paired(stated, truth, options.nearest_s)
     rows = np.flatnonzero(checked.usable & at.known)
-    covs = stated.planar
+    covs, by = stated.used_covs, geometry_of(stated.poses_world)
     assert covs is not None
     if len(rows) < LEAST:
         raise UsageError(
@@ -138,18 +157,18 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
             )
         both = (stated.poses_world[at.known], at.poses_world[at.known])
         start = int(np.count_nonzero(at.known[:start]))
-        motion = alignment_of_paths(*both) if align == "all" else motion_at_start(*(path[start:] for path in both))
-        poses, covs = moved(poses, motion), moved_covs(covs, motion, frame)
+        motion = (
+            by.alignment_of_paths(*both) if align == "all" else by.motion_at_start(*(path[start:] for path in both))
+        )
+        poses, covs = by.moved(poses, motion), by.moved_covs(covs, motion, frame)
     if options.reference_sigma is not None:
-        covs = covs + _of_reference(poses, options.reference_sigma, frame)
-    left = errors(poses, true, frame)
-    plain = stated.planar if frame == DEFAULT and align == "none" else None
-    order = (
-        "" if plain is None else order_hint(stated, _spread(errors(stated.poses_world, at.poses_world, frame), rows))
-    )
+        covs = covs + _of_reference(poses, options.reference_sigma, frame, covs.shape[1])
+    left = by.errors(poses, true, frame)
+    plain = stated.used_covs if frame == DEFAULT and align == "none" else None
+    order = "" if plain is None else order_hint(stated, _spread(left, rows, len(stated.time_s)))
     return Audited(
         stated.name, frame, stated.time_s[rows], left, covs, *_scores(left, covs),
-        stated.anees_from_start or _from_start(poses, true, covs, frame), _lags(stated, rows, poses, true, covs, frame),
+        stated.anees_from_start or _from_start(poses, true, covs, frame), _lags(stated, rows, poses, true, frame),
         tuple(filter(None, (*stated.notes, at.note, *checked.notes, _aligned(align)))),
         (order,) if order else tuple(hints(left, covs)),
     )  # fmt: skip
@@ -160,8 +179,7 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
 
     Without the joint covariance of two poses the largest possible one is taken, 2 (P_a + P_b), of whatever correlation.
     """
-    frame, checked, covs = stated.frame or options.error or DEFAULT, check(stated), stated.planar
-    assert covs is not None
+    frame, checked = stated.frame or options.error or DEFAULT, check(stated)
     within_s = same_scan_s(stated.time_s)
     (first, near), (second, also) = (
         nearest_rows(stated.time_s, asked, within_s) for asked in (relations.first_s, relations.second_s)
@@ -181,7 +199,8 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
     total = stated_covs if own is None else stated_covs + own.cov
     left = between(taken.motions, between(poses[first[chosen]], poses[second[chosen]]))
     notes = ["the relations count as exact, since no three of them close a triangle"] if own is None else [
-        f"sigma of a relation, from triangles of them: {own.translation_m:.3g} m and {own.rotation_rad:.3g} rad"
+        f"sigma of a relation, from triangles of them: {own.translation_m:.3g} m and {own.rotation_rad:.3g} rad,"
+        f" within which {own.mistaken} of {own.mistaken + own.told_by} do not close (99 % region)"
     ]  # fmt: skip
     if is_bound:
         notes.append("the correlation of two poses is not stated, so relations between them have the largest possible"
@@ -192,29 +211,30 @@ def audited_relations(stated: Stated, relations: Relations, options: Options) ->
     )  # fmt: skip
 
 
-def _scores(left: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> tuple[Score, Score, Score]:
+def _scores(left: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> tuple[Score, Score, Score]:
     if not np.all(rest := definite(covs)):
         raise UsageError(
             f"expected covariances that are positive definite beside those of the errors' frame, found"
             f" {np.count_nonzero(~rest)} that are not: give more digits, or move the origin nearer"
         )
-    parts = (slice(0, 3), slice(0, 2), slice(2, 3))
-    pose, position, heading = (score(whitened(left[:, at], covs[:, at, at])) for at in parts)
+    pose, position, heading = (
+        score(whitened(left[:, at], covs[:, at, at])) for at in (slice(None), *parts(left.shape[1]))
+    )
     return pose, position, heading
 
 
 def _of_reference(
-    poses: Float[np.ndarray, "n 3"], sigmas: tuple[float, float], frame: Frame
-) -> Float[np.ndarray, "n 3 3"]:
+    poses: Float[np.ndarray, "n p"], sigmas: tuple[float, float], frame: Frame, axes: int
+) -> Float[np.ndarray, "n d d"]:
     """Return the covariance of a reference's error in the frame of the errors."""
-    own = np.diag(np.square([sigmas[0], sigmas[0], sigmas[1]]))
-    return to_frame(poses, np.broadcast_to(own, (len(poses), 3, 3)), "additive", frame)
+    own = np.diag(np.square(np.repeat(sigmas, [len(range(axes)[part]) for part in parts(axes)])))
+    return geometry_of(poses).to_frame(poses, np.tile(own, (len(poses), 1, 1)), "additive", frame)
 
 
-def _spread(values: Float[np.ndarray, "n 3"], rows: Int[np.ndarray, " k"]) -> Float[np.ndarray, "n 3"]:
-    """Return values at some rows, NaN at the others."""
-    found = np.full_like(values, np.nan)
-    found[rows] = values[rows]
+def _spread(values: Float[np.ndarray, "k d"], rows: Int[np.ndarray, " k"], count: int) -> Float[np.ndarray, "n d"]:
+    """Return values in some of so many rows, NaN in the others."""
+    found = np.full((count, values.shape[1]), np.nan)
+    found[rows] = values
     return found
 
 
@@ -226,11 +246,14 @@ def _aligned(align: Align) -> str:
 
 
 def _from_start(
-    poses: Float[np.ndarray, "n 3"], true: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"], frame: Frame
+    poses: Float[np.ndarray, "n p"], true: Float[np.ndarray, "n p"], covs: Float[np.ndarray, "n d d"], frame: Frame
 ) -> float | None:
     """Return the ANEES of the poses relative to the first one; None where the covariance falls below that of it."""
+    axes = covs.shape[1]
     left, stated = since_start(poses, true, covs, frame)
-    stated = 0.5 * (stated + stated.swapaxes(1, 2)) + KNOWN_START
+    stated = 0.5 * (stated + stated.swapaxes(1, 2)) + np.diag(
+        np.repeat(KNOWN_START, [len(range(axes)[part]) for part in parts(axes)])
+    )
     if not np.all(definite(stated)):
         return None
     return anees(nees(left, stated), left.shape[1])
@@ -239,34 +262,34 @@ def _from_start(
 def _lags(
     stated: Stated,
     rows: Int[np.ndarray, " n"],
-    poses: Float[np.ndarray, "n 3"],
-    true: Float[np.ndarray, "n 3"],
-    covs: Float[np.ndarray, "n 3 3"],
+    poses: Float[np.ndarray, "n p"],
+    true: Float[np.ndarray, "n p"],
     frame: Frame,
 ) -> tuple[Lag, ...]:
-    found = []
+    by, found = geometry_of(poses), []
     for steps in LAGS:
         if len(rows) <= max(steps, LEAST):
             break
-        left = between(between(true[:-steps], true[steps:]), between(poses[:-steps], poses[steps:]))
+        left = by.relative_errors(*(by.between(path[:-steps], path[steps:]) for path in (true, poses)))
+        position, rotation = parts(left.shape[1])
         total, is_bound = _between_covs(stated, rows[:-steps], rows[steps:], frame)
         if not np.all(definite(total)):
             continue
         told = score(whitened(left, total))
-        found.append(Lag(steps, rms(np.hypot(*left[:, :2].T)), rms(left[:, 2]), told, is_bound))
+        found.append(Lag(steps, _size(left[:, position]), _size(left[:, rotation]), told, is_bound))
     return tuple(found)
 
 
 def _between_covs(
     stated: Stated, first: Int[np.ndarray, " m"], second: Int[np.ndarray, " m"], frame: Frame
-) -> tuple[Float[np.ndarray, "m 3 3"], bool]:
+) -> tuple[Float[np.ndarray, "m d d"], bool]:
     """Return the covariances of relations between poses in the frame of the second, and whether they are bounds."""
-    motions = between(stated.poses_world[first], stated.poses_world[second])
+    by, own = geometry_of(stated.poses_world), stated.used_covs
+    motions = by.between(stated.poses_world[first], stated.poses_world[second])
     if stated.pair_covs is not None:
-        return relation_covs(motions, stated.pair_covs(first, second)), False
-    own = stated.planar
+        return by.relation_covs(motions, stated.pair_covs(first, second)), False
     assert own is not None
-    body = [to_frame(stated.poses_world[rows], own[rows], frame, "body") for rows in (first, second)]
-    joint = np.zeros((len(first), 6, 6))
-    joint[:, :3, :3], joint[:, 3:, 3:] = body
-    return 2.0 * relation_covs(motions, joint), True
+    body = [by.to_frame(stated.poses_world[rows], own[rows], frame, "body") for rows in (first, second)]
+    joint, axes = np.zeros((len(first), 2 * own.shape[1], 2 * own.shape[1])), own.shape[1]
+    joint[:, :axes, :axes], joint[:, axes:, axes:] = body
+    return 2.0 * by.relation_covs(motions, joint), True

@@ -17,14 +17,19 @@ from ...artifacts.run_folder import prepare
 from ...scoring.without_truth.references import read_relations
 from ...usage import UsageError
 from .audited import Align, Audited, Options, audited, audited_relations
-from .bags import read_poses
-from .graphs import is_graph, read_graph
-from .stated import Frame, Stated, read_folder, read_text
+from .reading.bags import read_poses
+from .reading.graphs import is_graph, read_graph
+from .reading.stated import TRUTH, Frame, Space, Stated, in_space, read_folder, read_text
 from .verdicts import Pair, Pooled, compare, pool
+from .without.halves import halves_of
+from .without.inner import Inner
+from .without.innovations import innovations
+from .without.loops import loops
+from .without.triangles import closures
 from .words import lines, pooled_line
 
 Paths = str | Path | Sequence[str | Path]
-GIVE = "give --truth FILE, --reference FILE or --relations FILE"
+GIVE = "give --truth FILE, --reference FILE or --relations FILE, or a second trajectory and --halves"
 REPORT, RECORD, TABLES = "report.html", "audit.json", "tables.tex"
 
 
@@ -39,13 +44,16 @@ class Audit:
     """Of several estimators on one drive."""
     asked: tuple[str, ...]
     """The words of the command that makes it."""
+    without_truth: tuple[Inner, ...] = ()
+    """What runs, graphs or relations show without a truth."""
 
     @property
     def verdict(self) -> list[str]:
         """The findings, in words: four to six lines for each trajectory."""
         is_told = "--error" in self.asked
         each = [line for found in self.trajectories for line in lines(found, is_told)]
-        return [*each, *self._pooled(), *(pair.told() for pair in self.pairs)]
+        inner = [line for found in self.without_truth for line in found.lines()]
+        return [*each, *inner, *self._pooled(), *(pair.told() for pair in self.pairs)]
 
     def _pooled(self) -> list[str]:
         return [] if self.pooled is None else [pooled_line(self.pooled)]
@@ -64,6 +72,7 @@ class Audit:
                 {"first": pair.first, "second": pair.second, "nees_ratio": pair.ratio,
                  "nees_ratio_interval": pair.interval, "stretches": pair.blocks} for pair in self.pairs
             ],
+            "without_truth": [each.record() for each in self.without_truth],
         }  # fmt: skip
 
     def report(self, folder: str | Path) -> Path:
@@ -71,12 +80,17 @@ class Audit:
         from chainslam.viz.reports.report import html, latex
 
         from .page import page_of
+        from .without.page import page_without
 
         place = Path(folder)
         prepare(place)
         singles = [f"{each.name}: {each.verdict.told()}" for each in self.trajectories]
+        singles += [each.lines()[0] for each in self.without_truth]
         told = [*self._pooled(), *singles, *(pair.told() for pair in self.pairs)]
-        page = page_of(self.trajectories, self.pooled, self.pairs, told, self.asked)
+        page = (
+            page_without(self.without_truth, told, self.asked) if self.without_truth
+            else page_of(self.trajectories, self.pooled, self.pairs, told, self.asked)
+        )  # fmt: skip
         write(place / RECORD, json_bytes({**stamp(), "command": list(self.asked), **self.record()}))
         write(place / TABLES, latex(page.all_tables))
         write(place / REPORT, html(page))
@@ -92,6 +106,9 @@ def audit(
     truth: Paths = (),
     reference: Paths = (),
     relations: str | Path | None = None,
+    without_truth: bool = False,
+    halves: bool = False,
+    space: Space = "plane",
     error: Frame | None = None,
     align: Align = "none",
     reference_sigma: tuple[float, float] | None = None,
@@ -103,22 +120,35 @@ def audit(
 
     `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
     (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
-    estimators. `relations` is a file of measured relations between poses. `error` is the frame that the covariances are
-    stated in: "additive" (the default), "body" or "world". `nearest` takes the nearest true pose within so many
-    seconds, which is otherwise interpolated. Raises UsageError for bad input.
+    estimators. `relations` is a file of measured relations between poses; without a trajectory its triangles are
+    audited. Without a truth, the innovations of a run's folder and the loop closures of a graph are audited;
+    `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of
+    two halves of the data. `space` "space" audits all six axes of poses with position and quaternion, in place of x,
+    y and heading. `error` is the frame that the covariances are stated in: "additive" (the default), "body" or
+    "world". `nearest` takes the nearest true pose within so many seconds, which is otherwise interpolated. Raises
+    UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
     given: dict[str, Any] = {
         "truth": true, "reference": references, "relations": [] if relations is None else [relations],
+        "without-truth": [] if not without_truth else [""], "halves": [] if not halves else [""],
+        "space": [] if space == "plane" else [space],
         "error": [] if error is None else [error], "align": [] if align == "none" else [align],
         "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],
         "topic": [] if topic is None else [topic], "truth-topic": [] if truth_topic is None else [truth_topic],
     }  # fmt: skip
     _check(paths, given)
     asked = ["chainslam", "audit", *map(str, paths)]
-    asked += [word for name, values in given.items() if values for word in (f"--{name}", *map(str, values))]
+    asked += [word for name, values in given.items() if values for word in (f"--{name}", *map(str, values)) if word]
     options = Options(error, align, reference_sigma, nearest)
-    stated = _named([read(path, topic) for path in paths])
+    if not paths:
+        assert relations is not None
+        return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma),))
+    if without_truth or not (true or references or relations or halves or not all(map(_is_alone, paths))):
+        return Audit((), None, (), tuple(asked), tuple(map(_inner, paths)))
+    stated = _named([read(path, topic, space=space) for path in paths])
+    if halves:
+        return Audit((halves_of(stated, options),), None, (), tuple(asked))
     if relations is not None:
         measured = read_relations(Path(relations))
         found = tuple(audited_relations(each, measured, options) for each in stated)
@@ -128,7 +158,7 @@ def audit(
         raise UsageError(
             f"expected one truth for all or one for each of {len(paths)} trajectories, found {len(known)}: correct it"
         )
-    truths = [read(path, truth_topic, needs_covariance=False) for path in known]
+    truths = [read(path, truth_topic, False, space) for path in known]
     every = truths if len(truths) == len(stated) else truths * len(stated)
     found = tuple(audited(each, against, options) for each, against in zip(stated, every, strict=True))
     estimators = {each.estimator for each in stated} - {None}
@@ -137,13 +167,29 @@ def audit(
     return Audit(found, None, _pairs(found, every), tuple(asked))
 
 
-def read(path: Path, topic: str | None = None, needs_covariance: bool = True) -> Stated:
+def _is_alone(path: Path) -> bool:
+    """Return whether a graph or the folder of a run has no truth of its own."""
+    has_steps = path.is_dir() and (path / "steps.csv").is_file()
+    return is_graph(path) or (has_steps and not (path / TRUTH).is_file())
+
+
+def _inner(path: Path) -> Inner:
+    if is_graph(path):
+        return loops(path)
+    if not (path / "steps.csv").is_file():
+        raise UsageError(f"expected the folder of a run or a g2o graph for --without-truth, found {path}: {GIVE}")
+    return innovations(path)
+
+
+def read(path: Path, topic: str | None = None, needs_covariance: bool = True, space: Space = "plane") -> Stated:
     """Read a trajectory of whatever format; raises UsageError."""
     if is_graph(path):
-        return read_graph(path)
-    if is_bag(path):
-        return read_poses(path, topic, needs_covariance)
-    return read_folder(path) if path.is_dir() else read_text(path)
+        found = read_graph(path)
+    elif is_bag(path):
+        found = read_poses(path, topic, needs_covariance)
+    else:
+        found = read_folder(path) if path.is_dir() else read_text(path)
+    return in_space(found, needs_covariance) if space == "space" else found
 
 
 def _paths(given: Paths) -> list[Path]:
@@ -151,14 +197,17 @@ def _paths(given: Paths) -> list[Path]:
 
 
 def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
-    if not paths:
+    if not paths and not given["relations"]:
         raise UsageError("expected a trajectory with covariances, found none: name a file or the folder of a run first")
-    against = [f"--{name}" for name in ("truth", "reference", "relations") if given[name]]
+    against = [f"--{name}" for name in ("truth", "reference", "relations", "without-truth", "halves") if given[name]]
     if len(against) > 1:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
+    if given["space"] and given["relations"]:
+        raise UsageError("expected --relations without --space, found both: relations are audited in the plane")
     sigma = given["reference-sigma"]
-    if sigma and (not given["reference"] or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):
-        found = f"{sigma[0]:g} {sigma[1]:g}" if given["reference"] else "no reference"
+    known = given["reference"] or not paths
+    if sigma and (not known or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):
+        found = f"{sigma[0]:g} {sigma[1]:g}" if known else "no reference"
         raise UsageError(f"expected --reference-sigma METRES RADIANS of a --reference, found {found}: correct it")
     if given["nearest"] and not 0.0 <= given["nearest"][0] < float("inf"):
         raise UsageError(f"expected --nearest as seconds, found {given['nearest'][0]:g}: correct it")

@@ -16,8 +16,9 @@ from chainslam.viz.reports.report import Page, PagePicture, PageTable, Section, 
 from chainslam.viz.text import NONE
 
 from ...views.numbers import estimated, number, percent
-from .audited import IN_WORDS, Audited
+from .audited import Audited
 from .draws import LEVELS
+from .geometry.kinds import parts
 from .verdicts import Pair, Pooled
 
 AXES = {
@@ -25,6 +26,13 @@ AXES = {
     "body": ("forward (m)", "left (m)", "heading (degrees)"),
     "world": ("x, world frame (m)", "y, world frame (m)", "heading (degrees)"),
 }
+AXES_IN_SPACE = {
+    frame: tuple(f"{axis} ({unit})" for unit, axes in (("m", shifts), ("degrees", turns)) for axis in axes)
+    for frame, shifts, turns in (
+        ("additive", "xyz", ("roll", "pitch", "yaw")), ("body", ("forward", "left", "up"), ("roll", "pitch", "yaw")),
+        ("world", "xyz", ("about x", "about y", "about z")),
+    )
+}  # fmt: skip
 MOST_POINTS = 2000
 """Points of a curve; more are not seen."""
 TURNS = (3, 0, 5, 2, 6, 1, 4, 7)
@@ -49,7 +57,7 @@ def page_of(
 
 
 def _how(found: Sequence[Audited]) -> str:
-    frames = " and ".join(dict.fromkeys(IN_WORDS[each.frame] for each in found))
+    frames = " and ".join(dict.fromkeys(each.error_in_words for each in found))
     return (
         f"NEES: squared error over stated covariance; {frames}. ANEES: its mean over the number of its axes, ideally 1,"
         " with the 95 % interval in brackets. Effective samples: errors that last from pose to pose count once, and the"
@@ -63,7 +71,7 @@ def _mean(of: dict[str, Any]) -> str:
 
 
 def _table(found: Sequence[Audited], pooled: Pooled | None) -> PageTable:
-    rows = [each.record() for each in found]
+    rows, turn = [each.record() for each in found], found[0].turn
     if pooled is not None:
         rows.append({
             "file": f"{pooled.runs} runs together", "verdict": pooled.verdict.words, "factor": pooled.verdict.factor,
@@ -77,11 +85,11 @@ def _table(found: Sequence[Audited], pooled: Pooled | None) -> PageTable:
             "factor": lambda row: number(row["factor"]),
             "ANEES": _mean,
             "position": lambda row: _mean(row["position"]) if "position" in row else NONE,
-            "heading": lambda row: _mean(row["heading"]) if "heading" in row else NONE,
+            turn: lambda row: _mean(row[turn]) if turn in row else NONE,
             "from the start": lambda row: number(row.get("anees_from_start")),
             "effective samples": lambda row: number(row.get("effective_samples"), 2),
             "error, m": lambda row: _beside(row, "position_m", 1.0),
-            "error, degrees": lambda row: _beside(row, "heading_rad", degrees(1.0)),
+            "error, degrees": lambda row: _beside(row, f"{turn}_rad", degrees(1.0)),
         },
         rows,
         "Factor: error over stated sigma of an overconfident estimate, stated sigma over error of a cautious one.",
@@ -115,9 +123,9 @@ def _curves(found: Sequence[Audited]) -> tuple[PagePicture, ...]:
     curves = []
     for rank, each in enumerate(shown):
         rows = _thinned(len(each.time_s))
-        band = np.tile(np.array(chi2_band(3))[:, None], len(rows))
+        band = np.tile(np.array(chi2_band(each.errors.shape[1]))[:, None], len(rows))
         nees = np.maximum(each.nees[rows], 1e-6)
-        curves.append(NeesCurve(each.name, each.time_s[rows] - found[0].time_s[0], nees, band, None, _colour(rank)))
+        curves.append(NeesCurve(each.name, each.time_s[rows] - found[0].time_s[0], nees, band, None, colour(rank)))
     words = "NEES of the pose, with the band in which it lies in 95 % of the poses of a consistent estimate"
     return (PagePicture(saved(draw_nees(curves, "time (s)"), "svg"), words),)
 
@@ -125,9 +133,10 @@ def _curves(found: Sequence[Audited]) -> tuple[PagePicture, ...]:
 def _section(each: Audited, rank: int) -> Section:
     rows = _thinned(len(each.time_s))
     sigmas = np.sqrt(np.einsum("nii->ni", each.covs[rows]))
-    scale = np.array([1.0, 1.0, degrees(1.0)])
+    scale = np.repeat([1.0, degrees(1.0)], [len(sigmas[0, part]) for part in parts(sigmas.shape[1])])
+    names = AXES[each.frame] if each.turn == "heading" else AXES_IN_SPACE[each.frame]
     figure = draw_stated_errors(
-        each.time_s[rows] - each.time_s[0], scale * each.errors[rows], scale * sigmas, AXES[each.frame], _colour(rank)
+        each.time_s[rows] - each.time_s[0], scale * each.errors[rows], scale * sigmas, names, colour(rank)
     )
     words = "Errors, and the intervals in which 95 % of them lie if the covariances are right"
     pictures = (PagePicture(saved(figure, "svg"), words),)
@@ -135,12 +144,12 @@ def _section(each: Audited, rank: int) -> Section:
 
 
 def _coverage(each: Audited) -> PageTable:
-    parts = {"pose": each.pose, "position": each.position, "heading": each.heading}
+    of = {"pose": each.pose, "position": each.position, each.turn: each.heading}
     columns = {"quantity": lambda name: name} | {
-        f"{100.0 * level:g} % region": (lambda name, k=k: f"{percent(parts[name].covered[k])} %")
+        f"{100.0 * level:g} % region": (lambda name, k=k: f"{percent(of[name].covered[k])} %")
         for k, level in enumerate(LEVELS)
     }
-    return table("Share of the errors inside their stated regions", columns, tuple(parts))
+    return table("Share of the errors inside their stated regions", columns, tuple(of))
 
 
 def _lags(each: Audited) -> PageTable:
@@ -154,7 +163,8 @@ def _lags(each: Audited) -> PageTable:
     }, each.lags, note if any(lag.is_bound for lag in each.lags) else "")  # fmt: skip
 
 
-def _colour(rank: int) -> str:
+def colour(rank: int) -> str:
+    """Return the colour of the curve of a rank."""
     return palette.of_rank(TURNS[rank % len(TURNS)])
 
 

@@ -3,7 +3,7 @@
 Matrices that are none are left out and counted. All else is only a hint: nothing is converted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -12,7 +12,8 @@ from chainslam.slam.evaluation.consistency import anees, nees, whitened
 
 from ...usage import UsageError
 from ...views.numbers import number
-from .stated import Stated, symmetric
+from .geometry.kinds import parts
+from .reading.stated import IN_SPACE, Stated, symmetric
 
 DEGREES = float(np.rad2deg(1.0)) ** 2
 """The ratio of variances in degrees and in radians."""
@@ -45,7 +46,7 @@ class Checked:
 
 def check(stated: Stated) -> Checked:
     """Return which covariances are positive definite; raises UsageError where most are not."""
-    covs = stated.planar
+    covs = stated.used_covs
     if covs is None:
         raise UsageError(
             f"expected {stated.name} with covariances, found poses only: append 6 columns xx xy xt yy yt tt of x, y and"
@@ -75,10 +76,14 @@ def check(stated: Stated) -> Checked:
     if np.count_nonzero(usable) < USABLE * len(covs):
         hint = order_hint(stated)
         raise UsageError(
-            f"expected covariances of x, y and heading in {stated.name}, found that {'; '.join(notes)}:"
+            f"expected covariances of {_axes(stated)} in {stated.name}, found that {'; '.join(notes)}:"
             f" {hint or 'correct them'}"
         )
     return Checked(usable, tuple(f"{words}: left out" for words in notes))
+
+
+def _axes(stated: Stated) -> str:
+    return "x y z roll pitch yaw" if stated.poses_world.shape[1] == IN_SPACE else "x, y and heading"
 
 
 def definite(covs: Float[np.ndarray, "n d d"]) -> Bool[np.ndarray, " n"]:
@@ -93,27 +98,28 @@ def definite(covs: Float[np.ndarray, "n d d"]) -> Bool[np.ndarray, " n"]:
     return definite
 
 
-def other_orders(stated: Stated) -> dict[str, Float[np.ndarray, "n 3 3"]]:
-    """Return, by name, the covariances of x, y and heading if the columns were meant in another order."""
+def other_orders(stated: Stated) -> dict[str, Float[np.ndarray, "n d d"]]:
+    """Return, by name, the covariances of the audited axes if the columns were meant in another order."""
     if stated.covs is None:
         return {}
     size = stated.covs.shape[1]
     if size == 6:
         swap = (3, 4, 5, 0, 1, 2)
         turned = stated.covs[:, swap][:, :, swap]
-        return {"roll pitch yaw x y z, as GTSAM has it": turned[:, (0, 1, 5)][:, :, (0, 1, 5)]}
+        used = replace(stated, covs=turned).used_covs
+        return {} if used is None else {"roll pitch yaw x y z, as GTSAM has it": used}
     upper = np.triu_indices(3)
     cells = stated.covs[:, upper[0], upper[1]]
     return {words: symmetric(cells[:, order], 3) for words, order in ORDERS_OF_6.items()}
 
 
-def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -> str:
+def order_hint(stated: Stated, errors: Float[np.ndarray, "n d"] | None = None) -> str:
     """Return in which other order of its columns all covariances would be right; empty if in none.
 
     Without the errors: in which they are positive definite, where too few are as given. With them: in which position
     and heading are consistent, where they are not as given.
     """
-    given = stated.planar
+    given = stated.used_covs
     assert given is not None
     is_odd = np.mean(definite(given)) < 0.9
     for words, covs in other_orders(stated).items():
@@ -126,40 +132,42 @@ def order_hint(stated: Stated, errors: Float[np.ndarray, "n 3"] | None = None) -
     return ""
 
 
-def _both_fit(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> bool:
+def _both_fit(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> bool:
     """Return whether the ANEES of position and of heading are both near 1."""
     rows = definite(covs) & np.all(np.isfinite(errors), axis=1)
     if not np.any(rows):
         return False
-    parts = (whitened(errors[rows][:, at], covs[rows][:, at, at]) for at in (slice(0, 2), slice(2, 3)))
-    return all(1.0 / NEAR < float(np.mean(white**2)) < NEAR for white in parts)
+    whites = (whitened(errors[rows][:, at], covs[rows][:, at, at]) for at in parts(covs.shape[1]))
+    return all(1.0 / NEAR < float(np.mean(white**2)) < NEAR for white in whites)
 
 
-def hints(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> list[str]:
+def hints(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> list[str]:
     """Return what the errors tell of units and accumulation of covariances, in words; empty if nothing is odd."""
     found = []
-    sigma = float(np.sqrt(np.median(covs[:, 2, 2])))
-    position, heading = (whitened(errors[:, at], covs[:, at, at]) for at in (slice(0, 2), slice(2, 3)))
+    at = parts(covs.shape[1])
+    sigma = float(np.sqrt(np.median(covs[:, at[1], at[1]].diagonal(axis1=1, axis2=2).max(axis=1))))
+    position, heading = (whitened(errors[:, part], covs[:, part, part]) for part in at)
+    what = "heading" if covs.shape[1] == 3 else "rotation"
     ratio = float(np.mean(heading**2)) / max(float(np.mean(position**2)), 1e-300)
     if DEGREES / NEAR < ratio < DEGREES * NEAR:
-        found.append("the NEES of the heading is 57.3² times that of the position: are the headings in degrees?")
+        found.append(f"the NEES of the {what} is 57.3² times that of the position: are the {what}s in degrees?")
     elif 1.0 / (DEGREES * NEAR) < ratio < NEAR / DEGREES:
-        found.append("the NEES of the heading is 57.3² times smaller than that of the position: is its covariance in"
+        found.append(f"the NEES of the {what} is 57.3² times smaller than that of the position: is its covariance in"
                      " degrees?")  # fmt: skip
     elif sigma > np.pi:
-        found.append(f"the stated sigma of the heading is {number(sigma)} rad, more than half a turn: in degrees?")
+        found.append(f"the stated sigma of the {what} is {number(sigma)} rad, more than half a turn: in degrees?")
     if _is_constant(covs) and _grows(errors, covs):
         found.append("the covariance is constant while the errors grow: is it that of a step, or of a second?")
     return found
 
 
-def _is_constant(covs: Float[np.ndarray, "n 3 3"]) -> bool:
+def _is_constant(covs: Float[np.ndarray, "n d d"]) -> bool:
     sizes = np.linalg.det(covs)
     return float(sizes.max()) <= 1.1 * float(sizes.min())
 
 
-def _grows(errors: Float[np.ndarray, "n 3"], covs: Float[np.ndarray, "n 3 3"]) -> bool:
+def _grows(errors: Float[np.ndarray, "n d"], covs: Float[np.ndarray, "n d d"]) -> bool:
     """Return whether the errors of the last third are far larger than those of the first, and than stated."""
     third = max(len(errors) // 3, 1)
-    first, last = (anees(nees(errors[part], covs[part]), 3) for part in (slice(third), slice(-third, None)))
+    first, last = (anees(nees(errors[part], covs[part]), covs.shape[1]) for part in (slice(third), slice(-third, None)))
     return last > NEAR * max(first, 1e-300) and last > NEAR

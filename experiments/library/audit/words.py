@@ -4,7 +4,7 @@ from math import degrees
 from typing import Any
 
 from ...views.numbers import number, percent
-from .audited import DEFAULT, IN_WORDS, Audited
+from .audited import DEFAULT, Audited
 from .draws import LEVELS
 from .verdicts import TOO_FEW, Pooled
 
@@ -14,15 +14,16 @@ def lines(found: Audited, is_told: bool) -> list[str]:
     record, pose = found.record(), found.pose
     least = "at least " if found.is_bound else ""
     start = "" if found.from_start is None else f", relative to the start {number(found.from_start)}"
-    frame = IN_WORDS[found.frame] + ("" if is_told or found.frame != DEFAULT else ", by default")
+    frame = found.error_in_words + ("" if is_told or found.frame != DEFAULT else ", by default")
     inside = percent(pose.covered[LEVELS.index(0.95)])
     told = [
         f"{found.name}: {found.verdict.told()}",
         f"  ANEES {least}{number(pose.anees)} (95 % interval {number(pose.low)} to {number(pose.high)}; ideally 1):"
-        f" position {number(found.position.anees)}, heading {number(found.heading.anees)}{start}",
+        f" position {number(found.position.anees)}, {found.turn} {number(found.heading.anees)}{start}",
         f"  {pose.count:,} {found.what}, effective sample size {number(pose.draws, 2)}; {inside} % of them inside"
         f" their 95 % region; {frame}",
-        f"  rms error {_sizes(record, 'rms')}, stated {_sizes(record, 'stated')}",
+        f"  rms error {_sizes(record, f'rms_position_m rms_{found.turn}_rad')}, stated"
+        f" {_sizes(record, f'stated_position_m stated_{found.turn}_rad')}",
     ]
     if found.notes:
         told.append(f"  note: {'; '.join(found.notes)}")
@@ -31,8 +32,8 @@ def lines(found: Audited, is_told: bool) -> list[str]:
     return told
 
 
-def _sizes(record: dict[str, Any], kind: str) -> str:
-    metres, turn = record[f"{kind}_position_m"], record[f"{kind}_heading_rad"]
+def _sizes(record: dict[str, Any], keys: str) -> str:
+    metres, turn = (record[key] for key in keys.split())
     return f"{number(metres)} m and {number(degrees(turn))} degrees"
 
 

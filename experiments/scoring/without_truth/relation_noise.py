@@ -97,7 +97,7 @@ def sigmas_of_relations(relations: Relations) -> Sigmas | None:
     def noise(S: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "t 3 3"]:
         return np.asarray(2.0 * S + back @ S @ back.swapaxes(1, 2))
 
-    return likeliest(between(ac, _composed(ab, bc)), noise)
+    return likeliest(between(ac, composed(ab, bc)), noise)
 
 
 def sigmas_of_path(
@@ -139,6 +139,6 @@ def _sigmas(logs: Float[np.ndarray, "2"]) -> Sigmas:
     return Sigmas(*(LEAST + np.exp(logs)).tolist())
 
 
-def _composed(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:
+def composed(first: Float[np.ndarray, "m 3"], second: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:
     """Return each motion of `first` with the one of `second` after it."""
     return np.column_stack([first[:, :2] + turned(second[:, :2], first[:, 2]), first[:, 2] + second[:, 2]])

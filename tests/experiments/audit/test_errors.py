@@ -6,13 +6,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.linalg import expm, logm
 
-from chainslam.experiments.library.audit.errors import (
-    errors,
-    motion_at_start,
-    moved_covs,
-    since_start,
-    to_frame,
-)
+from chainslam.experiments.library.audit.geometry.kinds import since_start
+from chainslam.experiments.library.audit.geometry.plane import errors, motion_at_start, moved_covs, to_frame
 from chainslam.experiments.scoring.trajectories import alignment_of_paths, moved
 from chainslam.slam.evaluation.consistency import nees
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chainslam.experiments.library.audit.auditing import audit, read
-from chainslam.experiments.library.audit.graphs import graph_at
+from chainslam.experiments.library.audit.reading.graphs import graph_at
 from chainslam.experiments.library.audit.verdicts import pool
 from chainslam.experiments.usage import UsageError
 from chainslam.slam.geometry.poses import compose, inverse

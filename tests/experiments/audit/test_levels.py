@@ -7,7 +7,7 @@ import pytest
 
 from chainslam.experiments.campaign.comparison.consistency import CAUTIOUS, CONSISTENT, OVERCONFIDENT
 from chainslam.experiments.library.audit.draws import interval, score
-from chainslam.experiments.library.audit.errors import errors
+from chainslam.experiments.library.audit.geometry.plane import errors
 from chainslam.experiments.library.audit.verdicts import TOO_FEW, compare, judge, pool
 from chainslam.experiments.scoring.statistics import mean_interval
 from chainslam.slam.evaluation.consistency import whitened

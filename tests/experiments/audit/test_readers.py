@@ -18,7 +18,7 @@ def test_six_columns_and_twenty_one_of_a_robot_in_the_plane_say_the_same(tmp_pat
     many = tum(tmp_path / "many.tum", DRIVE.time_s, DRIVE.estimated, in_space(DRIVE.covs))
     one, other = (audit(path, truth=true).trajectories[0] for path in (six, many))
     assert one.pose.anees == pytest.approx(other.pose.anees, rel=1e-9)
-    assert read(six).planar == pytest.approx(DRIVE.covs, rel=1e-12)
+    assert read(six).used_covs == pytest.approx(DRIVE.covs, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_columns_of_a_table_are_found_by_their_names(header, degrees, tmp_path):
     (tmp_path / "a.csv").write_text("\n".join([header, *rows]))
     found = read(tmp_path / "a.csv")
     assert found.poses_world == pytest.approx(np.column_stack([DRIVE.estimated[:, :2], found.poses_world[:, 2]]))
-    assert found.planar == pytest.approx(DRIVE.covs)
+    assert found.used_covs == pytest.approx(DRIVE.covs)
 
 
 def test_a_table_without_correlations_says_so(tmp_path):

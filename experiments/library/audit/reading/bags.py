@@ -8,7 +8,7 @@ import numpy as np
 from chainslam.sim.logs.rosbag import named_as_its_kind
 from chainslam.slam.robot.ros.transforms import seconds
 
-from ...usage import UsageError, did_you_mean, need
+from ....usage import UsageError, did_you_mean, need
 from .stated import Stated, heading_of, symmetric
 
 WITH_COVARIANCE = ("geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
@@ -39,10 +39,11 @@ def read_poses(path: Path, topic: str | None, needs_covariance: bool) -> Stated:
         raise UsageError(f"expected poses in {path}, found none on {chosen[0].topic}: name another --topic")
     table = np.array(rows)
     table = table[np.argsort(table[:, 0], kind="stable")]
-    heading, notes = heading_of(table[:, 3:7], path)
-    covs = None if chosen[0].msgtype not in WITH_COVARIANCE else symmetric(table[:, 7:], 6)
+    heading, notes = heading_of(table[:, 4:8], path)
+    covs = None if chosen[0].msgtype not in WITH_COVARIANCE else symmetric(table[:, 8:], 6)
     notes = (*notes, f"poses of {chosen[0].topic}")
-    return Stated(path.name, table[:, 0], np.column_stack([table[:, 1:3], heading]), covs, notes)
+    poses = np.column_stack([table[:, 1:3], heading])
+    return Stated(path.name, table[:, 0], poses, covs, notes, spatial=table[:, 1:8])
 
 
 def _chosen(connections: list[Any], topic: str | None, needs_covariance: bool, path: Path) -> list[Any]:
@@ -70,4 +71,4 @@ def _row(message: Any) -> list[float]:
     if hasattr(pose, "covariance"):
         pose, covariance = pose.pose, pose.covariance
     p, q = pose.position, pose.orientation
-    return [seconds(message.header.stamp), p.x, p.y, q.x, q.y, q.z, q.w, *covariance]
+    return [seconds(message.header.stamp), p.x, p.y, p.z, q.x, q.y, q.z, q.w, *covariance]

@@ -14,18 +14,24 @@ from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M
 from chainslam.slam.geometry.poses import wrap
 
-from ...artifacts.saved import read_summary
-from ...usage import UsageError
+from ....artifacts.saved import read_summary
+from ....usage import UsageError
 
 Frame = Literal["additive", "body", "world"]
+Space = Literal["plane", "space"]
 PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
 MOST_BYTES = 2**28
 PLANE_TO_SPACE = (0, 1, 5)
 """Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
 UNIT = 0.02
 """Largest difference of a quaternion's length from 1."""
+TRUTH = "trajectory_true.tum"
+"""The true poses in the folder of a run."""
+TILTED = "the robot tilts, and only x, y and yaw are audited"
 TILTED_RAD = 0.2
 """A robot that is tilted by more does not move in the plane."""
+IN_SPACE = 7
+"""Numbers of a pose in space."""
 TUM, PLANAR = 8, 4
 WIDTHS = {0: 0, 6: 3, 9: 3, 21: 6, 36: 6}
 """Columns behind a pose, upper triangle or full matrix, and the size of the covariance."""
@@ -36,12 +42,15 @@ NAMES = {
     "t": ("time", "time_s", "t", "timestamp", "stamp", "sec", "seconds"),
     "x": ("x", "x_m", "px", "pose_x", "position_x"),
     "y": ("y", "y_m", "py", "pose_y", "position_y"),
+    "z": ("z", "z_m", "pz", "pose_z", "position_z"),
     "theta": ("theta", "theta_rad", "heading", "heading_rad", "yaw", "yaw_rad", "th", "phi"),
     **{name: (name, f"orientation_{name[1]}") for name in ("qx", "qy", "qz", "qw")},
 }
 """Names of CSV columns."""
-COV = re.compile(r"(?:cov|p|c)?_?(x|y|t|th|theta|yaw|heading)_?(x|y|t|th|theta|yaw|heading)")
-AXES = {"x": 0, "y": 1}
+AXIS = "(x|y|z|roll|pitch|t|th|theta|yaw|heading)"
+COV = re.compile(rf"(?:cov|p|c)?_?{AXIS}_?{AXIS}")
+AXES = {"x": 0, "y": 1, "z": 2, "roll": 3, "pitch": 4}
+"""Places in the order of ROS; all others are the yaw."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +59,8 @@ class Stated:
 
     name: str
     time_s: Float[np.ndarray, " n"]
-    poses_world: Float[np.ndarray, "n 3"]
-    """x m, y m, heading rad."""
+    poses_world: Float[np.ndarray, "n p"]
+    """x m, y m, heading rad; in space x y z qx qy qz qw."""
     covs: Float[np.ndarray, "n d d"] | None = None
     """Of (x, y, heading), or of x y z roll pitch yaw; None for a truth."""
     notes: tuple[str, ...] = ()
@@ -68,20 +77,40 @@ class Stated:
     """The back end of a run of ours."""
     anees_from_start: float | None = None
     """The ANEES relative to the start, as the run itself has it."""
+    spatial: Float[np.ndarray, "n 7"] | None = None
+    """The poses in space, x y z qx qy qz qw, if the file has them."""
 
     @property
-    def planar(self) -> Float[np.ndarray, "n 3 3"] | None:
-        """The covariances of x, y and heading."""
-        if self.covs is None or self.covs.shape[1] == 3:
+    def used_covs(self) -> Float[np.ndarray, "n d d"] | None:
+        """The covariances of the axes that are audited: x, y and heading, or all six."""
+        if self.covs is None or self.covs.shape[1] == 3 or self.poses_world.shape[1] == IN_SPACE:
             return self.covs
         return np.asarray(self.covs[:, PLANE_TO_SPACE][:, :, PLANE_TO_SPACE])
+
+
+def in_space(stated: Stated, needs_covariance: bool = True) -> Stated:
+    """Return a trajectory with its poses in space; raises UsageError if its file has not all six axes."""
+    name, poses = stated.name, stated.spatial
+    if poses is None:
+        raise UsageError(
+            f"expected x y z qx qy qz qw in {name} for --space space, found poses in the plane: leave --space out"
+        )
+    if not np.all(np.abs(poses[:, :3]) <= MOST_M):
+        raise UsageError(f"expected positions within {MOST_M:g} m in {name}, found others in z: correct it")
+    if needs_covariance and (stated.covs is None or stated.covs.shape[1] != 6):
+        found = "none" if stated.covs is None else "those of x, y and heading"
+        raise UsageError(
+            f"expected covariances of x y z roll pitch yaw in {name}, found {found}: append their 21 columns, the upper"
+            " triangle"
+        )
+    return replace(stated, poses_world=poses, notes=tuple(note for note in stated.notes if note != TILTED))
 
 
 def read_folder(folder: Path) -> Stated:
     """Read the poses, covariances and truth of a run of ours; raises UsageError."""
     if not (folder / "steps.csv").is_file():
         raise UsageError(f"expected a trajectory, found {folder} without steps.csv: name a file, or a run's folder")
-    summary, truth = read_summary(folder), folder / "trajectory_true.tum"
+    summary, truth = read_summary(folder), folder / TRUTH
     return replace(
         read_text(folder / "steps.csv"),
         name=folder.resolve().name,
@@ -93,11 +122,11 @@ def read_folder(folder: Path) -> Stated:
 
 def read_text(path: Path) -> Stated:
     """Read a trajectory in the TUM format, as `t x y theta`, or as CSV with a header; raises UsageError."""
-    header, rows = _table(path)
+    header, rows = table(path)
     if header is None:
-        time_s, poses, covs, notes = _by_place(path, rows)
+        time_s, poses, covs, notes, spatial = _by_place(path, rows)
     else:
-        time_s, poses, covs, notes = _by_name(path, header, rows)
+        time_s, poses, covs, notes, spatial = _by_name(path, header, rows)
     if not np.all(np.isfinite(time_s)) or not np.all(np.isfinite(poses)) or np.abs(poses[:, :2]).max() > MOST_M:
         at = int(np.flatnonzero(~np.isfinite(time_s) | ~np.all(np.isfinite(poses), axis=1)).min(initial=len(rows)))
         where = f"in row {at + 1}" if at < len(rows) else f"beyond {MOST_M:g} m"
@@ -105,10 +134,14 @@ def read_text(path: Path) -> Stated:
     order = np.argsort(time_s, kind="stable")
     if np.any(np.diff(order) < 0):
         notes = (*notes, "its rows were sorted by time")
-    return Stated(path.name, time_s[order], poses[order], None if covs is None else covs[order], notes)
+    covs, spatial = (None if each is None else each[order] for each in (covs, spatial))
+    return Stated(path.name, time_s[order], poses[order], covs, notes, spatial=spatial)
 
 
-Columns = tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"], Float[np.ndarray, "n d d"] | None, tuple[str, ...]]
+Columns = tuple[
+    Float[np.ndarray, " n"], Float[np.ndarray, "n 3"], Float[np.ndarray, "n d d"] | None, tuple[str, ...],
+    Float[np.ndarray, "n 7"] | None,
+]  # fmt: skip
 
 
 def _by_place(path: Path, rows: Float[np.ndarray, "n w"]) -> Columns:
@@ -123,7 +156,8 @@ def _by_place(path: Path, rows: Float[np.ndarray, "n w"]) -> Columns:
         heading, notes = heading_of(rows[:, 4:8], path)
     size = WIDTHS[width - first]
     covs = symmetric(rows[:, first:], size) if size else None
-    return rows[:, 0], np.column_stack([rows[:, 1:3], heading]), covs, notes
+    spatial = rows[:, 1:8] if first == TUM else None
+    return rows[:, 0], np.column_stack([rows[:, 1:3], heading]), covs, notes, spatial
 
 
 def _by_name(path: Path, header: Sequence[str], rows: Float[np.ndarray, "n w"]) -> Columns:
@@ -142,14 +176,19 @@ def _by_name(path: Path, header: Sequence[str], rows: Float[np.ndarray, "n w"]) 
         heading, notes = heading_of(np.stack(parts, axis=1), path)
     cells = {pair: k for k, name in enumerate(names) if (pair := _pair(name)) is not None and k not in known.values()}
     poses = np.column_stack([rows[:, known["x"]], rows[:, known["y"]], heading])
-    if not {(0, 0), (1, 1), (2, 2)} <= set(cells):
-        return rows[:, known["t"]], poses, None, notes
-    covs = np.zeros((len(rows), 3, 3))
-    for (i, j), k in cells.items():
+    every = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    spatial = rows[:, [known[key] for key in every]] if set(every) <= set(known) else None
+    given = [axis for axis in range(6) if (axis, axis) in cells]
+    if not set(PLANE_TO_SPACE) <= set(given):
+        return rows[:, known["t"]], poses, None, notes, spatial
+    axes = list(range(6)) if len(given) == 6 else list(PLANE_TO_SPACE)
+    covs, upper = np.zeros((len(rows), len(axes), len(axes))), np.triu_indices(len(axes))
+    named = [(i, j, cells[axes[i], axes[j]]) for i, j in zip(*upper, strict=True) if (axes[i], axes[j]) in cells]
+    for i, j, k in named:
         covs[:, i, j] = covs[:, j, i] = rows[:, k]
-    if len(cells) < 6:
+    if len(named) < len(upper[0]):
         notes = (*notes, "correlations without a column count as 0")
-    return rows[:, known["t"]], poses, covs, notes
+    return rows[:, known["t"]], poses, covs, notes, spatial
 
 
 def _first(words: Sequence[str], names: Sequence[str]) -> str | None:
@@ -161,7 +200,7 @@ def _pair(name: str) -> tuple[int, int] | None:
     found = COV.fullmatch(name)
     if found is None:
         return None
-    i, j = (AXES.get(axis, 2) for axis in found.groups())
+    i, j = (AXES.get(axis, 5) for axis in found.groups())
     return min(i, j), max(i, j)
 
 
@@ -185,7 +224,7 @@ def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarra
         )
     x, y, z, w = (q / length[:, None]).T
     tilt = float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
-    notes = ("the robot tilts, and only x, y and yaw are audited",) if tilt > TILTED_RAD else ()
+    notes = (TILTED,) if tilt > TILTED_RAD else ()
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)), notes
 
 
@@ -196,7 +235,7 @@ def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarra
     return np.asarray(wrap(heading))
 
 
-def _table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
+def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
     """Return the header of a text file, if it has one, and its numbers; raises UsageError."""
     expected = f"expected a trajectory ({FORMATS}; or CSV with named columns)"
     try:

@@ -13,11 +13,17 @@ from jaxtyping import Float
 from chainslam.slam.evaluation.consistency import pose_covariances, pose_errors
 from chainslam.slam.geometry.poses import J, rotation, wrap
 
-from ...scoring.trajectories import moved
-from ...scoring.without_truth.relation_noise import body_covs
-from ...scoring.without_truth.relations import between
-from .stated import Frame
+from ....scoring.trajectories import alignment_of_paths, moved
+from ....scoring.without_truth.relation_noise import body_covs, relation_covs
+from ....scoring.without_truth.relations import between, interpolated
+from ..reading.stated import Frame
 
+__all__ = [
+    "NUMBERS", "about", "alignment_of_paths", "between", "errors", "interpolated", "motion_at_start", "moved",
+    "moved_covs", "relation_covs", "relative_errors", "to_frame",
+]  # fmt: skip
+NUMBERS = 3
+"""Of a pose: x m, y m, heading rad."""
 Poses = Float[np.ndarray, "n 3"]
 Covs = Float[np.ndarray, "n 3 3"]
 
@@ -65,18 +71,11 @@ def motion_at_start(estimated: Poses, true: Poses) -> Float[np.ndarray, "3"]:
     return np.append(true[0, :2] - rotation(turn) @ estimated[0, :2], turn)
 
 
-def since_start(
-    estimated: Poses, true: Poses, covs: Covs, frame: Frame
-) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 3 3"]]:
-    """Return the errors of the poses relative to the first one, and their covariances, which may be none.
+def about(poses: Poses, place: Float[np.ndarray, "3"]) -> Poses:
+    """Return poses with the origin of the world moved to the position of one."""
+    return np.column_stack([poses[:, :2] - place[:2], poses[:, 2]])
 
-    The error of the first pose is taken for one that the estimate carries along, as one that nothing observes: in the
-    world frame about the start, errors and covariances since then only add up.
-    """
-    around = np.append(estimated[0, :2], 0.0)
-    about = moved(estimated, -around)
-    stated = to_frame(about, to_frame(estimated, covs, frame, "additive"), "additive", "world")
-    brought = moved(estimated, motion_at_start(estimated, true))
-    left = errors(moved(brought, -np.append(true[0, :2], 0.0)), moved(true, -np.append(true[0, :2], 0.0)), "world")
-    turn = moved_covs(stated - stated[0], np.append(np.zeros(2), wrap(true[0, 2] - estimated[0, 2])), "additive")
-    return left[1:], turn[1:]
+
+def relative_errors(true_motions: Poses, motions: Poses) -> Poses:
+    """Return shift and turn between true relative poses and estimated ones, in the frames of the true ones."""
+    return between(true_motions, motions)

@@ -1,0 +1,1 @@
+"""Errors of poses and their covariances: in the plane, and in space."""
