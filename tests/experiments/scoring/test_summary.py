@@ -246,7 +246,6 @@ def test_the_distance_of_two_names_has_the_deviation_of_the_walls_along_it(run, 
     assert replace(straight, joint=None).summary()["distances"]["A-B"]["sigma_m"] is None
 
 
-
 def test_how_soon_the_floor_is_seen_is_on_the_clock_and_the_path_of_the_log(run):
     """Scans without a return show all within 4 m: 86, 97 and 100 % of the square after each."""
     assert {run.summary()[key] for key in SOON} == {None}
