@@ -28,6 +28,7 @@ from ..artifacts.schema import UnfitError
 from ..replays.paths.external import is_external, without_map
 from ..replays.replay import RecordedRun, ReplayOptions, replay, run_of
 from ..scenario import TrialConfig, build, load_world
+from ..scoring.maps.swept import SOON
 from ..scoring.truth import truth_of
 from ..trial import TrialResult, default_mission, run_scenario
 from .plan import Trial, world_key
@@ -38,15 +39,17 @@ from .scores.score import TrialScores, record_of
 SUMMARY = "summary_json"
 """Name of the summary in a trial's file."""
 
+SCANS = tuple(key for key in SOON if key.endswith("_steps"))
 NUMBERS = (
     *("path_length_m", "coverage", "swept", "pose_rmse_m", "heading_rmse_rad", "pose_anees", "pose_nees_in_band"),
     *("pose_anees_from_start", "nis", "nis_in_band"),
     *("map_anees", "joint_anees", "ate_m", "wall_rmse_m", "wall_shape_m", "nis_mean", "nis_whiteness", "trace_least"),
     *("trace_below", "bound_margin", "bound_first_m", "bound_worst_m"),
+    *(key for key in SOON if key not in SCANS),
 )
 COUNTS = (
     *("duplicate_lines", "false_matches", "matches_true", "matches_missed", "matches_false", "merges"),
-    *("false_merges", "steps", "collisions"),
+    *("false_merges", "steps", "collisions", *SCANS),
 )
 AT_A_MARK = (
     *("pose_error_m", "wall_rmse_m", "wall_shape_m", "pose_anees_so_far", "map_anees", "coverage"),

@@ -108,6 +108,12 @@ class Summary(TypedDict):
     coverage_curve: CoverageCurve | None
     map_began_step: int | None
     swept: float | None
+    swept_90_s: float | None
+    swept_90_m: float | None
+    swept_90_steps: int | None
+    swept_99_s: float | None
+    swept_99_m: float | None
+    swept_99_steps: int | None
     map_anees: float | None
     map_frame_anees: float | None
     map_frame_m: float | None

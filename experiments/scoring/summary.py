@@ -29,7 +29,7 @@ from .maps.coverage import (
     own_alignment,
     sample,
 )
-from .maps.swept import swept
+from .maps.swept import soon, swept
 from .own_gauge import OwnGauge, own_gauge
 from .records import Log, Sketch
 
@@ -206,6 +206,7 @@ def _map_scores(
     established = ~walls.tentative
     labelled = established & (labels >= 0)
     straight = map_error(votes, walls.ids, joint, labelled & ~walls.crooked)
+    seen = swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m)
     return {
         "lines": len(walls),
         "lines_tentative": int(np.count_nonzero(~established)),
@@ -219,7 +220,8 @@ def _map_scores(
         "coverage_own_frame": coverage(samples, to_world(walls.ends_world[established], own), near),
         "coverage_curve": coverage_curve(samples, sketches, to_true, near),
         "map_began_step": began_at,
-        "swept": swept(scenario.world, scenario.config.robot, log.true_world, log.bearings_rad, log.ranges_m),
+        "swept": float(seen[-1]),
+        **soon(seen, log.time_s, log.path_length_m),
         **map_scores(None if errorless else map_error(votes, walls.ids, joint, labelled)),
         "map_anees_straight": None if errorless or straight is None else straight.anees,
         "duplicate_lines": duplicate_lines(walls, labels, established),

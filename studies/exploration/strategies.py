@@ -15,8 +15,6 @@ from rich.table import Table
 
 from chainslam.experiments.scenario import Scenario, TrialConfig, build
 from chainslam.experiments.scoring.maps.coverage import NEAR_M, NEAR_NOISY_M, Samples, alignment, coverage, sample
-from chainslam.experiments.scoring.maps.swept import Floor, visible_floor
-from chainslam.experiments.scoring.records import Log
 from chainslam.experiments.scoring.statistics import estimate, paired
 from chainslam.experiments.scoring.truth import truth_of
 from chainslam.experiments.terminal.console import plain_console
@@ -67,16 +65,6 @@ def length_to(share: float, lengths: Float[np.ndarray, " s"], shares: Float[np.n
     return float(lengths[reached[0]]) if len(reached) else None
 
 
-def floor_shares(scenario: Scenario, log: Log) -> Float[np.ndarray, " s"]:
-    """Return, for each step, the share of the visible floor that was seen up to then, from the true poses."""
-    target = visible_floor(scenario.world, scenario.config.robot)
-    floor, shares = Floor(scenario.world.free), []
-    for pose, ranges in zip(log.true_world, log.ranges_m, strict=True):
-        floor.look(pose, log.bearings_rad, ranges, log.range_max_m)
-        shares.append(np.count_nonzero(floor.seen & target))
-    return np.array(shares) / max(int(np.count_nonzero(target)), 1)
-
-
 def known_by(trial: TrialConfig) -> Row:
     """Return what makes a trial this one and no other."""
     return {key: getattr(trial, key) for key in KEYS}
@@ -91,9 +79,8 @@ def one(config: TrialConfig) -> Row:
     row = {key: summary.get(key) for key in SCORES} | {"set_aside": len(summary.get("set_aside", []))}
     if result.log is not None:
         lengths, shares = np.array(gauge.rows).T
-        swept = floor_shares(scenario, result.log)
         row |= {f"contour_{share:g}_m": length_to(share, lengths, shares) for share in SHARES}
-        row |= {f"floor_{share:g}_m": length_to(share, result.log.path_length_m, swept) for share in SHARES}
+        row |= {f"floor_{share:g}_m": summary[f"swept_{100 * share:g}_m"] for share in SHARES}
         row["step_ms_mean"] = summary["step_ms"]["mean"]
     return row
 

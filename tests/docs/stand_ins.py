@@ -29,6 +29,12 @@ def lay_out(folder: Path) -> None:
     (folder / "map.yaml").write_text(
         "image: map.pgm\nresolution: 0.02\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
     )
+    floor, maps = np.full((250, 250), 205, dtype=np.uint8), folder / "Explore-Bench/exploration_benchmark/blueprints"
+    maps.mkdir(parents=True)
+    floor[20:70, 190:240], floor[21:69, 191:239] = 0, 254
+    for name in ("room_with_corner", "loop_with_corridor_sym"):
+        Image.fromarray(floor).save(maps / f"{name}.pgm")
+        (maps / f"{name}.yaml").write_text(f"image: {name}.pgm\nresolution: 0.1\norigin: [-12.5, -12.5, 0]\n")
     made = drive(np.random.default_rng(0))
     with gzip.open(folder / "intel.log.gz", "wt") as log:
         log.writelines(f"{line}\n" for line in made.flaser())

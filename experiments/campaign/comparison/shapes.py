@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal, TypedDict
 from msgspec import Struct, defstruct
 
 from ...artifacts.schema import UnfitError, many
+from ...scoring.maps.swept import PERCENTS, SOON
 from ..plan import ARMS
 from ..scores.score import END
 from .comparison import AT_MARKS, MEANS, MEASURES, SUMS
@@ -95,6 +96,10 @@ _HYPOTHESIS = _object(
     [("decisive_mark", _one_of(_MARKS)), ("marks", _MARKED)],
     [("verdict", Literal["matches", "does not match", "undecided"])],
 )  # fmt: skip
+_EXPLORED = _object(
+    "Explored", _of(str, "strategy", "backend"), _of(int, "sound", *(f"reached_{percent}" for percent in PERCENTS)),
+    _of(ESTIMATE | None, *SOON),
+)  # fmt: skip
 COMPARISON = _object(
     "Comparison",
     [("counts", _object("Counts", _of(int, "trials", "complete", "stopped", "failed"))), ("pooled", many(CELL))],
@@ -105,7 +110,7 @@ COMPARISON = _object(
     [("marks", many(_object(
         "Mark", _ARM, _of(str, "world", "strategy", "backend", "metres"), _STATES, [("without", dict[str, int])],
         _of(NUMBER, *AT_MARKS))))],
-    [("hypothesis", _HYPOTHESIS | None), ("findings", list[Finding])],
+    [("hypothesis", _HYPOTHESIS | None), ("findings", list[Finding]), ("exploration", many(_EXPLORED), [])],
 )  # fmt: skip
 _TRIAL = [("backend", str), ("mode", Literal["closed", "replay"]), ("association", Literal["own", "true"])]
 _SIDES = [

@@ -21,6 +21,7 @@ from ..plan import Campaign, Trial, gate_of, is_errorless
 from ..scores.score import END, TrialScores
 from .comparison import compare
 from .consistency import consistency
+from .exploration import exploration
 from .findings import findings
 from .hypothesis import hypothesis
 from .shapes import COMPARISON
@@ -227,6 +228,6 @@ def write_tables(
     write_table(folder / "steps", steps)
     said = compare(campaign, rows, marks, bands)
     claims = [] if is_errorless(campaign) else findings(said["pooled"], gate)
-    said |= {**stamp(), "hypothesis": hypothesis(marks), "findings": claims}
+    said |= {**stamp(), "hypothesis": hypothesis(marks), "findings": claims, "exploration": exploration(rows)}
     write(folder / "comparison.json", json_bytes(said))
     return said

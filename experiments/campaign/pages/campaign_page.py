@@ -81,6 +81,7 @@ def _tables(campaign: Campaign, said: Row, exact: bool) -> dict[str, PageTable]:
         "cells": table(f"Each world and strategy, {shown.ARMS[arm]}", told(shown.CELLS), cells),
         "strategies": shown.crossed("Strategies", closed, {"strategy": "first", "estimator": "backend"},
                                     shown.OF_STRATEGIES),
+        "explored": table("How soon the floor is seen, closed loop", shown.EXPLORED, said.get("exploration", [])),
         "marks": shown.marks_table(said, told(shown.MARKS)),
     }  # fmt: skip
     if exact:

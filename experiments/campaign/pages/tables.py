@@ -8,6 +8,7 @@ from chainslam.slam.evaluation.consistency import noise_model
 from chainslam.viz.reports.report import PageTable, table
 from chainslam.viz.text import NONE
 
+from ...scoring.maps.swept import PERCENTS
 from ...views.numbers import BUILDINGS, digits_apart, estimated, interval, number, percent
 from ..comparison.consistency import in_words
 from ..comparison.families import is_clear
@@ -56,6 +57,10 @@ def _value(name: str, scale: float = 1.0) -> Callable[[Row], str]:
     return lambda row: number(None if row[name] is None else scale * row[name])
 
 
+def _reached(percent: int) -> Callable[[Row], str]:
+    return lambda row: f"{row[f'reached_{percent}']} of {row['sound']}"
+
+
 ESTIMATORS: Columns = {
     "estimator": text("backend"),
     "verdict": in_words,
@@ -100,6 +105,12 @@ ERRORS: Columns = {
     "no map ANEES": lambda row: number(row["without"].get("map_anees", 0)),
     "no wall error": lambda row: number(row["without"].get("wall_rmse_m", 0)),
 }
+EXPLORED: Columns = {
+    "strategy": text("strategy"), "estimator": text("backend"),
+    **{f"{percent} % seen": _reached(percent) for percent in PERCENTS},
+    **{words.format(percent): _mean(f"swept_{percent}_{unit}") for percent in PERCENTS
+       for unit, words in {"s": "time to {} %, s", "m": "path to {} %, m", "steps": "scans to {} %"}.items()},
+}  # fmt: skip
 DIFFERENCES: Columns = {
     "measure": lambda row: MEASURES[row["measure"]],
     "kind": text("kind"),

@@ -1,4 +1,4 @@
-"""Free-space coverage: how much of the visible floor the range finder has seen, on a grid at true poses."""
+"""Free-space coverage: how much of the visible floor the range finder has seen, and how soon, at true poses."""
 
 from functools import lru_cache
 
@@ -17,6 +17,10 @@ from chainslam.slam.robot import Scan
 CELL_M = 0.05
 LOOKOUT_M = 0.25
 LOOKOUT_BEAMS = 720
+PERCENTS = (90, 99)
+"""Shares of the visible floor whose time and path are scores: those of Explore-Bench (Xu et al., ICRA 2022)."""
+SOON = tuple(f"swept_{percent}_{what}" for percent in PERCENTS for what in ("s", "m", "steps"))
+"""The keys of `soon`."""
 
 
 class Floor:
@@ -51,10 +55,10 @@ class Floor:
         bearings_rad: Float[np.ndarray, " k"],
         ranges_m: Float[np.ndarray, " k"],
         range_max_m: float,
-    ) -> None:
+    ) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " c"]]:
         """Mark the cells that lie before the return of the beam nearest to them; a missing return is free floor.
 
-        One that was lost is not (`Scan.shown_m`).
+        One that was lost is not (`Scan.shown_m`). Returns rows and columns of the cells that were not seen before.
         """
         row, column = self._unseen_around(pose_world, range_max_m)
         dx, dy = self._x[column] - pose_world[0], self._y[row] - pose_world[1]
@@ -65,6 +69,7 @@ class Floor:
         # Beyond the last beam of less than a full turn nothing is seen.
         visible = (beam < len(reach)) & (np.hypot(dx, dy) <= reach[np.minimum(beam, len(reach) - 1)])
         self.seen[row[visible], column[visible]] = True
+        return row[visible], column[visible]
 
 
 @lru_cache(maxsize=4)
@@ -113,14 +118,30 @@ def swept(
     poses_world: Float[np.ndarray, "s 3"],
     bearings_rad: Float[np.ndarray, " k"],
     ranges_m: Float[np.ndarray, "s k"],
-) -> float:
-    """Return the share of the visible floor that scans at these true poses of the body have seen."""
+) -> Float[np.ndarray, " s"]:
+    """Return the share of the visible floor that scans at these true poses of the body have seen, up to each."""
     target = visible_floor(world, config)
     floor = Floor(world.floor)
     finder = RangeFinder(world.faces, config.lidar) if config.faults.dropout > 0.0 else None
+    news = []
     for pose, ranges in zip(scanner_poses(poses_world, config.true_scanner), ranges_m, strict=True):
         if finder is not None:
             # A beam without a valid return shows nothing, however many of its neighbours are missing too.
             ranges = np.where(np.isposinf(ranges) & np.isfinite(finder.cast(pose)[0]), np.nan, ranges)
-        floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
-    return int(np.count_nonzero(floor.seen & target)) / max(int(np.count_nonzero(target)), 1)
+        new = floor.look(pose, bearings_rad, ranges, config.lidar.range_max_m)
+        news.append(np.count_nonzero(target[new]))
+    return np.cumsum(news) / max(int(np.count_nonzero(target)), 1)
+
+
+def soon(
+    shares: Float[np.ndarray, " s"], time_s: Float[np.ndarray, " s"], path_length_m: Float[np.ndarray, " s"]
+) -> dict[str, float | int | None]:
+    """Return time, s, path length, m, and number of scans until each of `PERCENTS` was seen; None if it never was."""
+    found: dict[str, float | int | None] = dict.fromkeys(SOON)
+    for percent in PERCENTS:
+        reached = np.flatnonzero(shares >= percent / 100)
+        if len(reached):
+            k = int(reached[0])
+            values = (float(time_s[k]), float(path_length_m[k]), k + 1)
+            found |= zip((key for key in SOON if f"_{percent}_" in key), values, strict=True)
+    return found

@@ -14,6 +14,7 @@ from chainslam.sim.worlds import Contour, World
 from ...scenario import Scenario
 from ..association import Votes
 from ..innovations import innovation_scores
+from ..maps.swept import SOON
 from ..records import Log
 from ..summary import Ending, range_scores, run_keys, spread_ms
 from ..truth import Truth
@@ -88,7 +89,7 @@ def summarise_unwitnessed(scenario: Scenario, log: Log, votes: Votes, step: Step
         "duplicate_lines": len(doubles(walls.ends_world[established])),
         "merges": votes.merges,
         "distances": {},
-        **dict.fromkeys(WITNESSED.split()),
+        **dict.fromkeys((*WITNESSED.split(), *SOON)),
         **innovation_scores(log),
         **range_scores(step, log),
         "step_ms": spread_ms(log.seconds),

@@ -83,7 +83,7 @@ def test_a_campaign_of_one_strategy_that_only_replays_has_no_empty_parts(tmp_pat
     page = campaign_page(run(tmp_path / "replays", campaign))
     titles = {name for name, table in page.tables.items() if table.rows}
     assert {"estimators", "costs", "stated replay-own"} <= titles
-    assert {"strategies", "interaction", "marks", "cells", "hypothesis"}.isdisjoint(titles)
+    assert {"strategies", "explored", "interaction", "marks", "cells", "hypothesis"}.isdisjoint(titles)
     shown = html(page).decode()
     for empty in ("Which strategy", "At equal path lengths", "Interaction", "The same recordings"):
         assert empty not in shown

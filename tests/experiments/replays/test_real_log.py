@@ -13,6 +13,7 @@ from chainslam.experiments.commands.cli import main
 from chainslam.experiments.replays import real_log
 from chainslam.experiments.replays.real_log import RealOptions, read_real_run
 from chainslam.experiments.scenario import TrialConfig
+from chainslam.experiments.scoring.maps.swept import SOON
 from chainslam.slam.geometry.lines import directions, normals
 from chainslam.viz.timeline.blueprints import comparison, one_run
 from chainslam.viz.timeline.layers.sights import UNITS_PER_M
@@ -101,7 +102,7 @@ def test_the_summary_has_every_key_of_a_run_and_null_for_what_only_the_truth_tel
     assert main(["explore", "paper-fig4", "--max-steps", "3", "--out", str(tmp_path)]) == 0
     ours, theirs = (json.loads((f / "summary.json").read_text()) for f in (tmp_path, replayed / "out" / "full-ekf"))
     assert ours.keys() == theirs.keys()
-    for key in ("pose_rmse_m", "pose_anees", "map_anees", "coverage", "swept", "false_matches", "collisions"):
+    for key in ("pose_rmse_m", "pose_anees", "map_anees", "coverage", "swept", *SOON, "false_matches", "collisions"):
         assert theirs[key] is None
     assert theirs["status"] == "complete"
     assert theirs["lines"] >= 3

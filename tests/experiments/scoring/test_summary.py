@@ -9,6 +9,7 @@ from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
 from chainslam.experiments.scoring.maps.coverage import alignment
+from chainslam.experiments.scoring.maps.swept import SOON
 from chainslam.experiments.scoring.records import Sketch
 from chainslam.experiments.scoring.summary import Ending, nees_of_poses, pose_nees_from_start
 from chainslam.explore.goal import GivenUp, SetAside
@@ -243,3 +244,12 @@ def test_the_distance_of_two_names_has_the_deviation_of_the_walls_along_it(run, 
     # Each wall is known at its middle, 2.5 m from the corner, and turns about it by its own alpha.
     assert found["sigma_m"] == pytest.approx(np.sqrt(2 * 1e-4 * (1.0 + 2.5**2)))
     assert replace(straight, joint=None).summary()["distances"]["A-B"]["sigma_m"] is None
+
+
+def test_how_soon_the_floor_is_seen_is_on_the_clock_and_the_path_of_the_log(run):
+    """Scans without a return show all within 4 m: 86, 97 and 100 % of the square after each."""
+    assert {run.summary()[key] for key in SOON} == {None}
+    true = np.array([[1.0, 1.0, 0.0], [2.5, 1.0, 0.0], [4.0, 4.0, 0.0]])
+    found = replace(run, log=log_of(true_world=true, ranges_m=np.full((3, 36), np.inf))).summary()
+    assert [found[key] for key in SOON] == [1.0, 0.1, 2, 2.0, 0.25, 3]
+    assert found["swept"] == pytest.approx(1.0, abs=1e-3)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapely
 
-from chainslam.experiments.scoring.maps.swept import CELL_M, Floor, swept, visible_floor
+from chainslam.experiments.scoring.maps.swept import CELL_M, SOON, Floor, soon, swept, visible_floor
 from chainslam.sim.faults import FaultsConfig
-from chainslam.sim.lidar import RangeFinder
+from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.sim.robot import RobotConfig
 from chainslam.sim.worlds import World
 
@@ -99,14 +99,61 @@ def test_the_swept_share_is_of_what_can_be_seen_and_only_grows():
         floor.look(pose, finder.bearings_rad, ranges[k], config.lidar.range_max_m)
         seen |= floor.seen
         shares.append(np.sum(seen & target) / np.sum(target))
-        assert swept(world, config, poses[: k + 1], finder.bearings_rad, ranges[: k + 1]) == pytest.approx(shares[-1])
+    assert swept(world, config, poses, finder.bearings_rad, ranges) == pytest.approx(shares)
     assert 0.4 < shares[0] < shares[1] < shares[2] <= 1.0
+
+
+def in_sight(points, others, range_m):
+    """Whether a straight line in the room joins each of the points with each of the others, within range."""
+    ends = np.broadcast_arrays(points[:, None], others[None])
+    lines = shapely.linestrings(np.stack(ends, axis=2))
+    return (shapely.length(lines) <= range_m) & shapely.covers(ROOM, lines)
+
+
+def test_how_soon_the_floor_is_seen_agrees_with_lines_of_sight_on_a_grid_of_its_own():
+    """Ten centimetres a point; what can be seen is in sight of some place of the body's middle."""
+    shapely.prepare(ROOM)
+    world = World("room", shapely.geometry.polygon.orient(ROOM), POSE, {})
+    config = RobotConfig(radius_m=0.2, lidar=LidarConfig(beams=1440, range_max_m=1.0))
+    corners = np.array([[1.5, -0.7], [3.5, -0.7], [3.5, -1.75], [1.5, -1.75]])
+    path = shapely.LinearRing(corners)
+    way = np.arange(0.0, 0.97 * path.length, 0.1)
+    poses = np.column_stack([shapely.get_coordinates(shapely.line_interpolate_point(path, way)), 0.3 * way])
+    finder = RangeFinder(world.faces, config.lidar)
+    ranges = np.array([finder.cast(pose)[0] for pose in poses])
+    shares = swept(world, config, poses, finder.bearings_rad, ranges)
+
+    x, y = np.meshgrid(np.arange(1.03, 4.0, 0.1), np.arange(-1.97, 0.0, 0.1))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    points = points[shapely.contains_xy(ROOM, points[:, 0], points[:, 1])]
+    places = points[shapely.distance(ROOM.boundary, shapely.points(points)) >= 0.2]
+    can_be_seen = in_sight(points, places, 1.0).any(axis=1)
+    seen = np.logical_or.accumulate(in_sight(poses[:, :2], points[can_be_seen], 1.0), axis=0)
+    expected = seen.mean(axis=1)
+
+    assert shares == pytest.approx(expected, abs=0.02)
+    assert (np.diff(shares) >= 0.0).all()
+    assert shares[0] < 0.5 < 0.99 <= shares[-1]
+    found = soon(shares, 2.0 * way, way)
+    for percent in (90, 99):
+        k = found[f"swept_{percent}_steps"] - 1
+        assert (found[f"swept_{percent}_s"], found[f"swept_{percent}_m"]) == (2.0 * way[k], way[k])
+        assert abs(k - np.argmax(expected >= percent / 100)) <= 2
+
+
+def test_time_path_and_scans_are_those_of_the_first_scan_that_reaches_a_share():
+    time_s, path_m = np.array([0.1, 1.0, 2.5, 2.5]), np.array([0.0, 0.3, 0.4, 0.6])
+    found = soon(np.array([0.5, 0.9, 0.95, 0.99]), time_s, path_m)
+    assert [found[key] for key in SOON] == [1.0, 0.3, 2, 2.5, 0.6, 4]
+    found = soon(np.array([0.5, 0.89, 0.9, 0.989]), time_s, path_m)
+    assert [found[key] for key in SOON] == [2.5, 0.4, 3, None, None, None]
+    assert set(soon(np.zeros(4), time_s, path_m).values()) == {None}
 
 
 def test_where_the_body_does_not_fit_nothing_can_be_seen_or_swept():
     world = World("slit", shapely.box(0.0, 0.0, 5.0, 0.3), np.array([1.0, 0.15, 0.0]), {})
     assert not visible_floor(world, RobotConfig()).any()
-    assert swept(world, RobotConfig(), POSE[None], np.linspace(-1.0, 1.0, 9), np.ones((1, 9))) == 0.0
+    assert swept(world, RobotConfig(), POSE[None], np.linspace(-1.0, 1.0, 9), np.ones((1, 9))) == [0.0]
 
 
 @pytest.mark.parametrize("pose", [POSE, np.array([3.6, -0.3, 2.0]), np.array([1.2, -1.9, -1.0])])
@@ -140,7 +187,7 @@ def test_beams_that_a_scanner_lost_show_nothing_however_many_are_lost_together()
     lost = np.where(ranges < 1.2, np.inf, ranges)
     assert 20 < np.count_nonzero(np.isposinf(lost)) < 120
     scores = [
-        swept(world, RobotConfig(faults=faults), POSE[None], finder.bearings_rad, each[None])
+        swept(world, RobotConfig(faults=faults), POSE[None], finder.bearings_rad, each[None])[-1]
         for faults, each in ((FaultsConfig(), lost), (LOSING, lost), (LOSING, np.where(ranges < 1.2, np.nan, ranges)))
     ]
     assert scores[0] > 1.2 * scores[1]
