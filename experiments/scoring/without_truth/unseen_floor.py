@@ -1,7 +1,7 @@
 """How much floor an explorer has not seen, by its occupancy grid alone, as an upper bound that holds with 95 %.
 
 The bound is a split-conformal quantile: in plans that were explored for it, the share of unseen floor was held against
-the length of the border between known and unknown floor (`studies.exploration.unseen_floor`). It holds in buildings
+the length of the border between known and unknown floor (`studies.plans.unseen_floor`). It holds in buildings
 that are like those plans, whoever explores them.
 """
 

@@ -1,7 +1,7 @@
 """How much floor is unseen at most, at 95 %: the bound of `unseen_floor.json`, and whether it holds in other plans.
 
-.venv/bin/python -m studies.exploration.unseen_floor --plans DIR              # by the stored bound
-.venv/bin/python -m studies.exploration.unseen_floor --plans DIR --calibrate  # store the bound of the even plans
+.venv/bin/python -m studies.plans.unseen_floor --plans DIR              # by the stored bound
+.venv/bin/python -m studies.plans.unseen_floor --plans DIR --calibrate  # store the bound of the even plans
 """
 
 from collections.abc import Sequence
