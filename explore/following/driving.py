@@ -132,12 +132,11 @@ def motions_of(config: DrivingConfig) -> tuple[tuple[MotionCommand, ...], Motion
     forward, turn = np.array([[each.forward_m, each.turn_rad] for each in commands]).T
     places = np.array([[arc(s * f, s * t) for s in ON_THE_WAY] for f, t in zip(forward, turn, strict=True)])
     wheel_m = np.abs(forward) * np.where(forward < 0.0, config.back, 1.0) + 0.5 * robot.wheels.base_m * np.abs(turn)
-    clear_m = config.clear_m + config.clear_share * np.maximum(
-        np.abs(forward), 0.5 * robot.wheels.base_m * np.abs(turn)
-    )
-    if robot.outline_m is not None:
+    error_m: float | Float[np.ndarray, " a"] = config.clear_m
+    if robot.outline_m is not None:  # errors of returns and of the turn are independent
         slip = [np.sqrt(robot.wheels.over_arc(f, t).cov[2, 2]) for f, t in zip(forward, turn, strict=True)]
-        clear_m += SWING_SIGMAS * (robot.radius_m - robot.half_width_m) * np.array(slip)
+        error_m = np.hypot(error_m, SWING_SIGMAS * (robot.radius_m - robot.half_width_m) * np.array(slip))
+    clear_m = error_m + config.clear_share * np.maximum(np.abs(forward), 0.5 * robot.wheels.base_m * np.abs(turn))
     step_m, turn_m = config.step_cost_m, 0.5 * robot.wheels.base_m
     motions = Motions(
         places=places,

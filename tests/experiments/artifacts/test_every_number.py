@@ -14,6 +14,7 @@ HERE = Path(__file__).parents[1]
 BY_HAND = (
     *(f"scoring/test_{name}" for name in ("summary", "map_nees", "step_table", "innovations", "range_scores")),
     "artifacts/test_products",
+    "scoring/maps/test_swept",
     *(f"campaign/scores/test_{name}" for name in ("score", "path_scores")),
     *(
         f"campaign/comparison/test_{name}"

@@ -144,7 +144,10 @@ def test_how_soon_the_floor_is_seen_agrees_with_lines_of_sight_on_a_grid_of_its_
 def test_time_path_and_scans_are_those_of_the_first_scan_that_reaches_a_share():
     time_s, path_m = np.array([0.1, 1.0, 2.5, 2.5]), np.array([0.0, 0.3, 0.4, 0.6])
     found = soon(np.array([0.5, 0.9, 0.95, 0.99]), time_s, path_m)
-    assert [found[key] for key in SOON] == [1.0, 0.3, 2, 2.5, 0.6, 4]
+    assert found == {
+        "swept_90_s": 1.0, "swept_90_m": 0.3, "swept_90_steps": 2,
+        "swept_99_s": 2.5, "swept_99_m": 0.6, "swept_99_steps": 4,
+    }  # fmt: skip
     found = soon(np.array([0.5, 0.89, 0.9, 0.989]), time_s, path_m)
     assert [found[key] for key in SOON] == [2.5, 0.4, 3, None, None, None]
     assert set(soon(np.zeros(4), time_s, path_m).values()) == {None}
