@@ -19,6 +19,7 @@ SAID = {
     "irsim_robot": "complete: 12 walls",
     "mujoco_robot": "complete: 12 walls",
     "read_results": "wall 1:",
+    "policy": "of the contour mapped",
     "cluster_campaign": "full-ekf",
 }
 NEEDS_ROS = {"ros_node"}
