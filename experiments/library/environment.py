@@ -28,7 +28,7 @@ from chainslam.slam.robot import MotionCommand, Odometry, Robot, Scan
 from ..artifacts.settings import settings_of
 from ..scenario import KNOWN, Scenario, build, check, load_world
 from ..scoring.maps.coverage import sample
-from ..scoring.maps.information import Ruler, thinned
+from ..scoring.maps.information import PITCH_M, Ruler
 from ..scoring.truth import truth_of
 from .asked import asked_trial
 
@@ -38,8 +38,6 @@ RANDOM = "random"
 """In place of a world: another random building in each episode."""
 CELL_M = 0.1
 """Side of a cell of the observed floor."""
-EVERY = 5
-"""Every fifth sample of the contour is measured, one for 0.1 m of it."""
 REST = MotionCommand(0.0, 0.0)
 
 
@@ -208,8 +206,7 @@ class Exploration(gymnasium.Env[dict[str, Any], np.ndarray]):
 def _ruler(scenario: Scenario) -> Ruler:
     """Return what the map of an episode is measured by."""
     robot = scenario.config.robot
-    samples = sample(truth_of(scenario.world, robot))
-    return Ruler(thinned(samples, EVERY), robot.lidar.range_max_m)
+    return Ruler(sample(truth_of(scenario.world, robot), PITCH_M), robot.lidar.range_max_m)
 
 
 def _floor_about(

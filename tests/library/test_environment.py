@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import chainslam.gym  # noqa: F401 (registers the environment)
 from chainslam.experiments.library.environment import CELL_M, FREE, OCCUPIED, Exploration
 from chainslam.experiments.scoring.maps.coverage import sample
-from chainslam.experiments.scoring.maps.information import WRONG_SHARE, Ruler, thinned
+from chainslam.experiments.scoring.maps.information import PITCH_M, WRONG_SHARE, Ruler
 from chainslam.experiments.scoring.truth import truth_of
 from chainslam.experiments.usage import UsageError
 from chainslam.sim.robot import RobotConfig
@@ -55,7 +55,7 @@ def map_of(truth, errors, cov, extents=None):
 
 
 def ruler_of(truth):
-    return Ruler(thinned(sample(truth), 5), RANGE_M)
+    return Ruler(sample(truth, PITCH_M), RANGE_M)
 
 
 def test_a_true_covariance_earns_most():

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import gammaincinv
 
 from chainslam.slam.estimation.gates import gate_level
@@ -71,12 +71,21 @@ def pooled_dof(scores: Sequence[Score]) -> float:
 
 
 def _share_of_one_draw(w: Float[np.ndarray, " n"]) -> float:
+    return min(lasting(w, 2), float(len(w))) / len(w)
+
+
+def lasting(w: Float[np.ndarray, " n"], power: int) -> float:
+    """Return 1 + 2 sum_k (1 - k/n) rho(k)^power of a series, to the first lag at which rho is not positive."""
     n = len(w)
     rho = autocorrelation(w)[1:]
     ends = np.flatnonzero(rho <= 0.0)
     most = int(ends[0]) if len(ends) else n - 1
-    weights = 1.0 - np.arange(1, most + 1) / n
-    return min(1.0 + 2.0 * float(np.sum(weights * rho[:most] ** 2)), float(n)) / n
+    return 1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, most + 1) / n) * rho[:most] ** power))
+
+
+def evenly(count: int, most: int) -> Int[np.ndarray, " k"]:
+    """Return so many rows of a series at most, evenly chosen."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def autocorrelation(w: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

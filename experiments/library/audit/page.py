@@ -17,7 +17,7 @@ from chainslam.viz.text import NONE
 
 from ...views.numbers import estimated, number, percent
 from .audited import Audited
-from .draws import LEVELS
+from .draws import LEVELS, evenly
 from .geometry.kinds import parts
 from .verdicts import Pair, Pooled
 
@@ -122,7 +122,7 @@ def _curves(found: Sequence[Audited]) -> tuple[PagePicture, ...]:
     shown = found[:MOST_CURVES]
     curves = []
     for rank, each in enumerate(shown):
-        rows = _thinned(len(each.time_s))
+        rows = evenly(len(each.time_s), MOST_POINTS)
         band = np.tile(np.array(chi2_band(each.errors.shape[1]))[:, None], len(rows))
         nees = np.maximum(each.nees[rows], 1e-6)
         curves.append(NeesCurve(each.name, each.time_s[rows] - found[0].time_s[0], nees, band, None, colour(rank)))
@@ -131,7 +131,7 @@ def _curves(found: Sequence[Audited]) -> tuple[PagePicture, ...]:
 
 
 def _section(each: Audited, rank: int) -> Section:
-    rows = _thinned(len(each.time_s))
+    rows = evenly(len(each.time_s), MOST_POINTS)
     sigmas = np.sqrt(np.einsum("nii->ni", each.covs[rows]))
     scale = np.repeat([1.0, degrees(1.0)], [len(sigmas[0, part]) for part in parts(sigmas.shape[1])])
     names = AXES[each.frame] if each.turn == "heading" else AXES_IN_SPACE[each.frame]
@@ -166,8 +166,3 @@ def _lags(each: Audited) -> PageTable:
 def colour(rank: int) -> str:
     """Return the colour of the curve of a rank."""
     return palette.of_rank(TURNS[rank % len(TURNS)])
-
-
-def _thinned(count: int) -> np.ndarray:
-    """Return rows of a curve, evenly chosen."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(np.int64))

@@ -36,12 +36,12 @@ class Samples:
     rings: Int[np.ndarray, " p"]
 
 
-def sample(truth: Truth) -> Samples:
-    """Return the reachable contour as points every 0.02 m or less; within the fence, where there is one."""
+def sample(truth: Truth, pitch_m: float = PITCH_M) -> Samples:
+    """Return the reachable contour as points at most so far apart, m; within the fence, where there is one."""
     pieces = truth.contour.segments
     along = pieces[:, 1] - pieces[:, 0]
     lengths = np.hypot(along[:, 0], along[:, 1])
-    counts = np.maximum(np.ceil(lengths / PITCH_M).astype(int), 1)
+    counts = np.maximum(np.ceil(lengths / pitch_m).astype(int), 1)
     piece = np.repeat(np.arange(len(pieces)), counts)
     share = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece] + 0.5) / counts[piece]
     points, fence = pieces[piece, 0] + share[:, None] * along[piece], truth.world.fence

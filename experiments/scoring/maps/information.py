@@ -12,6 +12,9 @@ from chainslam.slam.map.stochastic_map import StochasticMap
 from .coverage import NEAR_NOISY_M, Samples
 
 PITCH_M = 0.1
+"""Largest distance of the points at which the contour is measured."""
+BEYOND_M = 0.1
+"""A point this far beyond the end of a wall is still predicted by it."""
 AGREES = float(np.cos(np.pi / 4.0))
 WRONG_SHARE = 0.01
 """Probability that a wall is somewhere else altogether; bounds what one mistake costs."""
@@ -50,7 +53,7 @@ class Ruler:
         from_anchor = samples.points_world[:, None] - belief.anchors[kept]
         off = np.vecdot(from_anchor, normals(alpha)) - d
         along = np.vecdot(from_anchor, directions(alpha))
-        beside = (along > walls.extents[kept, 0] - PITCH_M) & (along < walls.extents[kept, 1] + PITCH_M)
+        beside = (along > walls.extents[kept, 0] - BEYOND_M) & (along < walls.extents[kept, 1] + BEYOND_M)
         near: Bool[np.ndarray, "p w"] = beside & (samples.normals_world @ normals(alpha).T > AGREES)
         gap = np.where(near, np.abs(off), np.inf)
         wall = np.argmin(gap, axis=1)
@@ -61,13 +64,6 @@ class Ruler:
         nats = np.log(self.prior_m * ((1.0 - WRONG_SHARE) * _density(error, var) + WRONG_SHARE / self.prior_m))
         length = samples.length_m
         return MapInformation(float(nats @ length[has]), float(length[has].sum() / length.sum()))
-
-
-def thinned(samples: Samples, every: int) -> Samples:
-    """Return every n-th sample of the contour, each standing for a piece n times as long."""
-    at = slice(every // 2, None, every)
-    length = samples.length_m[at] * (samples.length_m.sum() / samples.length_m[at].sum())
-    return Samples(samples.points_world[at], samples.normals_world[at], length, samples.rings[at])
 
 
 def _covariances(walls: StochasticMap, rows: np.ndarray) -> Float[np.ndarray, "w 2 2"]:

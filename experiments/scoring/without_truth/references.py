@@ -58,17 +58,21 @@ def read_path(path: Path) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, "r
     return rows[order, 0], np.column_stack([rows[:, 1:3], wrap(headings)])[order]
 
 
-def _table(path: Path, widths: tuple[int, ...], what: str) -> Float[np.ndarray, "n w"]:
-    """Return the numbers of a text file, the same count on each line; lines that begin with # are comments."""
-    rows: list[list[float]] = []
+def lines_of(path: Path, what: str) -> list[str]:
+    """Return the lines of a text file in which `what` is expected; raises UsageError if it cannot be read."""
     try:
         if regular(path).stat().st_size > MOST_BYTES:
             raise UsageError(f"expected {what}, found {path.name} of more than {MOST_BYTES >> 20} MiB: name another")
-        lines = path.read_text(encoding="latin-1").splitlines()
+        return path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise UsageError(f"expected {what}, found {path.name} ({reason}): name a file that exists") from error
-    for number, line in enumerate(lines, 1):
+
+
+def _table(path: Path, widths: tuple[int, ...], what: str) -> Float[np.ndarray, "n w"]:
+    """Return the numbers of a text file, the same count on each line; lines that begin with # are comments."""
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines_of(path, what), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from chainslam.sim.logs.archive import regular
 from chainslam.slam.evaluation.consistency import chi2_band
 from chainslam.slam.geometry.poses import wrap
 
+from ....scoring.without_truth.references import lines_of
 from ....usage import UsageError
 from ....views.numbers import number
 from .linear import Graph, linearised, pair_covs_of
-from .stated import MOST_BYTES, Stated, symmetric
+from .stated import Stated, symmetric
 
 VERTEX, EDGE, FIX = "VERTEX_SE2", "EDGE_SE2", "FIX"
 COLUMNS = {VERTEX: 4, EDGE: 11}
@@ -53,15 +53,8 @@ def _of_edges(residual: float, dof: int) -> str:
 
 def graph_at(path: Path) -> Graph:
     """Read a graph in the plane; raises UsageError."""
-    expected = f"expected {VERTEX} and {EDGE} lines in {path}"
-    try:
-        if regular(path).stat().st_size > MOST_BYTES:
-            raise UsageError(f"{expected}, found more than {MOST_BYTES >> 20} MiB: name another")
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise UsageError(
-            f"{expected}, found {error.strerror or type(error).__name__}: name a file that exists"
-        ) from error
+    what = f"{VERTEX} and {EDGE} lines"
+    expected, lines = f"expected {what} in {path}", lines_of(path, what)
     rows: dict[str, list[list[float]]] = {VERTEX: [], EDGE: []}
     fixed, others = [], dict[str, int]()
     for at, line in enumerate(lines, 1):

@@ -10,17 +10,16 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M
 from chainslam.slam.geometry.poses import wrap
 
 from ....artifacts.saved import read_summary
+from ....scoring.without_truth.references import lines_of
 from ....usage import UsageError
 
 Frame = Literal["additive", "body", "world"]
 Space = Literal["plane", "space"]
 PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
-MOST_BYTES = 2**28
 PLANE_TO_SPACE = (0, 1, 5)
 """Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
 UNIT = 0.02
@@ -237,14 +236,8 @@ def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarra
 
 def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
     """Return the header of a text file, if it has one, and its numbers; raises UsageError."""
-    expected = f"expected a trajectory ({FORMATS}; or CSV with named columns)"
-    try:
-        if regular(path).stat().st_size > MOST_BYTES:
-            raise UsageError(f"{expected}, found {path} of more than {MOST_BYTES >> 20} MiB: name another")
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise UsageError(f"{expected}, found {path} ({reason}): name a file that exists") from error
+    what = f"a trajectory ({FORMATS}; or CSV with named columns)"
+    lines = lines_of(path, what)
     header: list[str] | None = None
     rows: list[list[float]] = []
     for number, line in enumerate(lines, 1):
@@ -263,7 +256,7 @@ def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
             )
         rows.append([float("nan") if each is None else each for each in numbers])
     if not rows:
-        raise UsageError(f"{expected}, found no row in {path}: name another file")
+        raise UsageError(f"expected {what}, found no row in {path}: name another file")
     return header, np.array(rows)
 
 

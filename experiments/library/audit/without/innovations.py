@@ -11,7 +11,7 @@ from chainslam.slam.estimation.gates import gate_level
 from ....artifacts.files import CONFIG
 from ....artifacts.reading import read_plain, told
 from ....usage import UsageError
-from ..draws import autocorrelation
+from ..draws import lasting
 from ..reading.stated import table
 from .inner import Inner, Told
 
@@ -73,13 +73,9 @@ def effective_dof(squared: Float[np.ndarray, " n"], dof: Int[np.ndarray, " n"]) 
     the sum of their autocorrelation to the first lag at which it is not positive, and where they scatter more than a
     chi-square scaled to their mean.
     """
-    n, scale = len(squared), float(squared.sum()) / float(dof.sum())
+    scale = float(squared.sum()) / float(dof.sum())
     if not scale > 0.0:
         return float(dof.sum())
     off = (squared / scale - dof) / np.sqrt(2.0 * dof)
-    rho = autocorrelation(off)[1:]
-    ends = np.flatnonzero(rho <= 0.0)
-    most = int(ends[0]) if len(ends) else n - 1
-    longer = 1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, most + 1) / n) * rho[:most]))
     wider = max(float(np.average(off**2, weights=dof)), 1.0)
-    return max(float(dof.sum()) / (wider * longer), float(np.max(dof)))
+    return max(float(dof.sum()) / (wider * lasting(off, 1)), float(np.max(dof)))

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 from ....usage import UsageError
 from ....views.numbers import number
+from ..draws import evenly
 from ..reading.graphs import graph_at
 from ..reading.linear import Linear, optimised
 from ..suspicions import definite
@@ -95,7 +96,7 @@ def _own(linear: Linear, rows: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3 
 def _dof(linear: Linear, rows: Int[np.ndarray, " m"], whiten: Float[np.ndarray, "m 3 3"]) -> float:
     """Return the degrees of freedom of the sum of the squares of all."""
     m, total = len(rows), 0.0
-    chosen = np.unique(np.linspace(0, m - 1, min(m, MOST)).round().astype(np.int64))
+    chosen = evenly(m, MOST)
     every = linear.jacobian[_cells(rows)]
     for part in np.array_split(chosen, -(-len(chosen) // AT_ONCE)):
         cross = every @ linear.solve(linear.jacobian[_cells(rows[part])].T.toarray())

@@ -12,6 +12,7 @@ from chainslam.viz.reports.report import Page, PagePicture, PageTable, Section, 
 from chainslam.viz.text import NONE
 
 from ....views.numbers import estimated, number, percent
+from ..draws import evenly
 from ..page import MOST_POINTS, colour
 from .inner import Inner
 
@@ -57,7 +58,7 @@ def _mean(each: Inner) -> str:
 
 
 def _section(each: Inner, rank: int) -> Section:
-    rows = np.unique(np.linspace(0, len(each.at) - 1, min(len(each.at), MOST_POINTS)).round().astype(np.int64))
+    rows = evenly(len(each.at), MOST_POINTS)
     bands = {dof: chi2_band(dof) for dof in np.unique(each.dof).tolist()}
     band = np.array([bands[dof] for dof in each.dof[rows].tolist()]).T / each.dof[rows]
     curve = NeesCurve(
