@@ -36,7 +36,7 @@ def progress(
 ) -> Iterator[Callable[[Step], None]]:
     """Show steps on standard error while the block runs; quiet where that is not a terminal.
 
-    `steps` is how many are expected; without it no time left is told. `more` says what else is told, every 50 steps.
+    `steps` is how many are expected; without it no time left is told. `more` says every 50 steps what is told in place of the robot's clock.
     """
     with bar_of(title, steps, TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True))) as (bar, task):
         curved, returns, also = 0, 0, ""
@@ -49,10 +49,10 @@ def progress(
             if done == SCANS and (words := few_straight(curved, returns)):
                 bar.console.print(words)
             open_ends = sum(len(chain.open_ends) for chain in step.chains)
-            clock = timedelta(seconds=int(step.time_s))
-            if step.index % MORE_STEPS == 0:
+            if not bar.disable and step.index % MORE_STEPS == 0:
                 also = more(step)
-            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends{also}, robot clock {clock}"
+            last = also or f"robot clock {timedelta(seconds=int(step.time_s))}"
+            words = f"step {done}, {step.path_length_m:.0f} m, {open_ends} open ends, {last}"
             bar.update(task, completed=done, total=total_of(steps, done), words=words)
 
         yield watch

@@ -88,7 +88,7 @@ def unseen_now(step: Step) -> UnseenFloor | None:
 def unseen_words(step: Step) -> str:
     """Return in words how much floor is unseen at most; nothing where that is not known."""
     floor = unseen_now(step)
-    return "" if floor is None else f", at most {floor.at_most_m2:.1f} m2 unseen (95 %)"
+    return "" if floor is None else f"95 %: < {floor.at_most_m2:.1f} m2 unseen"
 
 
 def frontier_of(

@@ -1,9 +1,19 @@
 """The bar of a run, and times in words."""
 
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
 import pytest
 
 from chainslam.experiments.terminal import progress
 from chainslam.experiments.terminal.progress import EVERY_S, bar_of, duration, share_of, total_of
+from chainslam.explore.mission import explore_mission
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 
 @pytest.mark.parametrize(
@@ -28,6 +38,31 @@ def test_progress_tells_what_is_left_on_a_terminal_and_nothing_elsewhere(capsys,
     with bar_of("figures", None):
         pass
     assert "left" not in capsys.readouterr().err
+
+
+def test_what_takes_longer_than_a_step_is_asked_where_it_is_shown_and_every_fifty_steps(capsys, monkeypatch):
+    world = load("paper-fig4")
+    backend = BACKENDS["full-ekf"].make(np.array(world.start), np.diag([0.01, 0.01, 0.002]) ** 2)
+    (first,) = islice(explore_mission(SimulatedRobot(world, 1), Mapper(backend), STRATEGIES["nearest-robot"].make()), 1)
+    asked = []
+
+    def more(step):
+        asked.append(step.index)
+        return "seventeen"
+
+    for shown in (False, True):
+        if shown:
+            monkeypatch.setenv("FORCE_COLOR", "1")
+        with progress.progress("a run", None, more) as watch:
+            for index in range(101):
+                watch(replace(first, index=index))
+        assert asked == ([0, 50, 100] if shown else [])
+    told = capsys.readouterr().err
+    assert "seventeen" in told
+    assert "robot clock" not in told
+    with progress.progress("a run", None) as watch:
+        watch(first)
+    assert "robot clock 0:00:00" in capsys.readouterr().err
 
 
 def test_a_run_longer_than_expected_never_fills_its_bar():
