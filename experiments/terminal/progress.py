@@ -36,7 +36,8 @@ def progress(
 ) -> Iterator[Callable[[Step], None]]:
     """Show steps on standard error while the block runs; quiet where that is not a terminal.
 
-    `steps` is how many are expected; without it no time left is told. `more` says every 50 steps what is told in place of the robot's clock.
+    `steps` is how many are expected; without it no time left is told. `more` says every 50 steps what is told in place
+    of the robot's clock.
     """
     with bar_of(title, steps, TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True))) as (bar, task):
         curved, returns, also = 0, 0, ""
