@@ -30,6 +30,7 @@ from ..scenario import KNOWN, Scenario, build, check, load_world
 from ..scoring.maps.coverage import sample
 from ..scoring.maps.information import PITCH_M, Ruler
 from ..scoring.truth import truth_of
+from ..usage import UsageError
 from .asked import asked_trial
 
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
@@ -38,6 +39,8 @@ RANDOM = "random"
 """In place of a world: another random building in each episode."""
 CELL_M = 0.1
 """Side of a cell of the observed floor."""
+MAPPED_SHARE = 0.99
+"""Of the reachable contour: an episode is over once more is mapped."""
 REST = MotionCommand(0.0, 0.0)
 
 
@@ -104,6 +107,8 @@ class Exploration(gymnasium.Env[dict[str, Any], np.ndarray]):
         `view` is how many cells the observed floor reaches to each side, `ends` how many open ends are told. `settings`
         maps the keys of docs/reference/settings.md to values. The start is known. Raises UsageError for bad input.
         """
+        if min(view, ends) < 1:
+            raise UsageError(f"expected at least 1 for view and for ends, found {min(view, ends)}: raise it")
         named = "random:0" if world == RANDOM else str(world)
         said = {"world": named, "backend": backend, "p0": KNOWN, "max_steps": max_steps}
         self._trial = asked_trial(said, {}, None, None, None, None, [settings_of(settings or {})])
@@ -150,12 +155,16 @@ class Exploration(gymnasium.Env[dict[str, Any], np.ndarray]):
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Drive one motion, map one scan, and return the observation, the reward, and whether the episode is over.
 
-        Raises RuntimeError before the first `reset` and after the end of an episode.
+        Raises RuntimeError before the first `reset` and after the end of an episode, and ValueError for an action that
+        is not two finite numbers.
         """
-        forward, turn = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0).tolist()
-        robot = self._trial.robot
+        asked = np.asarray(action, dtype=np.float64)
+        if asked.shape != (2,) or not np.all(np.isfinite(asked)):
+            raise ValueError(f"expected an action of two finite numbers, found {action!r}: give (forward, turn)")
         if self._led is None:
             raise RuntimeError("expected an episode, found none: call reset() first")
+        forward, turn = np.clip(asked, -1.0, 1.0).tolist()
+        robot = self._trial.robot
         self._led.command = MotionCommand(
             (forward if robot.can_reverse else max(forward, 0.0)) * robot.step_m, turn * robot.turn_rad
         )
@@ -167,14 +176,11 @@ class Exploration(gymnasium.Env[dict[str, Any], np.ndarray]):
         self._told = told
         step_cost, touch_cost = self._costs
         reward = told.nat_m - before.nat_m - step_cost - touch_cost * bool(step.odometry.touched)
-        failed = step.outcome is not None
-        return (
-            self._observed(step),
-            reward,
-            failed or told.coverage > 0.99,
-            step.index >= self._trial.max_steps,
-            self._info(step),
-        )
+        terminated = step.outcome is not None or told.coverage > MAPPED_SHARE
+        truncated = step.index >= self._trial.max_steps
+        if terminated or truncated:
+            self._steps = iter(())
+        return self._observed(step), reward, terminated, truncated, self._info(step)
 
     def _observed(self, step: Step) -> dict[str, np.ndarray]:
         belief, far_m = step.map.belief, self._trial.robot.lidar.range_max_m

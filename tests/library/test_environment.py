@@ -175,5 +175,17 @@ def test_a_step_without_an_episode_and_bad_input_are_told():
         Exploration("no-such-world")
     with pytest.raises(UsageError, match="expected"):
         Exploration("paper-fig4", backend="no-such-back-end")
+    with pytest.raises(UsageError, match="view"):
+        Exploration("paper-fig4", view=0)
+    with pytest.raises(UsageError, match="ends"):
+        Exploration("paper-fig4", ends=0)
+    short = Exploration("paper-fig4", max_steps=1)
     with pytest.raises(RuntimeError, match="reset"):
-        Exploration("paper-fig4").step(np.zeros(2))
+        short.step(np.zeros(2))
+    short.reset(seed=1)
+    for wrong in ([0.1], [np.nan, 0.0], [[0.0, 0.0]]):
+        with pytest.raises(ValueError, match="two finite numbers"):
+            short.step(np.array(wrong))
+    assert short.step(np.zeros(2))[2:4] == (False, True)
+    with pytest.raises(RuntimeError, match="has ended"):
+        short.step(np.zeros(2))

@@ -64,8 +64,12 @@ def unseen_floor(
 
     Its cells are 0 where they are free, 100 where they are occupied, and -1 where they are unknown.
     `robot_rc` is the row and column of the robot, and `radius_m` that of its body. Raises ValueError if the grid has no
-    free cell within the body's radius of the robot.
+    free cell within the body's radius of the robot, or for lengths that are none.
     """
+    if not (cell_m > 0.0 and radius_m > 0.0 and np.isfinite(cell_m + radius_m)):
+        raise ValueError(
+            f"expected a cell and a body of positive size, found {cell_m:g} and {radius_m:g} m: correct them"
+        )
     seen_m2, frontier_m = frontier_of(grid, cell_m, robot_rc, radius_m)
     told = UnseenFloor(0.0, seen_m2, frontier_m)
     share = calibration().share(np.array([told.reach]))

@@ -52,6 +52,9 @@ def test_the_share_does_not_depend_on_the_unit_of_length():
 def test_a_robot_that_stands_on_no_free_floor_is_told():
     with pytest.raises(ValueError, match="free cells"):
         unseen_floor(CLOSED, CELL_M, (0, 0), 0.05)
+    for cell, radius in ((0.0, 0.2), (0.1, -0.2), (np.nan, 0.2), (0.1, np.inf)):
+        with pytest.raises(ValueError, match="positive size"):
+            unseen_floor(CLOSED, cell, (12, 12), radius)
 
 
 def test_the_stored_bound_grows_with_the_border_and_is_finite():
