@@ -8,6 +8,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+import shapely
 from gymnasium.utils.env_checker import check_env
 
 import chainslam.gym  # noqa: F401 (registers the environment)
@@ -82,7 +83,38 @@ def test_a_sure_mistake_costs_no_more_than_what_is_never_sure():
     true = truth()
     wrong = np.tile([0.0, 0.2], (len(true.faces), 1))
     found = ruler_of(true).measure(map_of(true, wrong, np.diag([1e-12, 1e-12])))
-    assert found.nat_m == pytest.approx(np.log(WRONG_SHARE) * sample(true).length_m.sum() * found.coverage, rel=0.02)
+    assert found.nat_m == pytest.approx(np.log(0.01) * sample(true).length_m.sum() * found.coverage, rel=0.02)
+
+
+def test_a_wall_half_a_metre_away_is_another_one():
+    true = truth()
+    far = np.tile([0.0, 0.5], (len(true.faces), 1))
+    assert ruler_of(true).measure(map_of(true, far, np.diag([1e-6, 1e-4]))).coverage < 0.1
+    assert ruler_of(true).samples.length_m.max() <= 0.1
+
+
+def test_the_variance_of_a_point_is_that_of_its_offset_by_differences():
+    """With correlated direction and distance, and with what is stated beyond the back end's own covariance."""
+    true, cov, more = truth(), np.array([[4e-6, 3e-6], [3e-6, 9e-6]]), np.diag([1e-6, 1e-4])
+    walls, ruler = map_of(true, np.zeros((len(true.faces), 2)), cov), ruler_of(true)
+    means, anchors = walls.belief.means, walls.belief.anchors
+
+    def information(cov):
+        total = 0.0
+        for point, normal, length in zip(
+            ruler.samples.points_world, ruler.samples.normals_world, ruler.samples.length_m, strict=True
+        ):
+            gaps = [shapely.LineString(face).distance(shapely.Point(point)) for face in true.faces]
+            row = min(np.flatnonzero(normals(means[:, 0]) @ normal > 0.9), key=lambda k: gaps[k])
+            ahead, behind = (normals(means[row, 0] + h) @ (point - anchors[row]) for h in (1e-6, -1e-6))
+            by = np.array([(ahead - behind) / 2e-6, -1.0])
+            density = np.exp(-0.0) / np.sqrt(2.0 * np.pi * (by @ cov @ by))
+            total += length * np.log(RANGE_M * (0.99 * density + 0.01 / RANGE_M))
+        return total
+
+    assert ruler.measure(walls).nat_m == pytest.approx(information(cov), rel=2e-3)
+    crooked = replace(walls, off_line_cov=np.tile(more, (len(walls), 1, 1)))
+    assert ruler.measure(crooked).nat_m == pytest.approx(information(cov + more), rel=2e-3)
 
 
 def test_what_is_tentative_or_beyond_its_extent_earns_nothing():
@@ -138,6 +170,47 @@ def test_the_floor_lies_ahead_to_the_right_of_the_picture_and_left_at_its_top(en
             hits += 1
     assert hits > 50
     assert np.all(floor[middle - 1 : middle + 1, middle - 1 : middle + 1] == FREE)
+
+
+def test_the_nearest_ends_come_first_and_all_are_counted():
+    told = []
+    for ends in (2, 40):
+        env = Exploration("paper-fig9", ends=ends)
+        env.reset(seed=1)
+        told.append([env.step(np.array([0.2, 1.0]))[0] for _ in range(5)][-1])
+    few, many = told
+    count = int(many["open_end_count"][0])
+    assert few["open_end_count"] == many["open_end_count"]
+    assert 2 < count < 40
+    assert np.all(np.diff(np.hypot(*many["open_ends"][:count].T)) >= 0.0)
+    assert not many["open_ends"][count:].any()
+    np.testing.assert_array_equal(few["open_ends"], many["open_ends"][:2])
+
+
+def test_the_start_is_known_and_a_positive_turn_is_to_the_left(env):
+    observation, _ = env.reset(seed=1)
+    np.testing.assert_allclose(observation["sigmas"], [1e-4, 1e-4, 1e-5], rtol=0.05)
+    before = observation["pose"]
+    after = env.step(np.array([0.0, 1.0]))[0]["pose"]
+    assert after[2] - before[2] == pytest.approx(np.deg2rad(10.0), abs=0.02)
+
+
+def test_a_robot_that_cannot_reverse_does_not():
+    env = Exploration("paper-fig4", settings={"robot.can_reverse": False})
+    env.reset(seed=1)
+    assert env.step(np.array([-1.0, 0.0]))[4]["path_length_m"] == 0.0
+    assert env.step(np.array([1.0, 0.0]))[4]["path_length_m"] > 0.1
+
+
+def test_a_robot_whose_scans_are_mirrored_has_failed():
+    env = Exploration("rooms", settings={"robot.faults.mirrored": True})
+    env.reset(seed=1)
+    for _ in range(30):
+        _, _, terminated, _, info = env.step(np.array([0.3, 1.0]))
+        if terminated:
+            break
+    assert terminated
+    assert "swapped" in info["words"]
 
 
 def test_a_robot_that_pushes_against_a_wall_pays():

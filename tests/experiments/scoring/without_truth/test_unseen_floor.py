@@ -1,9 +1,25 @@
 """How much floor is unseen at most: borders in drawn grids by hand, and the level of the bound by simulation."""
 
+from dataclasses import replace
+from itertools import islice
+
 import numpy as np
 import pytest
 
-from chainslam.experiments.scoring.without_truth.unseen_floor import calibrated, calibration, frontier_of, unseen_floor
+from chainslam.experiments.scoring.without_truth.unseen_floor import (
+    calibrated,
+    calibration,
+    frontier_of,
+    unseen_floor,
+    unseen_now,
+)
+from chainslam.explore.floor.free_space import FreeSpaceConfig
+from chainslam.explore.mission import MissionConfig, explore_mission
+from chainslam.explore.strategies import STRATEGIES
+from chainslam.sim.robot import SimulatedRobot
+from chainslam.sim.worlds import load
+from chainslam.slam.backends import BACKENDS
+from chainslam.slam.mapper import Mapper
 
 CELL_M = 0.1
 
@@ -33,7 +49,29 @@ def test_what_lies_behind_a_gap_narrower_than_the_body_does_not_count():
     narrow = OPEN.copy()
     narrow[5:12, 24] = 100
     assert frontier_of(narrow, CELL_M, (12, 12), 0.2)[1] == 0.0
-    assert frontier_of(OPEN, CELL_M, (12, 12), 0.8)[1] == 0.0
+    assert frontier_of(OPEN, CELL_M, (12, 12), 0.65)[1] == 0.0
+
+
+def test_cells_that_touch_at_a_corner_hang_together():
+    rows, columns = np.indices((30, 30))
+    slope = np.where(rows + columns < 30, 0, -1).astype(np.int8)
+    assert frontier_of(slope, CELL_M, (5, 5), 0.05)[1] == pytest.approx(30 * 0.1 + 28 * 0.1 + 29 * 0.1)
+    squares = np.full((20, 20), -1, dtype=np.int8)
+    squares[:10, :10] = squares[10:, 10:] = 0
+    assert frontier_of(squares, CELL_M, (2, 2), 0.05)[1] == pytest.approx(2 * 36 * 0.1)
+
+
+def test_what_lies_beyond_the_fence_is_not_to_be_seen():
+    world, told = load("paper-fig4"), []
+    x, y = world.start[:2]
+    for fence in (None, ((x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5))):
+        config = replace(MissionConfig(), free_space=FreeSpaceConfig(fence=fence))
+        backend = BACKENDS["full-ekf"].make(np.array(world.start), np.diag([0.01, 0.01, 0.002]) ** 2)
+        strategy = STRATEGIES["nearest-robot"].make()
+        (step,) = islice(explore_mission(SimulatedRobot(world, 1), Mapper(backend), strategy, config), 1)
+        told.append(unseen_now(step))
+    assert told[0].frontier_m > 1.0
+    assert told[1].frontier_m == 0.0
 
 
 def test_the_edge_of_the_grid_is_unknown_and_few_cells_are_a_gap_between_beams():
