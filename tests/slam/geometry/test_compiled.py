@@ -49,9 +49,12 @@ Kind = IntEnum("Kind", "ONE TWO")
 
 def started(folder: Path, inner: str = "x * FACTOR", constants: str = CONSTANTS, **variables: str):
     folder.mkdir(exist_ok=True)
-    (folder / "constants.py").write_text(constants)
-    (folder / "inner_kernels.py").write_text(CALLED.format(inner=inner))
-    (folder / "outer_kernels.py").write_text(CALLER)
+    files = {"constants.py": constants, "inner_kernels.py": CALLED.format(inner=inner), "outer_kernels.py": CALLER}
+    for name, content in files.items():
+        path = folder / name
+        # What another process may be reading is not written again: it would find a file cut short.
+        if not path.exists() or path.read_text() != content:
+            path.write_text(content)
     around = {
         "PYTHONPATH": f"{Path(__file__).parents[3]}:{folder}",
         "NUMBA_CACHE_DIR": str(folder / "cache"),
