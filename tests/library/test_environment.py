@@ -20,7 +20,7 @@ from chainslam.experiments.usage import UsageError
 from chainslam.sim.robot import RobotConfig
 from chainslam.sim.worlds import load
 from chainslam.slam.estimation.backend import Belief, Joint
-from chainslam.slam.geometry.lines import normals
+from chainslam.slam.geometry.lines import directions, normals
 from chainslam.slam.map.stochastic_map import StochasticMap
 
 ROOT = Path(__file__).parents[2]
@@ -33,11 +33,11 @@ def truth():
     return truth_of(world, RobotConfig())
 
 
-def map_of(truth, errors, cov, extents=None):
+def map_of(truth, errors, cov, extents=None, share=0.5):
     """Return a map with a wall for each true face, wrong by `errors` (alpha rad, d m), which states `cov` of each."""
     faces, count = truth.faces, len(truth.faces)
-    anchors = faces.mean(axis=1)
-    half = 0.5 * np.hypot(*(faces[:, 1] - faces[:, 0]).T)
+    anchors = faces[:, 0] + share * (faces[:, 1] - faces[:, 0])
+    along = np.vecdot(faces - anchors[:, None], directions(truth.lines[:, 0])[:, None])
     alpha = truth.lines[:, 0] + errors[:, 0]
     d = truth.lines[:, 1] - np.vecdot(normals(truth.lines[:, 0]), anchors) + errors[:, 1]
     means = np.stack([alpha, d], axis=-1)
@@ -51,7 +51,7 @@ def map_of(truth, errors, cov, extents=None):
 
     belief = Belief(np.zeros(3), np.eye(3) * 1e-6, np.arange(count), anchors, means, query)
     no = np.zeros(count, dtype=bool)
-    extents = np.stack([-half, half], axis=-1) if extents is None else extents
+    extents = np.sort(along, axis=1) if extents is None else extents
     return StochasticMap(belief, extents, np.full(count, 5), no, no)
 
 
@@ -96,7 +96,7 @@ def test_a_wall_half_a_metre_away_is_another_one():
 def test_the_variance_of_a_point_is_that_of_its_offset_by_differences():
     """With correlated direction and distance, and with what is stated beyond the back end's own covariance."""
     true, cov, more = truth(), np.array([[4e-6, 3e-6], [3e-6, 9e-6]]), np.diag([1e-6, 1e-4])
-    walls, ruler = map_of(true, np.zeros((len(true.faces), 2)), cov), ruler_of(true)
+    walls, ruler = map_of(true, np.zeros((len(true.faces), 2)), cov, share=0.1), ruler_of(true)
     means, anchors = walls.belief.means, walls.belief.anchors
 
     def information(cov):
