@@ -165,9 +165,7 @@ class Exploration(gymnasium.Env[dict[str, Any], np.ndarray]):
             raise RuntimeError("expected an episode, found none: call reset() first")
         forward, turn = np.clip(asked, -1.0, 1.0).tolist()
         robot = self._trial.robot
-        self._led.command = MotionCommand(
-            (forward if robot.can_reverse else max(forward, 0.0)) * robot.step_m, turn * robot.turn_rad
-        )
+        self._led.command = MotionCommand(forward * robot.step_m, turn * robot.turn_rad)
         step = next(self._steps, None)
         if step is None:
             raise RuntimeError("expected an episode that goes on, found one that has ended: call reset()")
