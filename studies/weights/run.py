@@ -99,8 +99,9 @@ def driven(
 ) -> dict[str, list[float | None]]:
     """Return the scores of each world, run by the copied source without a mechanism.
 
-    The edited source always stands at one place, by which compiled loops are found again. What was run before an
-    interruption is kept beside it. Raises UsageError where the suite ends by an error.
+    The edited source always stands at one place and has the times of the files that it was copied from: by both,
+    compiled loops are found again. What was run before an interruption is kept beside it. Raises UsageError where the
+    suite ends by an error.
     """
     source, out = folder / "edited", folder / f"{rows.fingerprint()}-{mechanism.digest}-{max_steps}.jsonl"
     shutil.rmtree(source, ignore_errors=True)
@@ -108,6 +109,7 @@ def driven(
     for edit in mechanism.edits:
         path = source / edit.path
         path.write_text(edit.applied(path.read_text()))
+        shutil.copystat(folder / "today" / edit.path, path)
     asked = ("--backend", "invariant-ekf", "--max-steps", str(max_steps), "--jobs", str(jobs), "--out", str(out))
     suite = (sys.executable, "-m", "studies.exploration.suite", *asked, "--worlds", *worlds)
     environment = os.environ | {"PYTHONPATH": str(source)}
