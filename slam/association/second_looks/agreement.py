@@ -1,4 +1,4 @@
-"""Two maps of one building laid on each other: which of their walls are one, and where that puts one map on the other."""
+"""Two maps of one building laid on each other: which of their walls are one, and where that puts one on the other."""
 
 from dataclasses import dataclass
 from functools import cached_property
