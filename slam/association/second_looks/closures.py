@@ -35,7 +35,7 @@ class Drive:
     """Scans to which the robot was carried: the first ones of later sessions."""
 
     def believed(self, config: SecondLooksConfig) -> Float[np.ndarray, "t 3 3"]:
-        """Return the covariance of each motion as it counts: scan matching states more than its error, others do not."""
+        """Return the covariance of each motion as it counts: scan matching states more than its error."""
         covs = self.covs / config.understated
         rows = np.array(self.carried, dtype=np.int64) - 1
         covs[rows] = self.covs[rows]

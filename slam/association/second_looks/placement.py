@@ -136,7 +136,7 @@ def _stretches(poses: Float[np.ndarray, "s 3"]) -> Int[np.ndarray, " k"]:
 def _rated(saved: Walls, placement: Placement, poses: Float[np.ndarray, "s 3"], rays: Rays) -> Placement:
     """Return a placement with what scans say of the saved walls there."""
     back = inverse(placement.place)
-    lines = saved.lines + [back[2], 0.0]
+    lines = saved.lines + np.array([back[2], 0.0])
     pro, contra = voted(Unknowns(poses, lines, to_world(saved.anchors, back)), saved.extents, rays, MARGIN_M)
     told = pro + contra > 1  # a single scan may see anything
     sums = (float(saved.lengths[told & which].sum()) for which in (pro > contra, pro <= contra))
@@ -157,7 +157,7 @@ def _settled(
     at: Float[np.ndarray, "3"],
     fields: Sequence[LikelihoodField],
 ) -> Placement:
-    """Return a placement by all walls at once, and then by those that both maps have; `at` is the pose that found it."""
+    """Return a placement by all walls at once, and then by those that both have; `at` is the pose that found it."""
     points, pose = to_robot(along(own.ends, FINE.cell_m), at), compose(place, at)
     for field in fields:
         pose, _ = refine(field, points, pose, FINE.step_rad, 0.1 * FINE.cell_m)

@@ -1,6 +1,7 @@
 """The log of a real robot in a building that is mapped already: placed in the saved map, and mapped on with it."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def turning(at, first_deg, last_deg):
 def drive(*ways):
     """Poses along straight ways, with a turn on the spot at each point."""
     found = []
-    for (x, y), (to_x, to_y) in zip(ways, ways[1:], strict=False):
+    for (x, y), (to_x, to_y) in pairwise(ways):
         heading = np.arctan2(to_y - y, to_x - x)
         found += turning((x, y), np.rad2deg(heading) - 180.0, np.rad2deg(heading) + 180.0)
         found += [
@@ -35,12 +36,12 @@ def drive(*ways):
 
 
 def write_log(path, faces, true, seed):
-    """Write what a scanner sees along a way, with wheels that lose a little heading; their frame is that of the start."""
+    """Write what a scanner sees along a way, and what wheels that lose a little heading say, from the start."""
     config = LidarConfig(beams=180, fov_rad=float(np.deg2rad(179.0)), range_max_m=20.0)
     finder, rng, lines = RangeFinder(faces, config), np.random.default_rng(seed), []
     for k, pose in enumerate(true):
         ranges = finder.cast(pose)[0] + rng.normal(0.0, 0.005, 180)
-        wheels = compose(inverse(true[0]), pose) + [0.0, 0.0, 0.0005 * k]
+        wheels = compose(inverse(true[0]), pose) + np.array([0.0, 0.0, 0.0005 * k])
         lines.append(" ".join(map(str, ["FLASER", 180, *ranges, *wheels, *wheels, 9e8 + 0.5 * k, "robot", 0.5 * k])))
     path.write_text("\n".join(lines) + "\n")
     return path
