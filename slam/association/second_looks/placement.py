@@ -89,11 +89,14 @@ def placements(saved: Walls, own: Walls, poses: Float[np.ndarray, "s 3"], rays: 
     first = _distinct([(rated[k], middles[k]) for k in order], SETTLED)
     fields = _fields(saved)
     settled = [_rated(saved, _settled(saved, own, each.place, at, fields), *witnesses) for each, at in first]
-    length_m = min(saved.lengths.sum(), own.lengths.sum())
-    holding = sorted((each for each in settled if each.holds(length_m)), key=lambda each: -each.net_m)
-    likely = [each for each in holding if each.net_m >= RIVAL * holding[0].net_m]
-    middle = poses[len(poses) // 2]
+    likely, middle = possible(settled, min(saved.lengths.sum(), own.lengths.sum())), poses[len(poses) // 2]
     return [each for each, _ in _distinct([(each, middle) for each in likely], SETTLED)]
+
+
+def possible(rated: Sequence[Placement], length_m: float) -> list[Placement]:
+    """Return the placements that hold for a map of that length, the likeliest first, and nearly as likely ones."""
+    holding = sorted((each for each in rated if each.holds(length_m)), key=lambda each: -each.net_m)
+    return [each for each in holding if each.net_m >= RIVAL * holding[0].net_m]
 
 
 def _distinct(
