@@ -32,8 +32,6 @@ ASKED = 200
 """So many scans, spread over the drive, are asked about a place."""
 MARGIN_M = 0.25
 """Beams that end so near a wall end on it: both maps are bent."""
-KERNELS_M = (0.2, 0.1)
-"""With kernels of these widths all walls are laid on the saved ones, one after the other."""
 SETTLED = 5
 """So many proposals are looked at closely, those first for which scans speak most."""
 SHARE = 0.75
@@ -87,8 +85,8 @@ def placements(saved: Walls, own: Walls, poses: Float[np.ndarray, "s 3"], rays: 
     rated = [_rated(saved, Placement(each, FINE.cov), *witnesses) for each in proposed]
     order = np.argsort([-each.net_m for each in rated], kind="stable")
     first = _distinct([(rated[k], middles[k]) for k in order], SETTLED)
-    fields = _fields(saved)
-    settled = [_rated(saved, _settled(saved, own, each.place, at, fields), *witnesses) for each, at in first]
+    field = _field(saved)
+    settled = [_rated(saved, _settled(saved, own, each.place, at, field), *witnesses) for each, at in first]
     likely, middle = possible(settled, min(saved.lengths.sum(), own.lengths.sum())), poses[len(poses) // 2]
     return [each for each, _ in _distinct([(each, middle) for each in likely], SETTLED)]
 
@@ -146,11 +144,11 @@ def _rated(saved: Walls, placement: Placement, poses: Float[np.ndarray, "s 3"], 
     return Placement(placement.place, placement.cov, placement.pairs, placement.chi2, *sums)
 
 
-def _fields(saved: Walls) -> list[LikelihoodField]:
+def _field(saved: Walls) -> LikelihoodField:
     points = along(saved.ends, 0.5 * FINE.cell_m)
     low, high = points.min(axis=0), points.max(axis=0)
     half_m = 0.5 * float((high - low).max()) + 1.0
-    return [field_of(points, 0.5 * (low + high), half_m, FINE.cell_m, kernel_m, 4) for kernel_m in KERNELS_M]
+    return field_of(points, 0.5 * (low + high), half_m, FINE.cell_m, FINE.cell_m, 4)
 
 
 def _settled(
@@ -158,12 +156,11 @@ def _settled(
     own: Walls,
     place: Float[np.ndarray, "3"],
     at: Float[np.ndarray, "3"],
-    fields: Sequence[LikelihoodField],
+    field: LikelihoodField,
 ) -> Placement:
     """Return a placement by all walls at once, and then by those that both have; `at` is the pose that found it."""
-    points, pose = to_robot(along(own.ends, FINE.cell_m), at), compose(place, at)
-    for field in fields:
-        pose, _ = refine(field, points, pose, FINE.step_rad, 0.1 * FINE.cell_m)
+    points = to_robot(along(own.ends, FINE.cell_m), at)
+    pose, _ = refine(field, points, compose(place, at), FINE.step_rad, 0.1 * FINE.cell_m)
     place = compose(pose, inverse(at))
     found = agreed(saved, own, place, about(FINE.cov, place, at[:2]))
     return Placement(found.place, found.cov, found.pairs, found.chi2)

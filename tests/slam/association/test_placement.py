@@ -7,7 +7,7 @@ import pytest
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.association.second_looks import placement
-from chainslam.slam.association.second_looks.agreement import Walls
+from chainslam.slam.association.second_looks.agreement import Agreement, Walls
 from chainslam.slam.association.second_looks.placement import Placement, placements, possible
 from chainslam.slam.association.second_looks.refuted import Rays, refuted, voted
 from chainslam.slam.association.second_looks.solve import Unknowns
@@ -123,3 +123,31 @@ def test_a_vote_of_a_single_scan_tells_nothing():
         walls_of(CROOKED), Placement(PLACE, np.eye(3)), poses[:2], Rays(rays.scans[:2], rays.scanner)
     )
     assert both.pro_m > 0.0
+
+
+def test_stretches_are_evenly_spread_along_the_path_however_slowly_it_was_driven():
+    x = np.concatenate([np.full(50, 0.0), np.linspace(0.0, 16.0, 1601)])
+    poses = np.column_stack([x, np.zeros((len(x), 2))])
+    np.testing.assert_allclose(poses[placement._stretches(poses), 0], np.arange(16) + 0.5, atol=0.02)
+
+
+def test_a_stretch_without_walls_nearby_proposes_nothing():
+    saved = walls_of(CROOKED)
+    assert placement._proposed(saved, saved, np.array([[90.0, 0.0, 0.0]])) == ([], [])
+    assert len(placement._proposed(saved, saved, np.array([[1.0, 1.0, 0.0]]))[1])
+
+
+def test_a_place_is_known_at_first_as_the_pose_that_found_it(monkeypatch):
+    """To a cell and a step there: the frame's origin, 30 m away, by its lever."""
+    saved, asked = walls_of(CROOKED), []
+    monkeypatch.setattr(
+        placement, "agreed", lambda *words: asked.append(words) or Agreement(words[2], words[3], 0, 0.0)
+    )
+    place, at = np.array([-30.0, 0.0, 0.0]), np.array([31.0, 1.0, 0.0])
+    own = walls_of(to_world(CROOKED, inverse(place)))
+    found = placement._settled(saved, own, place, at, placement._field(saved))
+    np.testing.assert_allclose(found.place, place, atol=0.02)
+    ((_, _, _, cov),) = asked
+    move = np.eye(3)
+    move[:2, 2] = [1.0, 31.0]
+    np.testing.assert_allclose(move @ cov @ move.T, np.diag([0.1, 0.1, placement.FINE.step_rad]) ** 2, atol=1e-6)
