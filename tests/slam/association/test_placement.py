@@ -140,14 +140,12 @@ def test_a_stretch_without_walls_nearby_proposes_nothing():
 def test_a_place_is_known_at_first_as_the_pose_that_found_it(monkeypatch):
     """To a cell and a step there: the frame's origin, 30 m away, by its lever."""
     saved, asked = walls_of(CROOKED), []
-    monkeypatch.setattr(
-        placement, "agreed", lambda *words: asked.append(words) or Agreement(words[2], words[3], 0, 0.0)
-    )
+    monkeypatch.setattr(placement, "agreed", lambda *given: asked.append(given) or Agreement(*given[2:], 0, 0.0))
     place, at = np.array([-30.0, 0.0, 0.0]), np.array([31.0, 1.0, 0.0])
     own = walls_of(to_world(CROOKED, inverse(place)))
     found = placement._settled(saved, own, place, at, placement._field(saved))
     np.testing.assert_allclose(found.place, place, atol=0.02)
     ((_, _, _, cov),) = asked
     move = np.eye(3)
-    move[:2, 2] = [1.0, 31.0]
+    move[:2, 2] = [-1.0, 31.0]
     np.testing.assert_allclose(move @ cov @ move.T, np.diag([0.1, 0.1, placement.FINE.step_rad]) ** 2, atol=1e-6)
