@@ -62,8 +62,6 @@ def _saved(folder: Path, run: RealRun) -> tuple[dict[str, np.ndarray], RecordedL
             f"expected a map made with the same scanner, found one of {len(recording.bearings_rad)} beams in {folder},"
             f" and {len(ours.bearings_rad)} in {run.name}: name another map"
         )
-    if not np.all(np.isfinite(arrays["cov"])):
-        raise UsageError("expected a map with its joint covariance, found one whose estimate was lost: name another")
     firm = np.flatnonzero(~arrays["tentative"])
     if not len(firm):
         raise UsageError(f"expected a map with walls, found none in {folder}: name another run")
@@ -102,7 +100,7 @@ def _both(saved: RecordedLog, log: RecordedLog, carried: Odometry) -> RecordedLo
 
 def _told(folder: Path, found: list[Placement], first: int) -> dict[str, Any]:
     """Return what `summary.json` says of a later session: where its first scan was taken, in the saved map."""
-    told: dict[str, Any] = {
+    return {
         "map": str(folder),
         "first_step": first,
         "placed_at_step": first if first else None,
@@ -110,4 +108,3 @@ def _told(folder: Path, found: list[Placement], first: int) -> dict[str, Any]:
         "place_covs": [each.cov.tolist() for each in found],
         "place_walls": [each.pairs for each in found],
     }
-    return told

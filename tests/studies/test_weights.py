@@ -9,7 +9,7 @@ from chainslam.experiments.usage import UsageError
 from studies.runner.rows import HERE, append, newest, read
 from studies.weights.mechanisms import BASELINE, MECHANISMS, Edit, Mechanism
 from studies.weights.run import WeightsRun, copied, driven, drop_others
-from studies.weights.table import ROWS, SCORES, table, verdict
+from studies.weights.table import ROWS, SCORES, difference, table, verdict
 
 MODULE, PIECE = "slam.extraction.straightness_kernels", "return (edge_m / (1.0 + (length_m / face_m) ** 4)) ** 2"
 OFF = Mechanism("short faces", "stated unsure", (Edit(MODULE, PIECE, "return 0.0"),))
@@ -112,6 +112,25 @@ def test_the_table_says_what_a_mechanism_holds_and_that_another_does_nothing():
     assert worse == cells
     assert nothing == "| as before | changes nothing | 40 pairs: nothing | not run yet |"
     assert unknown.endswith("| not run yet | not run yet |")
+
+
+@pytest.mark.parametrize(("shift", "is_told"), [(1.95, False), (2.05, True)])
+def test_a_difference_is_told_beyond_two_standard_errors_of_its_mean(shift, is_told):
+    off = np.array([-1.0, 1.0, -1.0, 1.0, 0.0])
+    error = off.std(ddof=1) / np.sqrt(5)
+    pairs = np.column_stack([np.ones(5), 1.0 + off + shift * error])
+    told = difference(pairs, SCORES["coverage"])
+    assert told == ((pytest.approx(shift * error), "+0.92 ± 0.4") if is_told else None)
+
+
+def test_four_pairs_tell_nothing():
+    pairs = np.column_stack([np.zeros(5), [1.0, 1.01, 0.99, 1.0, 1.0]])
+    assert difference(pairs, SCORES["coverage"]) is not None
+    assert difference(pairs[:4], SCORES["coverage"]) is None
+    few = [rows(each) for each in (BASELINE, OFF)]
+    for row in few:
+        row["plans"] = dict(list(row["plans"].items())[:4])
+    assert verdict(few, OFF, "apartments") == "not run yet"
 
 
 def test_runs_by_other_edits_and_runs_that_failed_count_for_nothing():

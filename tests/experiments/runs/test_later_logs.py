@@ -1,6 +1,7 @@
 """The log of a real robot in a building that is mapped already: placed in the saved map, and mapped on with it."""
 
 import json
+import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from chainslam.experiments.commands.cli import main
 from chainslam.sim.lidar import LidarConfig, RangeFinder
+from chainslam.slam.association.second_looks.placement import FINE
 from chainslam.slam.geometry.poses import compose, inverse, wrap
 from tests.slam.extraction.test_extract import loop
 
@@ -120,3 +122,53 @@ def test_a_map_of_another_scanner_ends_in_one_line(tmp_path, first, capsys):
     for words in (["--map", str(tmp_path / "nowhere")], ["--map", str(first)]):
         assert main(["replay", str(log), "--out", str(tmp_path / "out"), *words]) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) <= 2
+
+
+def changed(first, folder, file, **arrays):
+    """A copy of a folder of results with other arrays in one of its files."""
+    shutil.copytree(first, folder)
+    with np.load(folder / file) as kept:
+        np.savez(folder / file, **(dict(kept) | arrays))
+    return folder
+
+
+def test_the_carried_motion_is_as_sure_as_the_place_the_search_and_the_pose_before_together(first, tmp_path):
+    """The first session keeps its frame, wherever that began."""
+    start = np.array([1.0, -2.0, 0.4])
+    moved = changed(first, tmp_path / "moved", "log.npz", start_pose=start)
+    log = write_log(tmp_path / "b.log", CROOKED, SECOND, 2)
+    status, summary = replayed(log, tmp_path / "both", "--map", moved)
+    assert status == 0
+    with np.load(tmp_path / "both" / "log.npz") as both, np.load(moved / "map.npz") as old:
+        (at,) = np.flatnonzero(both["carried"])
+        expected = FINE.cov + np.array(summary["session"]["place_covs"][0]) + old["cov"][:3, :3]
+        np.testing.assert_allclose(both["odometry_cov"][at], expected, rtol=1e-6)
+        np.testing.assert_allclose(
+            both["odometry"][at], compose(inverse(old["pose"]), summary["session"]["places_world"][0])
+        )
+        np.testing.assert_allclose(both["start_pose"], start)
+
+
+def test_walls_that_were_never_confirmed_place_no_log(first, tmp_path):
+    with np.load(first / "map.npz") as kept:
+        tentative = np.arange(len(kept["ids"])) > 0
+    doubtful = changed(first, tmp_path / "doubtful", "map.npz", tentative=tentative)
+    log = write_log(tmp_path / "b.log", CROOKED, SECOND, 2)
+    assert replayed(log, tmp_path / "b", "--map", doubtful)[1]["session"]["places_world"] == []
+
+
+def test_a_map_that_cannot_be_used_ends_in_one_line(first, tmp_path, capsys):
+    log = write_log(tmp_path / "b.log", CROOKED, SECOND, 2)
+    with np.load(first / "map.npz") as kept, np.load(first / "log.npz") as recorded:
+        lost = np.full_like(kept["cov"], np.inf)
+        nothing, narrow = np.ones(len(kept["ids"]), dtype=bool), 0.9 * recorded["bearings_rad"]
+    for name, file, arrays, words in (
+        ("lost", "map.npz", {"cov": lost}, "found an invalid covariance"),
+        ("empty", "map.npz", {"tentative": nothing}, "expected a map with walls, found none"),
+        ("narrow", "log.npz", {"bearings_rad": narrow}, "made with the same scanner"),
+    ):
+        folder = changed(first, tmp_path / name, file, **arrays)
+        capsys.readouterr()
+        assert main(["replay", str(log), "--out", str(tmp_path / "out"), "--map", str(folder)]) == 2
+        (line,) = [each for each in capsys.readouterr().err.splitlines() if "expected" in each]
+        assert words in line
