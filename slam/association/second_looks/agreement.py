@@ -52,10 +52,10 @@ class Agreement:
     place: Float[np.ndarray, "3"]
     """Of the one map's frame in the other one, m m rad."""
     cov: Float[np.ndarray, "3 3"]
-    pairs: int
+    pairs: int = 0
     """So many walls are one."""
-    chi2: float
-    """Squared error of all pairs together, by the covariance of both maps."""
+    chi2: float = 0.0
+    """Squared error of all pairs together, by the covariance of both maps; twice their number less three are expected."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def agreed(saved: Walls, own: Walls, place: Float[np.ndarray, "3"], cov: Float[n
 
     Walls are paired one to one by the covariance of both maps and of the place. Two maps err independently.
     """
-    found = Agreement(place, cov, 0, 0.0)
+    found = Agreement(place, cov)
     for _ in range(ROUNDS):
         pairs = _paired(saved, own, found.place, found.cov)
         if not len(pairs):

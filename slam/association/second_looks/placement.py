@@ -6,7 +6,7 @@ through them at a wrong one. There the walls that both maps have tell the place,
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,7 +16,7 @@ from ...geometry.poses import compose, inverse, to_robot, to_world
 from ...odometry.field_kernels import LikelihoodField, field_of
 from ...odometry.search_kernels import refine
 from ..place_search import PlaceSearchConfig, along, apart, places_anywhere
-from .agreement import Walls, about, agreed
+from .agreement import Agreement, Walls, about, agreed
 from .refuted import Rays, voted
 from .solve import Unknowns
 
@@ -45,16 +45,9 @@ RIVAL = 0.7
 
 
 @dataclass(frozen=True)
-class Placement:
+class Placement(Agreement):
     """A place of a map in a saved one, and what speaks for it."""
 
-    place: Float[np.ndarray, "3"]
-    """The map's frame in the saved one, m m rad."""
-    cov: Float[np.ndarray, "3 3"]
-    pairs: int = 0
-    """Walls that both maps have."""
-    chi2: float = 0.0
-    """Squared error of these, by the covariance of both maps; twice their number less three are expected."""
     pro_m: float = 0.0
     """Length of the saved walls that scans of the drive see there ..."""
     contra_m: float = 0.0
@@ -140,8 +133,8 @@ def _rated(saved: Walls, placement: Placement, poses: Float[np.ndarray, "s 3"], 
     lines = saved.lines + np.array([back[2], 0.0])
     pro, contra = voted(Unknowns(poses, lines, to_world(saved.anchors, back)), saved.extents, rays, MARGIN_M)
     told = pro + contra > 1  # a single scan may see anything
-    sums = (float(saved.lengths[told & which].sum()) for which in (pro > contra, pro <= contra))
-    return Placement(placement.place, placement.cov, placement.pairs, placement.chi2, *sums)
+    pro_m, contra_m = (float(saved.lengths[told & which].sum()) for which in (pro > contra, pro <= contra))
+    return replace(placement, pro_m=pro_m, contra_m=contra_m)
 
 
 def _field(saved: Walls) -> LikelihoodField:
@@ -163,4 +156,4 @@ def _settled(
     pose, _ = refine(field, points, compose(place, at), FINE.step_rad, 0.1 * FINE.cell_m)
     place = compose(pose, inverse(at))
     found = agreed(saved, own, place, about(FINE.cov, place, at[:2]))
-    return Placement(found.place, found.cov, found.pairs, found.chi2)
+    return Placement(**vars(found))
