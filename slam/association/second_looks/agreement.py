@@ -55,7 +55,7 @@ class Agreement:
     pairs: int = 0
     """So many walls are one."""
     chi2: float = 0.0
-    """Squared error of all pairs together, by the covariance of both maps; twice their number less three are expected."""
+    """Squared error of all pairs together by the covariance of both maps, of twice their number less three degrees."""
 
 
 @dataclass(frozen=True)
