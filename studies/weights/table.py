@@ -46,7 +46,6 @@ SCORES = {
     "duplicate_lines": Measure("duplicate walls", -1.0),
     "steps": Measure("steps", -1.0, is_ratio=True),
     "collisions": Measure("collisions", -1.0),
-    "step_ms_mean": Measure("time of a step", -1.0, is_ratio=True),
 }
 
 
