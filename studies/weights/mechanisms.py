@@ -139,14 +139,12 @@ EXTRACTION = (
 
 DRIVING = "explore.following.driving"
 MOTIONS = "explore.following.motion_kernels"
-ERRAND = "explore.following.wall_following"
 END = "explore.following.end_errand"
 EXPLORER = "explore.goals.explorer"
-TRIES = "explore.goals.second_tries"
 
 EXPLORATION = (
     _off("first turns", "the robot turns on the spot before it drives",
-         ("explore.goals.first_turns", "FIRST_TURNS = 4", "FIRST_TURNS = 0")),
+         ("explore.goals.explorer_config", "first_turns: Number = 4", "first_turns: Number = 0")),
     _off("returns of five scans", "the robot keeps clear of what five scans hit, at the mean of their distances",
          ("explore.floor.accumulated_returns",
           "mean[near] = (rho[near] + same @ before) / (1.0 + np.count_nonzero(same, axis=1))", "pass"),
@@ -162,40 +160,25 @@ EXPLORATION = (
     _off("outward field", "the distance to the goal is continued a few cells into floor where the body has no room",
          ("explore.planning.paths", "OUTWARDS_CELLS, OUTWARDS_COST = 3, 8.0",
           "OUTWARDS_CELLS, OUTWARDS_COST = 0, 8.0")),
+    _off("walls in sight", "a path costs more where no wall is near enough to correct the pose",
+         ("explore.planning.passable", "blind_cost: Weight = 4.0", "blind_cost: Weight = 0.0")),
     _off("ways out", "the robot may leave a place that is too near to a wall",
          ("explore.planning.paths", "(self._clearance[box] >= self._clearance[r, c])", "False")),
     _off("single missing returns", "a single beam without a return shows neither free floor nor a way through a wall",
          ("slam.robot.messages", "shown = np.where(lone, np.minimum(before, after), free)", "shown = free"),
          ("slam.robot.messages", "np.isposinf(self.ranges_m) & np.isposinf(before) & np.isposinf(after)",
           "np.isposinf(self.ranges_m)")),
-    _off("redrawn floor", "the grid of free floor is drawn anew where the map has moved",
-         ("explore.floor.floor_memory", "if not np.any(moved > self._config.moved_m):", "if True:")),
     _off("two scans a view", "an end is viewed by two scans half a step of turn apart",
          (END, "super()._arrived()\n        return True", "super()._arrived()\n        return False")),
     _off("moved ends", "an end whose estimate has moved is viewed afresh",
          (END, "if np.hypot(*(end.position_world - self.end.position_world)) > self._config.moved_m:", "if False:")),
-    _off("routes", "a far end is approached along the walls that lead to it",
-         (END, "if self._stage == 0 and self._follow_route(around, planner):", "if False:")),
     _off("other viewpoints", "an end is viewed from elsewhere where no ideal viewpoint can be reached",
-         (END, " or self._plan_beyond(around, whole)", ""),
-         (END, "return self.looks_done == 0 and self._plan_anywhere(", "return False and self._plan_anywhere(")),
-    _off("blocked ways", "each failure asks for a wider path, and a gap where the body did not fit is left out",
-         (ERRAND, "margin = paths.margin_m + self._config.wider_m * self._failures", "margin = paths.margin_m"),
-         (ERRAND, "if squeeze is not None and (", "if False and (")),
-    _off("second tries", "an end that was given up is tried again once it has moved or more floor is known",
-         (TRIES, "if moved_m > self._config.moved_m and", "if False and"),
-         (TRIES, "if known_floor(around.free_space, ends[key].position_world, reach) >", "if 0.0 >")),
-    _off("ends that come and go", "an end that opened and closed eight times is given up",
-         (EXPLORER, ") >= self._config.returns:", ") >= 10**9:")),
+         (END, "if LOOKS[self._stage] in BEYOND and self._look_from(beyond, around, whole):", "if False:"),
+         (END, "        if self.looks_done:\n            return False", "        return False")),
     _off("round things", "ends on a curved obstacle are given up without a view",
-         (EXPLORER, "if is_round(end, around.walls, self._config.round_things):", "if False:")),
-    _off("patience", "a goal is given up once the way to it grows no shorter, or after the steps of a way of 60 m",
-         (ERRAND, "self._hopeless = self._stalled > self._config.stall_steps", "self._hopeless = False"),
-         (EXPLORER, "task.steps <= self._config.patience_steps or", "True or")),
-    _off("turns at the end", "the robot turns on the spot before it ends while some walls are tentative",
-         (EXPLORER, "again = self._looked_again <= self._config.second_looks and", "again = False and")),
-    _off("walks along walls", "the robot follows its wall to an end of which no view was possible",
-         (EXPLORER, "if in_time and not errand.looks_done and", "if False and")),
+         (EXPLORER, "elif looks and is_round(end, around.walls, self._config.round_things):", "elif False:")),
+    _off("patience", "a place is given up after the steps of a way of 60 m",
+         (EXPLORER, "return steps <= self._config.patience_steps", "return True")),
     _off("sweep", "after the last open end the robot visits unseen floor and obstacles that are no wall of the map",
          ("explore.goals.explorer_config", "sweep: bool = True", "sweep: bool = False")),
 )  # fmt: skip
