@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 
-from chainslam.slam.estimation.gates import gate_level
+from chainslam.slam.estimation.gates import gate_level, mean_inside
 from chainslam.slam.evaluation.consistency import nees
 from chainslam.slam.geometry.poses import J, turned
 
@@ -20,6 +20,8 @@ from .relations import Relations, between
 
 LEAST = 1e-4
 """Lower limit of the error of measurements, m and rad."""
+GATE = 0.99
+"""Level beyond which a residual counts as a mistake."""
 ROUNDS = 10
 """Upper limit of the iterations for the most likely error."""
 
@@ -114,12 +116,13 @@ def likeliest(left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.n
     """Return the most likely error, where `noise` is the covariance of the residuals as a function of it.
 
     Some residuals are gross errors, which are not Gaussian: those beyond the level of 99 % are left out, and the most
-    likely error is computed again until it no longer changes.
+    likely error is computed again until it no longer changes. What is left scatters less than all that is Gaussian, by
+    a factor that is known and taken out.
     """
     kept = np.ones(len(left), dtype=bool)
     for _ in range(ROUNDS):
         found = _likeliest(left, noise, kept)
-        before, kept = kept, nees(left, noise(found.cov)) <= gate_level(0.99, 3)
+        before, kept = kept, nees(left, noise(found.cov)) <= gate_level(GATE, left.shape[1])
         if not np.any(kept) or np.array_equal(before, kept):
             break
     return replace(found, told_by=int(np.count_nonzero(before)), mistaken=int(np.count_nonzero(~before)))
@@ -128,8 +131,10 @@ def likeliest(left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.n
 def _likeliest(
     left: Float[np.ndarray, "m 3"], noise: Callable[[np.ndarray], np.ndarray], kept: Bool[np.ndarray, " m"]
 ) -> Sigmas:
+    inside = mean_inside(GATE, left.shape[1])
+
     def cost(logs: Float[np.ndarray, "2"]) -> float:
-        covs = noise(_sigmas(logs).cov)[kept]
+        covs = inside * noise(_sigmas(logs).cov)[kept]
         return float(np.sum(np.linalg.slogdet(covs)[1]) + np.sum(nees(left[kept], covs)))
 
     return _sigmas(minimize(cost, np.log([0.02, 0.01]), method="Nelder-Mead", options={"xatol": 1e-4}).x)

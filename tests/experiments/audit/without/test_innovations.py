@@ -10,7 +10,7 @@ import chainslam
 from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.draws import interval
-from chainslam.experiments.library.audit.without.innovations import effective_dof, gated
+from chainslam.experiments.library.audit.without.innovations import effective_dof
 
 
 @pytest.fixture(scope="module")
@@ -100,10 +100,3 @@ def test_values_that_scatter_more_than_a_chi_square_count_less():
     rng = np.random.default_rng(2)
     squared = rng.chisquare(2, 2000) * np.where(rng.random(2000) < 0.1, 10.0, 0.1)
     assert effective_dof(squared, np.full(2000, 2)) < 0.5 * 4000
-
-
-@pytest.mark.parametrize("gate", [0.9, 0.99])
-def test_the_mean_behind_a_gate_is_that_of_a_simulation(gate):
-    drawn = np.random.default_rng(3).chisquare(2, 400_000)
-    kept = drawn[drawn <= np.quantile(drawn, gate)]
-    assert gated(gate) == pytest.approx(kept.mean() / 2.0, rel=0.01)

@@ -7,6 +7,8 @@ from chainslam.experiments.campaign.comparison.consistency import OVERCONFIDENT
 from chainslam.experiments.commands.cli import main
 from chainslam.experiments.library.audit.auditing import audit
 from chainslam.experiments.library.audit.without.triangles import closures
+from chainslam.experiments.scoring.without_truth.references import read_relations
+from chainslam.experiments.scoring.without_truth.relation_noise import sigmas_of_relations
 from chainslam.experiments.usage import UsageError
 from chainslam.slam.geometry.poses import compose, inverse
 
@@ -38,6 +40,15 @@ def test_a_true_sigma_is_rarely_rejected_and_half_of_it_always(tmp_path):
         assert half.verdict.factor == pytest.approx(2.0, rel=0.2)
         assert right.effective_dof < 3 * 240
     assert sum(outside) <= 6
+
+
+def test_the_sigma_that_triangles_tell_is_right_in_the_mean_with_a_relation_wrong_or_none(tmp_path):
+    for wrong in (0.0, 2.0):
+        found = [
+            sigmas_of_relations(read_relations(relations(tmp_path / "r", seed=seed, wrong=wrong))) for seed in range(40)
+        ]
+        assert np.mean([each.translation_m for each in found]) == pytest.approx(0.03, rel=0.017)
+        assert np.mean([each.rotation_rad for each in found]) == pytest.approx(0.01, rel=0.017)
 
 
 def test_the_command_estimates_the_sigma_and_names_what_does_not_close(tmp_path, capsys):
