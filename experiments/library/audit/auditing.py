@@ -17,9 +17,10 @@ from ...artifacts.run_folder import prepare
 from ...scoring.without_truth.references import read_relations
 from ...usage import UsageError
 from .audited import Align, Audited, Options, audited, audited_relations
+from .geometry.plane import Frame
 from .reading.bags import read_poses
-from .reading.graphs import is_graph, read_graph
-from .reading.stated import TRUTH, Frame, Space, Stated, in_space, read_folder, read_text
+from .reading.graphs import Rotations, is_graph, read_graph
+from .reading.stated import TRUTH, Space, Stated, in_space, read_folder, read_text
 from .verdicts import Pair, Pooled, compare, pool
 from .without.halves import halves_of
 from .without.inner import Inner
@@ -109,6 +110,7 @@ def audit(
     without_truth: bool = False,
     halves: bool = False,
     space: Space = "plane",
+    g2o_rotation: Rotations | None = None,
     error: Frame | None = None,
     align: Align = "none",
     reference_sigma: tuple[float, float] | None = None,
@@ -124,15 +126,17 @@ def audit(
     audited. Without a truth, the innovations of a run's folder and the loop closures of a graph are audited;
     `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of
     two halves of the data. `space` "space" audits all six axes of poses with position and quaternion, in place of x,
-    y and heading. `error` is the frame that the covariances are stated in: "additive" (the default), "body" or
-    "world". `nearest` takes the nearest true pose within so many seconds, which is otherwise interpolated. Raises
-    UsageError for bad input.
+    y and heading. `g2o_rotation` tells whether the rotational information of a graph in space is that of rotation
+    vectors ("vector", the default) or of the x, y and z of quaternions ("quaternion"). `error` is the frame that the
+    covariances are stated in: "additive" (the default), "body" or "world"; those of a graph, which are of the body
+    frame, are converted. `nearest` takes the nearest true pose within so many seconds, which is otherwise
+    interpolated. Raises UsageError for bad input.
     """
     paths, true, references = _paths(trajectories), _paths(truth), _paths(reference)
     given: dict[str, Any] = {
         "truth": true, "reference": references, "relations": [] if relations is None else [relations],
         "without-truth": [] if not without_truth else [""], "halves": [] if not halves else [""],
-        "space": [] if space == "plane" else [space],
+        "space": [] if space == "plane" else [space], "g2o-rotation": [] if g2o_rotation is None else [g2o_rotation],
         "error": [] if error is None else [error], "align": [] if align == "none" else [align],
         "reference-sigma": reference_sigma or [], "nearest": [] if nearest is None else [nearest],
         "topic": [] if topic is None else [topic], "truth-topic": [] if truth_topic is None else [truth_topic],
@@ -143,14 +147,14 @@ def audit(
     options = Options(error, align, reference_sigma, nearest)
     if not paths:
         assert relations is not None
-        return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma),))
+        return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma, space),))
     if without_truth or not (true or references or relations or halves or not all(map(_is_alone, paths))):
-        return Audit((), None, (), tuple(asked), tuple(map(_inner, paths)))
-    stated = _named([read(path, topic, space=space) for path in paths])
+        return Audit((), None, (), tuple(asked), tuple(_inner(each, space, g2o_rotation) for each in paths))
+    stated = _named([read(path, topic, True, space, g2o_rotation) for path in paths])
     if halves:
         return Audit((halves_of(stated, options),), None, (), tuple(asked))
     if relations is not None:
-        measured = read_relations(Path(relations))
+        measured = read_relations(Path(relations), space == "space")
         found = tuple(audited_relations(each, measured, options) for each in stated)
         return Audit(found, None, _pairs(found, stated[:1] * len(found)), tuple(asked))
     known = true or references or _own(stated)
@@ -158,7 +162,7 @@ def audit(
         raise UsageError(
             f"expected one truth for all or one for each of {len(paths)} trajectories, found {len(known)}: correct it"
         )
-    truths = [read(path, truth_topic, False, space) for path in known]
+    truths = [read(path, truth_topic, False, space, g2o_rotation) for path in known]
     every = truths if len(truths) == len(stated) else truths * len(stated)
     found = tuple(audited(each, against, options) for each, against in zip(stated, every, strict=True))
     estimators = {each.estimator for each in stated} - {None}
@@ -173,18 +177,24 @@ def _is_alone(path: Path) -> bool:
     return is_graph(path) or (has_steps and not (path / TRUTH).is_file())
 
 
-def _inner(path: Path) -> Inner:
+def _inner(path: Path, space: Space, rotation: Rotations | None) -> Inner:
     if is_graph(path):
-        return loops(path)
+        return loops(path, space, rotation)
     if not (path / "steps.csv").is_file():
         raise UsageError(f"expected the folder of a run or a g2o graph for --without-truth, found {path}: {GIVE}")
     return innovations(path)
 
 
-def read(path: Path, topic: str | None = None, needs_covariance: bool = True, space: Space = "plane") -> Stated:
+def read(
+    path: Path,
+    topic: str | None = None,
+    needs_covariance: bool = True,
+    space: Space = "plane",
+    rotation: Rotations | None = None,
+) -> Stated:
     """Read a trajectory of whatever format; raises UsageError."""
     if is_graph(path):
-        found = read_graph(path)
+        found = read_graph(path, space, rotation)
     elif is_bag(path):
         found = read_poses(path, topic, needs_covariance)
     else:
@@ -202,8 +212,8 @@ def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
     against = [f"--{name}" for name in ("truth", "reference", "relations", "without-truth", "halves") if given[name]]
     if len(against) > 1:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
-    if given["space"] and given["relations"]:
-        raise UsageError("expected --relations without --space, found both: relations are audited in the plane")
+    if given["g2o-rotation"] and not (given["space"] and any(map(is_graph, paths))):
+        raise UsageError("expected --g2o-rotation beside --space space and a g2o graph, found it alone: leave it out")
     sigma = given["reference-sigma"]
     known = given["reference"] or not paths
     if sigma and (not known or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from chainslam.sim.logs.archive import regular
 from chainslam.sim.logs.recorded_robot import MOST_M
@@ -43,10 +44,16 @@ def read_references(relations: Path | None, path: Path | None) -> References:
     )
 
 
-def read_relations(path: Path) -> Relations:
-    """Read lines `t1 t2 x y z roll pitch yaw` as the Freiburg benchmark has them; raises UsageError."""
+def read_relations(path: Path, in_space: bool = False) -> Relations:
+    """Read lines `t1 t2 x y z roll pitch yaw` as the Freiburg benchmark has them; raises UsageError.
+
+    In space the rotation is the roll about x, then the pitch about y and the yaw about z, about fixed axes as in ROS.
+    """
     rows = _table(path, (RELATION,), "relations (t1 t2 x y z roll pitch yaw)")
-    motions = np.column_stack([rows[:, 2:4], wrap(rows[:, 7])])
+    if in_space:
+        motions = np.column_stack([rows[:, 2:5], Rotation.from_euler("xyz", rows[:, 5:8]).as_quat()])
+    else:
+        motions = np.column_stack([rows[:, 2:4], wrap(rows[:, 7])])
     return Relations(rows[:, 0], rows[:, 1], motions)
 
 

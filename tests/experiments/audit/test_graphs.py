@@ -110,6 +110,16 @@ def test_relations_of_many_graphs_have_the_covariance_that_the_graph_says(tmp_pa
     assert longer.low < 1.0 < longer.high
 
 
+@pytest.mark.long
+def test_of_60_graphs_few_are_rejected(tmp_path):
+    scores = []
+    for seed in range(60):
+        drive(tmp_path, seed=seed)
+        [found] = audit(tmp_path / "a.g2o", truth=tmp_path / "a_true.g2o").trajectories
+        scores.append(found.pose)
+    assert sum(each.low > 1.0 or each.high < 1.0 for each in scores) <= 6
+
+
 def test_edges_that_do_not_fit_are_told(tmp_path):
     drive(tmp_path, told=9.0)
     found = audit(tmp_path / "a.g2o", truth=tmp_path / "a_true.g2o").trajectories[0]

@@ -16,10 +16,12 @@ from chainslam.slam.geometry.poses import wrap
 from ....artifacts.saved import read_summary
 from ....scoring.without_truth.references import lines_of
 from ....usage import UsageError
+from ..draws import Cross
+from ..geometry.plane import Frame
 
-Frame = Literal["additive", "body", "world"]
 Space = Literal["plane", "space"]
-PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m 6 6"]]
+PairCovs = Callable[[Int[np.ndarray, " m"], Int[np.ndarray, " m"]], Float[np.ndarray, "m e e"]]
+"""Joint covariances of two poses, e = 6 in the plane and 12 in space, given their rows."""
 PLANE_TO_SPACE = (0, 1, 5)
 """Rows of x, y and yaw in the order of ROS: x y z roll pitch yaw."""
 UNIT = 0.02
@@ -70,6 +72,8 @@ class Stated:
     """Row of the pose that is the frame of the others, and known in it."""
     pair_covs: PairCovs | None = None
     """The joint covariance of two poses, each in its body frame, given their rows."""
+    cross_covs: Cross | None = None
+    """The covariances of all poses with some, each in its body frame, given the rows of these."""
     truth: Path | None = None
     """The truth in the same folder."""
     estimator: str | None = None
@@ -85,6 +89,11 @@ class Stated:
         if self.covs is None or self.covs.shape[1] == 3 or self.poses_world.shape[1] == IN_SPACE:
             return self.covs
         return np.asarray(self.covs[:, PLANE_TO_SPACE][:, :, PLANE_TO_SPACE])
+
+    def cross_at(self, rows: Int[np.ndarray, " m"]) -> Cross | None:
+        """Return the covariances of the poses of some rows with each other, if they are known."""
+        of_poses = self.cross_covs
+        return None if of_poses is None else lambda some: of_poses(rows[some])[rows]
 
 
 def in_space(stated: Stated, needs_covariance: bool = True) -> Stated:
@@ -213,15 +222,20 @@ def symmetric(cells: Float[np.ndarray, "n w"], size: int) -> Float[np.ndarray, "
     return covs
 
 
-def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
-    """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
+def unit(q: Float[np.ndarray, "n 4"], path: Path, of: str = "row") -> Float[np.ndarray, "n 4"]:
+    """Return quaternions made unit; raises UsageError, which names the row, where they are far from it."""
     length = np.linalg.norm(np.clip(q, -9.0, 9.0), axis=1)  # beyond, its square may be infinite
     if np.any(bad := ~(np.abs(length - 1.0) < UNIT)):
         raise UsageError(
-            f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in row"
+            f"expected unit quaternions qx qy qz qw in {path}, found one of length {length[bad][0]:.3g} in {of}"
             f" {np.flatnonzero(bad)[0] + 1}: correct it"
         )
-    x, y, z, w = (q / length[:, None]).T
+    return np.asarray(q / length[:, None])
+
+
+def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
+    """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
+    x, y, z, w = unit(q, path).T
     tilt = float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
     notes = (TILTED,) if tilt > TILTED_RAD else ()
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)), notes
