@@ -18,7 +18,7 @@ class Audit:
     """Check the covariances of trajectories against the truth: consistent, overconfident, or too cautious.
 
     Several trajectories with a truth for each are runs of one estimator and are pooled; with one truth for all they are
-    different estimators and are compared.
+    different estimators and are compared. Without a truth, runs of one back end are pooled, and graphs are.
     """
 
     trajectories: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="TRAJECTORY")] = ()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from .reading.stated import TRUTH, Space, Stated, in_space, read_folder, read_te
 from .verdicts import Pair, Pooled, compare, pool
 from .without.halves import halves_of
 from .without.inner import Inner
+from .without.inner import pool as pool_inner
 from .without.innovations import innovations
 from .without.loops import loops
 from .without.triangles import closures
@@ -40,7 +41,7 @@ class Audit:
 
     trajectories: tuple[Audited, ...]
     pooled: Pooled | None
-    """Over several runs of one estimator, each with a truth of its own."""
+    """Over several runs of one estimator, each with a truth of its own, or all without one."""
     pairs: tuple[Pair, ...]
     """Of several estimators on one drive."""
     asked: tuple[str, ...]
@@ -57,18 +58,16 @@ class Audit:
         return [*each, *inner, *self._pooled(), *(pair.told() for pair in self.pairs)]
 
     def _pooled(self) -> list[str]:
-        return [] if self.pooled is None else [pooled_line(self.pooled)]
+        if self.pooled is not None:
+            return [pooled_line(self.pooled)]
+        kinds = list(dict.fromkeys(each.kind for each in self.without_truth))
+        return [f"not pooled, since they are of different kinds: {', '.join(kinds)}"] if len(kinds) > 1 else []
 
     def record(self) -> dict[str, Any]:
         """Return all figures, by name."""
-        pooled = self.pooled
         return {
             "trajectories": [each.record() for each in self.trajectories],
-            "pooled": pooled and {
-                "runs": pooled.runs, "verdict": pooled.verdict.words, "factor": pooled.verdict.factor,
-                "factor_interval": pooled.verdict.factor_interval, "anees": pooled.anees,
-                "anees_interval": [pooled.low, pooled.high],
-            },
+            "pooled": self.pooled and self.pooled.record(),
             "pairs": [
                 {"first": pair.first, "second": pair.second, "nees_ratio": pair.ratio,
                  "nees_ratio_interval": pair.interval, "stretches": pair.blocks} for pair in self.pairs
@@ -120,14 +119,15 @@ def audit(
 ) -> Audit:
     """Tell whether the covariances of trajectories may be believed, as `chainslam audit` does.
 
-    `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations `reference_sigma`
-    (m, rad), is one file for each, which are then runs of one estimator, or one for all, which are then different
-    estimators. `relations` is a file of measured relations between poses; without a trajectory its triangles are
-    audited. Without a truth, the innovations of a run's folder and the loop closures of a graph are audited;
-    `without_truth` asks for that although there is a truth. `halves` compares two trajectories with each other, of
-    two halves of the data. `space` "space" audits all six axes of poses with position and quaternion, in place of x,
-    y and heading. `g2o_rotation` tells whether the rotational information of a graph in space is that of rotation
-    vectors ("vector", the default) or of the x, y and z of quaternions ("quaternion"). `error` is the frame that the
+    `trajectories` are files or folders of runs. `truth`, or a `reference` with standard deviations
+    `reference_sigma` (m, rad), is one file for each, which are then runs of one estimator, or one for all, which
+    are then different estimators. `relations` is a file of measured relations between poses; without a trajectory
+    its triangles are audited. Without a truth, the innovations of a run's folder and the loop closures of a graph
+    are audited, and pooled if there are several of one back end, or several graphs; `without_truth` asks for that
+    although there is a truth. `halves` compares two trajectories with each other, of two halves of the data.
+    `space` "space" audits all six axes of poses with position and quaternion, in place of x, y and heading.
+    `g2o_rotation` tells whether the rotational information of a graph in space is that of rotation vectors
+    ("vector", the default) or of the x, y and z of quaternions ("quaternion"). `error` is the frame that the
     covariances are stated in: "additive" (the default), "body" or "world"; those of a graph, which are of the body
     frame, are converted. `nearest` takes the nearest true pose within so many seconds, which is otherwise
     interpolated. Raises UsageError for bad input.
@@ -149,7 +149,9 @@ def audit(
         assert relations is not None
         return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma, space),))
     if without_truth or not (true or references or relations or halves or not all(map(_is_alone, paths))):
-        return Audit((), None, (), tuple(asked), tuple(_inner(each, space, g2o_rotation) for each in paths))
+        inner = tuple(_named([_inner(each, space, g2o_rotation) for each in paths]))
+        are_runs = len(inner) > 1 and len({each.kind for each in inner}) == 1
+        return Audit((), pool_inner(inner) if are_runs else None, (), tuple(asked), inner)
     stated = _named([read(path, topic, True, space, g2o_rotation) for path in paths])
     if halves:
         return Audit((halves_of(stated, options),), None, (), tuple(asked))
@@ -209,6 +211,9 @@ def _paths(given: Paths) -> list[Path]:
 def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
     if not paths and not given["relations"]:
         raise UsageError("expected a trajectory with covariances, found none: name a file or the folder of a run first")
+    places = [path.resolve() for path in paths]
+    if doubles := [path for path, place in zip(paths, places, strict=True) if places.count(place) > 1]:
+        raise UsageError(f"expected different trajectories, found {doubles[0]} {len(doubles)} times: name it once")
     against = [f"--{name}" for name in ("truth", "reference", "relations", "without-truth", "halves") if given[name]]
     if len(against) > 1:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
@@ -231,7 +236,10 @@ def _own(stated: Sequence[Stated]) -> list[Path]:
     return [each.truth for each in stated if each.truth is not None]
 
 
-def _named(stated: Sequence[Stated]) -> list[Stated]:
+Named = TypeVar("Named", Stated, Inner)
+
+
+def _named(stated: Sequence[Named]) -> list[Named]:
     """Return trajectories with different names."""
     names = [each.name for each in stated]
     return [

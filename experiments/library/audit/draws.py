@@ -88,9 +88,9 @@ def joint_dof(whiten: Float[np.ndarray, "n d d"], cross: Cross) -> float:
     return float(n * d) ** 2 / total
 
 
-def pooled_dof(scores: Sequence[Score]) -> float:
+def pooled_dof(dofs: Sequence[float]) -> float:
     """Return the degrees of freedom of the mean of the ANEES of independent runs."""
-    return len(scores) ** 2 / sum(1.0 / each.dof for each in scores)
+    return len(dofs) ** 2 / sum(1.0 / each for each in dofs)
 
 
 def _share_of_one_draw(w: Float[np.ndarray, " n"]) -> float:

@@ -66,7 +66,7 @@ def test_runs_with_a_truth_each_are_pooled_and_estimators_of_one_drive_compared(
     pooled = chainslam.audit([path for path, _ in paths], truth=[true for _, true in paths])
     assert pooled.pooled is not None
     assert pooled.pooled.runs == 3
-    assert pooled.pooled.anees == pytest.approx(np.mean([each.pose.anees for each in pooled.trajectories]))
+    assert pooled.pooled.mean == pytest.approx(np.mean([each.pose.anees for each in pooled.trajectories]))
     assert pooled.pairs == ()
     assert pooled.verdict[-1].startswith("3 runs together: ")
     half = tum(tmp_path / "half.tum", RUNS[0].time_s, RUNS[0].estimated, 0.5 * RUNS[0].covs)

@@ -10,6 +10,7 @@ from chainslam.slam.estimation.gates import mean_inside
 
 from ....artifacts.files import CONFIG
 from ....artifacts.reading import read_plain, told
+from ....artifacts.saved import read_summary
 from ....usage import UsageError
 from ..draws import lasting
 from ..reading.stated import table
@@ -46,7 +47,7 @@ def innovations(folder: Path) -> Inner:
     notes = (f"{left} of {len(rows)} scans localised the robot by no match",) if left else ()
     return Inner(
         folder.resolve().name, TOLD, time_s[used], squared, whole, (), effective_dof(squared, whole), notes,
-        mean_inside(_gate(folder / CONFIG), 2),
+        mean_inside(_gate(folder / CONFIG), 2), str(read_summary(folder)["backend"]),
     )  # fmt: skip
 
 

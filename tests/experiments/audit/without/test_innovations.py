@@ -40,6 +40,25 @@ def test_a_run_with_a_truth_is_judged_by_it_unless_asked_and_one_without_by_its_
     assert "NIS" in chainslam.audit(real).report(tmp_path / "out").read_text()
 
 
+def test_runs_of_one_back_end_are_pooled_and_others_told_one_by_one(run, tmp_path, capsys):
+    for name, backend in (("one", None), ("two", None), ("other", "block-ekf")):
+        shutil.copytree(run, tmp_path / name / "run")
+        if backend is not None:
+            path = tmp_path / name / "run" / "summary.json"
+            path.write_text(path.read_text().replace('"full-ekf"', f'"{backend}"'))
+    one, two, other = (tmp_path / name / "run" for name in ("one", "two", "other"))
+    assert main(["audit", str(one), str(two), "--without-truth"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("run (1): observation and motion model")
+    assert told[-1].startswith("2 runs together: ")
+    assert "mean NIS per degree of freedom" in told[-1]
+    found = chainslam.audit([one, two], without_truth=True)
+    assert found.pooled.mean == pytest.approx(found.without_truth[0].mean)
+    assert main(["audit", str(one), str(other), "--without-truth"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == "not pooled, since they are of different kinds: scans of full-ekf, scans of block-ekf"
+
+
 def test_innovations_four_times_as_large_reject_the_models(run, tmp_path):
     wrong = tmp_path / "run"
     shutil.copytree(run, wrong)
