@@ -24,6 +24,8 @@ Align = Literal["none", "start", "all"]
 LAGS = (1, 10, 100)
 LEAST = 10
 """Poses that an audit needs."""
+EXACT = 1e-9
+"""Errors below it, m and rad, in all poses are those of a copy."""
 DEFAULT: Frame = "additive"
 KNOWN_START = (1e-8, 1e-10)
 """Of position and rotation relative to the start: the variances of a start that is known, as `--p0 zero` has it."""
@@ -41,8 +43,7 @@ class Options:
     error: Frame | None = None
     """The frame that the covariances are stated in, or that those of a graph are converted into; None takes its own."""
     align: Align = "none"
-    reference_sigma: tuple[float, float] | None = None
-    """Standard deviations of a reference, m and rad."""
+    reference_sigma: tuple[float, float] | None = None  # of a reference, m and rad
     nearest_s: float | None = None
 
 
@@ -165,7 +166,8 @@ def audited(stated: Stated, truth: Stated, options: Options) -> Audited:
         poses, covs = by.moved(poses, motion), by.moved_covs(covs, motion, frame)
     if options.reference_sigma is not None:
         covs = covs + _of_reference(poses, options.reference_sigma, frame, covs.shape[1])
-    left = by.errors(poses, true, frame)
+    if not np.any(np.abs(left := by.errors(poses, true, frame)) > EXACT):
+        raise UsageError(f"expected {truth.name} to differ from {stated.name}, found the same poses: name the truth")
     plain = stated.used_covs if frame == DEFAULT and align == "none" else None
     scores = _scores(left, covs, by.to_frame(poses, covs, frame, "body"), stated.cross_at(rows))
     order = "" if plain is None else order_hint(stated, _spread(left, rows, len(stated.time_s)))

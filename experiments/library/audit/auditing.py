@@ -148,7 +148,7 @@ def audit(
     if not paths:
         assert relations is not None
         return Audit((), None, (), tuple(asked), (closures(Path(relations), reference_sigma, space),))
-    if without_truth or not (true or references or relations or halves or not all(map(_is_alone, paths))):
+    if _judged_alone(paths, given):
         inner = tuple(_named([_inner(each, space, g2o_rotation) for each in paths]))
         are_runs = len(inner) > 1 and len({each.kind for each in inner}) == 1
         return Audit((), pool_inner(inner) if are_runs else None, (), tuple(asked), inner)
@@ -171,6 +171,12 @@ def audit(
     if len(stated) > 1 and len(truths) == len(stated) and (len(estimators) < 2 or true or references):
         return Audit(found, pool([each.pose for each in found]), (), tuple(asked))
     return Audit(found, None, _pairs(found, every), tuple(asked))
+
+
+def _judged_alone(paths: Sequence[Path], given: dict[str, Any]) -> bool:
+    """Return whether trajectories are judged by what they hold themselves."""
+    is_compared = any(given[name] for name in ("truth", "reference", "relations", "halves"))
+    return bool(given["without-truth"]) or not (is_compared or not all(map(_is_alone, paths)))
 
 
 def _is_alone(path: Path) -> bool:
@@ -219,6 +225,15 @@ def _check(paths: Sequence[Path], given: dict[str, Any]) -> None:
         raise UsageError(f"expected one of {', '.join(against)}, found {len(against)}: leave the others out")
     if given["g2o-rotation"] and not (given["space"] and any(map(is_graph, paths))):
         raise UsageError("expected --g2o-rotation beside --space space and a g2o graph, found it alone: leave it out")
+    for option, files in (("topic", paths), ("truth-topic", given["truth"] + given["reference"])):
+        if given[option] and not any(map(is_bag, files)):
+            raise UsageError(f"expected --{option} beside a ROS bag, found none: leave it out")
+    by_truth = given["truth"] or given["reference"] or given["halves"]
+    for option in ("align", "nearest"):
+        if given[option] and not by_truth and (given["relations"] or _judged_alone(paths, given)):
+            raise UsageError(f"expected --{option} beside --truth or --reference, found none: leave it out")
+    if given["error"] and (not paths or _judged_alone(paths, given)):
+        raise UsageError("expected --error beside poses to compare, found none: leave it out")
     sigma = given["reference-sigma"]
     known = given["reference"] or not paths
     if sigma and (not known or not np.all(np.isfinite(sigma)) or min(sigma) < 0.0):

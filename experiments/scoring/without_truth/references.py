@@ -22,6 +22,8 @@ from .relations import (
 )
 
 MOST_BYTES = 2**28
+BYTE_ORDER_MARK = "\xef\xbb\xbf"
+"""What spreadsheets write before a table, as Latin-1 has it."""
 RELATION, TUM, PLANAR = 8, 8, 4
 """Numbers on a line of a relations file, of a path in the TUM format, and of a path as `t x y theta`."""
 LEAST = 3
@@ -50,6 +52,8 @@ def read_relations(path: Path, in_space: bool = False) -> Relations:
     In space the rotation is the roll about x, then the pitch about y and the yaw about z, about fixed axes as in ROS.
     """
     rows = _table(path, (RELATION,), "relations (t1 t2 x y z roll pitch yaw)")
+    if (most := np.abs(rows[:, 5:]).max()) > 2.0 * np.pi:
+        raise UsageError(f"expected roll, pitch and yaw in radians in {path.name}, found {most:.4g}: degrees?")
     if in_space:
         motions = np.column_stack([rows[:, 2:5], Rotation.from_euler("xyz", rows[:, 5:8]).as_quat()])
     else:
@@ -70,7 +74,7 @@ def lines_of(path: Path, what: str) -> list[str]:
     try:
         if regular(path).stat().st_size > MOST_BYTES:
             raise UsageError(f"expected {what}, found {path.name} of more than {MOST_BYTES >> 20} MiB: name another")
-        return path.read_text(encoding="latin-1").splitlines()
+        return path.read_text(encoding="latin-1").removeprefix(BYTE_ORDER_MARK).splitlines()
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise UsageError(f"expected {what}, found {path.name} ({reason}): name a file that exists") from error

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
 
 from chainslam.slam.evaluation.consistency import chi2_band
 from chainslam.slam.geometry.poses import wrap
@@ -28,6 +29,8 @@ AS_VECTORS = (
 )
 LARGEST = 1e15
 """Numbers beyond it are none that a graph has."""
+NEGATIVE = 1e-9
+"""Part of an information matrix by which its eigenvalues may be below 0 for the digits of the file."""
 LEFT_OUT = 0.5
 """Share of lines of other kinds beyond which a file is refused."""
 
@@ -85,7 +88,9 @@ def graph_at(path: Path, space: Space = "plane", rotation: Rotations | None = No
             except ValueError as error:
                 raise UsageError(f"{expected} with numbers, found other words in line {at}: correct it") from error
             if kind != FIX and (len(numbers) != columns[kind] or not np.all(np.abs(numbers) <= LARGEST)):
-                raise UsageError(f"{expected} with {columns[kind]} numbers, found others in line {at}: correct it")
+                raise UsageError(
+                    f"{expected} with {columns[kind]} numbers within {LARGEST:g}, found others in line {at}: correct it"
+                )
             fixed.extend(numbers) if kind == FIX else rows[kind].append(numbers)
         elif not kind.startswith("#"):
             others[kind] = others.get(kind, 0) + 1
@@ -94,14 +99,16 @@ def graph_at(path: Path, space: Space = "plane", rotation: Rotations | None = No
         found = ", ".join(others) or "none"
         is_other = any(kind in others for kinds in KINDS.values() for kind in kinds)
         raise UsageError(f"{expected}, found {found}: {OTHERS[space] if is_other else 'name a graph of poses'}")
+    _check_ids(expected, vertices[:, 0], edges[:, :2])
     ids = vertices[:, 0].astype(np.int64)
     order = np.argsort(ids, kind="stable")
     ids, vertices = ids[order], vertices[order]
     ends = edges[:, :2].astype(np.int64)
-    if len(np.unique(ids)) < len(ids) or not np.all(np.isin(ends, ids)):
-        raise UsageError(f"{expected} with edges between vertices of ids of their own, found others: correct it")
     held = int(np.searchsorted(ids, fixed[0])) if fixed and fixed[0] in ids else 0
     notes = tuple(f"{count} lines {kind} are left out" for kind, count in others.items())
+    if fixed and fixed != [ids[held]]:
+        notes += (f"of the vertices that FIX names only {ids[held]} is held",) if fixed[0] in ids else (
+            f"FIX names no vertex of the graph, so {ids[held]} is held",)  # fmt: skip
     poses, motions = vertices[:, 1:], edges[:, 2 : 1 + columns[vertex]]
     information = symmetric(edges[:, 1 + columns[vertex] :], 3 if space == "plane" else 6)
     if space == "plane":
@@ -116,4 +123,21 @@ def graph_at(path: Path, space: Space = "plane", rotation: Rotations | None = No
             information[:, :, 3:] *= 0.5
         elif rotation is None and len(edges):
             notes += (AS_VECTORS,)
+    least = np.linalg.eigvalsh(0.5 * (information + information.swapaxes(1, 2)))[:, 0]
+    if odd := int(np.count_nonzero(least < -NEGATIVE * np.abs(information).max(axis=(1, 2)))):
+        notes += (f"the information of {odd} edges has a negative eigenvalue",)
     return Graph(ids, poses, np.searchsorted(ids, ends), motions, information, held, notes)
+
+
+def _check_ids(expected: str, ids: Float[np.ndarray, " n"], ends: Float[np.ndarray, "m 2"]) -> None:
+    """Raise UsageError unless the ids of vertices differ and all edges join two of them."""
+    known, counts = np.unique(ids, return_counts=True)
+    odd = np.concatenate([ids, ends.ravel()])
+    if len(odd := odd[odd != np.round(odd)]):
+        raise UsageError(f"{expected} with whole numbers as ids, found {odd[0]:g}: correct it")
+    if counts.max() > 1:
+        raise UsageError(f"{expected} with a vertex for each id, found {known[counts > 1][0]:.0f} twice: correct it")
+    if len(missing := ends[~np.isin(ends, ids)]):
+        raise UsageError(f"{expected} with edges between vertices, found none of id {missing[0]:.0f}: add it")
+    if len(same := ends[ends[:, 0] == ends[:, 1]]):
+        raise UsageError(f"{expected} with edges between two vertices, found one at {same[0, 0]:.0f} only: omit it")

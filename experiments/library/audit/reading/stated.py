@@ -29,6 +29,7 @@ UNIT = 0.02
 TRUTH = "trajectory_true.tum"
 """The true poses in the folder of a run."""
 TILTED = "the robot tilts, and only x, y and yaw are audited"
+SWAPPED = "the quaternions would not tilt in the order w x y z: is qw their first column?"
 TILTED_RAD = 0.2
 """A robot that is tilted by more does not move in the plane."""
 IN_SPACE = 7
@@ -41,9 +42,9 @@ FORMATS = (
 )
 NAMES = {
     "t": ("time", "time_s", "t", "timestamp", "stamp", "sec", "seconds"),
-    "x": ("x", "x_m", "px", "pose_x", "position_x"),
-    "y": ("y", "y_m", "py", "pose_y", "position_y"),
-    "z": ("z", "z_m", "pz", "pose_z", "position_z"),
+    "x": ("x", "x_m", "px", "tx", "pose_x", "position_x"),
+    "y": ("y", "y_m", "py", "ty", "pose_y", "position_y"),
+    "z": ("z", "z_m", "pz", "tz", "pose_z", "position_z"),
     "theta": ("theta", "theta_rad", "heading", "heading_rad", "yaw", "yaw_rad", "th", "phi"),
     **{name: (name, f"orientation_{name[1]}") for name in ("qx", "qy", "qz", "qw")},
 }
@@ -117,7 +118,10 @@ def in_space(stated: Stated, needs_covariance: bool = True) -> Stated:
 def read_folder(folder: Path) -> Stated:
     """Read the poses, covariances and truth of a run of ours; raises UsageError."""
     if not (folder / "steps.csv").is_file():
-        raise UsageError(f"expected a trajectory, found {folder} without steps.csv: name a file, or a run's folder")
+        raise UsageError(
+            f"expected a trajectory, found {folder} without steps.csv or a bag's metadata.yaml: name a file, the folder"
+            " of a run, or a bag"
+        )
     summary, truth = read_summary(folder), folder / TRUTH
     return replace(
         read_text(folder / "steps.csv"),
@@ -236,9 +240,14 @@ def unit(q: Float[np.ndarray, "n 4"], path: Path, of: str = "row") -> Float[np.n
 def heading_of(q: Float[np.ndarray, "n 4"], path: Path) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
     """Return the yaw of quaternions (x, y, z, w), with a note where they are tilted; raises UsageError."""
     x, y, z, w = unit(q, path).T
-    tilt = float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
-    notes = (TILTED,) if tilt > TILTED_RAD else ()
+    notes: tuple[str, ...] = (TILTED,) if _tilt(x, y) > TILTED_RAD else ()
+    notes += (SWAPPED,) if notes and _tilt(y, z) <= TILTED_RAD else ()
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)), notes
+
+
+def _tilt(x: Float[np.ndarray, " n"], y: Float[np.ndarray, " n"]) -> float:
+    """Return the largest tilt, rad, of unit quaternions."""
+    return float(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)).max())
 
 
 def _in_radians(heading: Float[np.ndarray, " n"], path: Path) -> Float[np.ndarray, " n"]:
@@ -263,7 +272,9 @@ def table(path: Path) -> tuple[list[str] | None, Float[np.ndarray, "n w"]]:
             header = words
             continue
         if header is None and None in numbers:
-            raise UsageError(f"expected numbers in line {number} of {path}, found other words: correct it")
+            raise UsageError(
+                f"expected numbers in line {number} of {path}, between blanks or commas, found other words: correct it"
+            )
         if len(words) != len(header or rows[0] if header or rows else words):
             raise UsageError(
                 f"expected {len(header or rows[0])} columns in line {number} of {path}, found {len(words)}: correct it"

@@ -47,6 +47,8 @@ def loops(path: Path, space: Space = "plane", rotation: Rotations | None = None)
     usable = definite(graph.information[rows])
     rows, left = rows[usable], int(np.count_nonzero(~usable))
     notes += (f"{left} closures whose information is not positive definite are left out",) if left else ()
+    if not len(rows):
+        raise UsageError(f"expected loop closures in {path} with positive definite information, found none: correct it")
     roots = np.linalg.cholesky(graph.information[rows])
     parts, axes = np.linalg.eigh(roots.swapaxes(1, 2) @ _own(linear, rows) @ roots)
     known = 1.0 - parts[:, -1] > ALONE

@@ -146,6 +146,15 @@ def test_a_graph_that_is_not_optimised_is_optimised_and_told(tmp_path, monkeypat
         loops(tmp_path / "a.g2o")
 
 
+def test_closures_without_positive_definite_information_are_refused(tmp_path):
+    w = (SIGMAS**-2.0).tolist()
+    lines = [f"VERTEX_SE2 {k} {k} 0 0" for k in range(3)]
+    lines += [f"EDGE_SE2 {k} {k + 1} 1 0 0 {w[0]} 0 0 {w[1]} 0 {w[2]}" for k in range(2)]
+    (tmp_path / "a.g2o").write_text("\n".join([*lines, "EDGE_SE2 0 2 2 0 0 1 2 0 1 0 1"]))
+    with pytest.raises(UsageError, match="with positive definite information, found none"):
+        audit(tmp_path / "a.g2o")
+
+
 @pytest.mark.parametrize(
     ("edges", "told"),
     [(((0, 1), (1, 2)), "found none: nothing predicts one"), (((0, 1), (0, 2)), "that the rest predicts, found none")],

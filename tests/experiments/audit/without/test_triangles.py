@@ -71,5 +71,8 @@ def test_relations_without_triangles_are_refused(tmp_path):
     (tmp_path / "r").write_text("0 1 1 0 0 0 0 0\n1 2 1 0 0 0 0 0\n")
     with pytest.raises(UsageError, match=r"at least 10 triangles .* found 0: give a trajectory"):
         audit([], relations=tmp_path / "r")
+    (tmp_path / "degrees").write_text("0 1 1 0 0 0 0 90\n")
+    with pytest.raises(UsageError, match="in radians in degrees, found 90"):
+        audit([], relations=tmp_path / "degrees")
     with pytest.raises(UsageError, match="correct it"):
         audit([], relations=tmp_path / "r", reference_sigma=(-1.0, 0.1))
