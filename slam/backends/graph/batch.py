@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .graph import Graph
-from .optimum import optimise
+from .isam import Isam, lines_of, poses_of
 
 
 class GraphBatch(Graph):
@@ -15,6 +15,7 @@ class GraphBatch(Graph):
 
         The beliefs that follow are those of the optimum; the mission may go on from here.
         """
-        solver = self._all_entered()
-        self._start_from(*optimise(self.config, self._record, solver.poses(), solver.all_lines()))
+        values = self._all_entered().values()
+        self.record.weigh(poses_of(values, self._isam.last + 1), lines_of(values, list(self.record.lines)))
+        self._start_from(Isam(self.config, self.record, values).optimum())
         return self.trajectory()
