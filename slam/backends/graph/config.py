@@ -27,7 +27,6 @@ class GraphConfig:
     """Eliminate by QR instead of Cholesky: a fifth slower, but accurate if some directions are known 10,000 times
     better than others."""
     most_turn_rad: Angle = 1.2
-    """Largest angle between an observation and its prediction in linearisation; a solution in which a wall turns
-    further is rejected."""
+    """A solution in which a wall turns by more than this from where it is linearised is rejected."""
     diverged_chance: Probability = 1e-9
     """A solution whose pose is less likely than this, given its prediction, is repeated with damped steps."""
