@@ -7,7 +7,7 @@ PLAYED := block-ekf full-ekf invariant-ekf graph
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: setup fuzz leaderboard demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading rules rules-held rules-table
+.PHONY: setup fuzz leaderboard demo test test-long mutants check bench docs smoke compare random courts schools strategies adaptive bias heading weights
 
 # What tests, checks and pages need, too; users of the program need .venv/made only.
 setup: .venv/tools
@@ -257,18 +257,10 @@ counts: setup
 settings: setup
 	PYTHONPATH=. $(BIN)/python docs/_ext/settings_page.py > docs/reference/settings.md
 
-rules: setup
-	$(BIN)/python -m studies.rules.study --plans $(PLANS) --out studies/rules/rows.jsonl
-	$(BIN)/python -m studies.rules.report
-
-rules-held: setup
-	$(BIN)/python -m studies.rules.held --plain --slowest-s 4 --tries 40 --out studies/rules/held.jsonl \
-	    --tests tests/slam/association tests/slam/odometry tests/experiments/replays tests/sim/logs tests/explore/goals
-	$(BIN)/python -m studies.rules.held --out studies/rules/held.jsonl
-	$(BIN)/python -m studies.rules.report
-
-rules-table: setup
-	$(BIN)/python -m studies.rules.report
+# What gets worse without each mechanism, in 40 apartments and ten schools, and its page. Hours; begun again, it goes on where it was.
+weights: setup
+	for plans in apartments schools; do nice $(BIN)/python -m studies.weights.run --plans $(PLANS) --set $$plans || exit; done
+	$(BIN)/python -m studies.weights.table
 
 .PHONY: pictures results screenshots player
 

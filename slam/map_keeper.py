@@ -24,7 +24,6 @@ from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
 from .map.polylines.change_points import ChangePointsConfig
 from .map.polylines.vertices import meetings
-from .map.polylines.wall_beams import WallBeams
 from .map.stochastic_map import StochasticMap
 from .robot import Scan, ScannerSpec
 
@@ -92,15 +91,6 @@ class MapKeeper:
         self.backend.remove(ids.tolist())
         self.landmarks.remove(ids)
         return self.map()
-
-    def split(self, seen: WallBeams) -> StochasticMap | None:
-        """Let two faces take the place of a wall that all scans together show to be two; None if there is none."""
-        split = self.landmarks.split_of(self.backend.belief, seen)
-        if split is None:
-            return None
-        if len(split.lines):
-            self.landmarks.split(split, self.backend.grow(split.lines, split.cov, split.centres))
-        return self.without(np.array([split.wall]), self.map())
 
     def store(
         self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]

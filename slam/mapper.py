@@ -267,7 +267,7 @@ class Mapper:
     def _cut_at_change_points(
         self, scan: Scan, segments: Segments, matches: Matches
     ) -> tuple[Segments, Matches, Int[np.ndarray, " c"]]:
-        """Forget a wall that all scans together show to bend, or to be two faces: these take its place.
+        """Forget a wall that all scans together show to bend: its two sides take its place.
 
         Returns the scan's segments, cut there too, what they are of the walls that are left, and the rows of the two
         beside a bend; all as it was, and none, while the scan shows a side of it too poorly.
@@ -276,10 +276,7 @@ class Mapper:
         if not self.config.vertices or self.config.change_points is None:
             return segments, matches, NONE
         seen = beams_on_walls(self.backend.belief, scan, segments, matches.pairs, self.config.shared)
-        change_point, split = change_points.see(seen), self._keeper.split(seen)
-        if split is not None:
-            segments = self._segments(scan, split)
-            return segments, self._view(scan, segments, split).match_all(), NONE
+        change_point = change_points.see(seen)
         if change_point is None:
             return segments, matches, NONE
         walls = self._keeper.map()

@@ -17,6 +17,7 @@ from ..artifacts.run_folder import held, prepare, refuse_others, settle
 from ..artifacts.settings import parse_settings
 from ..library.asked import asked_source
 from ..library.earlier import scored
+from ..library.later_logs import placed_real
 from ..library.sessions import placed_log
 from ..replays.measured import check_references, held_against
 from ..replays.paths.external import register
@@ -79,8 +80,8 @@ class Replay:
     reference: Path | None = None
     """Measured path, in the TUM format or `t x y theta` on each line, with which the path is compared."""
     map: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Go on with the map of an earlier run in the same building, of this results folder: the robot's place in that map
-    is found from the log, and both are mapped as one."""
+    """Go on with the map of an earlier run or log in the same building, of this results folder: the robot's place in
+    that map is found from the log, and both are mapped as one."""
     robot: str | None = None
     """Description of the robot in place of the run's: a bundled robot (paper, turtlebot, front-scanner) or a YAML
     file (docs/howto/use-your-robot.md), whose simulated devices are ignored."""
@@ -109,9 +110,11 @@ class Replay:
         if self.map is not None:
             if riders:
                 raise UsageError("expected --external without --map, found both: leave one of them out")
-            if not isinstance(source, OwnLog):
-                raise UsageError(f"expected the log of a run with the truth for --map, found {self.log}: leave it out")
-            source, session = placed_log(source, self.map, names[0])
+            if isinstance(source, OwnLog):
+                source, session = placed_log(source, self.map, names[0])
+            else:
+                with share_of("seeking the place in the saved map"):
+                    source, session = placed_real(source, self.map)
         check_references(references, *source.odometry)
         out = self.out or self.log.parent / f"replay-{self._kind(source)}"
         folders = {name: out / name if len(names) > 1 else out for name in names}

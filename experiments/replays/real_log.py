@@ -1,7 +1,7 @@
 """A real robot's log through a back end; without ground truth, scores come from the map and the log alone."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -68,6 +68,8 @@ class RealRun:
     options: RealOptions
     cut_short: str = ""
     """Why the drive or its log ended early, in words."""
+    start_world: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    """The first pose: the origin of the map, unless the log goes on with a saved one."""
 
     @property
     def unread(self) -> str:
@@ -78,7 +80,7 @@ class RealRun:
     @cached_property
     def wheels_alone(self) -> Float[np.ndarray, "s 3"]:
         """Poses of the wheel odometry at each keyframe, in the map's frame."""
-        return odometry_poses(np.zeros(3), self.log.recording.odometry)
+        return odometry_poses(self.start_world, self.log.recording.odometry)
 
 
 def read_real_run(
@@ -145,7 +147,7 @@ def replay_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lamb
 
 def mapped_real(run: RealRun, backend: str, watch: Callable[[Step], None] = lambda step: None) -> TrialResult:
     """Map it, without offline refinement; for `OFFLINE`, add up its path."""
-    scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording))
+    scenario = unwitnessed(replayed_real(run, backend), RecordedRobot(run.log.recording), run.start_world)
 
     def mission(scenario: Scenario) -> Iterator[Step]:
         if is_external(backend):

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from chainslam.explore.certificate import certify
 from chainslam.explore.step import Step
@@ -51,10 +52,14 @@ class UnwitnessedRobot:
         return self._robot.drive(command)
 
 
-def unwitnessed(config: TrialConfig, robot: Robot) -> Scenario:
+ORIGIN = np.zeros(3)
+"""Where a map begins."""
+
+
+def unwitnessed(config: TrialConfig, robot: Robot, start_world: Float[np.ndarray, "3"] = ORIGIN) -> Scenario:
     """Return the scenario of a robot in an unknown building; raises UsageError for unknown names."""
     check(config)
-    start, cov = np.zeros(3), np.diag(np.square(START_SIGMAS))
+    start, cov = start_world, np.diag(np.square(START_SIGMAS))
     strategy = None if config.strategy == STRATEGY_OF_REPLAYS else strategy_of(config.strategy)
     return Scenario(
         config,

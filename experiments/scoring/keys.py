@@ -70,6 +70,10 @@ class Session(TypedDict):
     placed_at_step: int | None
     places_world: list[list[float]]
     """The pose at that step, m m rad; or the poses that fit equally well."""
+    place_covs: NotRequired[list[list[list[float]]]]
+    """Of a real robot's log: the covariance of each."""
+    place_walls: NotRequired[list[int]]
+    """Of a real robot's log: number of walls that both maps have."""
     pose_anees: NotRequired[float]
     """Of the later session's steps alone."""
 

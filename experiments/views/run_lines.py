@@ -141,6 +141,13 @@ def notes_of(summary: Row) -> list[str]:
 def words_on_session(said: Row) -> str:
     """Return where a later session found itself in the map of an earlier one, or why it has a map of its own."""
     places = listed([f"({x:.2f}, {y:.2f}) m, {degrees(turn):.0f} degrees" for x, y, turn in said["places_world"]])
+    if said["first_step"] and (covs := said.get("place_covs")):
+        x, y, turn = (covs[0][k][k] ** 0.5 for k in range(3))
+        sure = f"{number(x)} and {number(y)} m, {number(degrees(turn))} degrees"
+        return (
+            f"the log begins at {places} in the map of {said['map']} (sigma {sure}; {said['place_walls'][0]} walls are"
+            " in both); both sessions are one map"
+        )
     if said["first_step"]:
         after = number(said["placed_at_step"] - said["first_step"] + 1)
         return f"the robot's place in the map of {said['map']} was found after {after} scans; both sessions are one map"

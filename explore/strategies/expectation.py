@@ -33,11 +33,6 @@ class Expectation:
     """What that look tells about those walls: the fall of their joint entropy."""
 
 
-def position_sigma(pose_cov: Float[np.ndarray, "3 3"]) -> float:
-    """Return the standard deviation of the position along its worst direction, m."""
-    return float(np.sqrt(max(np.linalg.eigvalsh(pose_cov[:2, :2])[-1], 0.0)))
-
-
 def walls_seen_from(
     walls: StochasticMap,
     graph: nx.DiGraph[int],

@@ -90,6 +90,41 @@ def place_on(
 ) -> Place | None:
     """Return the place of a window that lays points, robot frame, best on known surfaces; None where none does."""
     c = config
+    poses, scores = _fitting(surface_world, points, window, c)
+    if not len(poses):
+        return None
+    best = int(np.argmax(scores))
+    others = np.flatnonzero(apart(poses, poses[best], c))
+    second = int(others[np.argmax(scores[others])]) if len(others) else None
+    rival, rival_pose = (0.0, None) if second is None else (float(scores[second]), poses[second])
+    far = float(np.hypot(*points.T).max())
+    fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.cell_m, 4)
+    pose, _ = refine(fine, points, poses[best], 0.5 * c.step_rad, 0.1 * c.cell_m)
+    return Place(pose, float(scores[best]), rival, rival_pose)
+
+
+def places_anywhere(
+    surface_world: Float[np.ndarray, "m 2"], points: Float[np.ndarray, "n 2"], config: PlaceSearchConfig, most: int
+) -> Float[np.ndarray, "p 3"]:
+    """Return up to `most` places apart from each other that fit about as well as the best one, best first.
+
+    They are as fine as the cells of the search.
+    """
+    poses, scores = _fitting(surface_world, points, _everywhere(surface_world, points), config)
+    found: list[np.ndarray] = []
+    for k in np.argsort(-scores):
+        if len(found) == most or scores[k] < config.least or scores[k] < config.rival * scores.max():
+            break
+        if all(apart(poses[k][None], each, config)[0] for each in found):
+            found.append(poses[k])
+    return np.array(found).reshape(-1, 3)
+
+
+def _fitting(
+    surface_world: Float[np.ndarray, "m 2"], points: Float[np.ndarray, "n 2"], window: Window, config: PlaceSearchConfig
+) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, " p"]]:
+    """Return the poses of a window that fit about as well as the best one, and their scores."""
+    c = config
     far = float(np.hypot(*points.T).max())
     field = field_of(surface_world, window.guess[:2], far + window.half_m, c.cell_m, c.cell_m, 2)
     turns = int(np.ceil(window.half_rad / c.step_rad))
@@ -101,17 +136,8 @@ def place_on(
         values, largest_ahead(values, BLOCK), np.ascontiguousarray(at[..., 1]), np.ascontiguousarray(at[..., 0]),
         int(np.ceil(window.half_m / c.cell_m)), BLOCK, c.rival * c.least, c.rival,
     )  # fmt: skip
-    if not len(found):
-        return None
     moved = window.guess[:2] + c.cell_m * found[:, :0:-1][:, :2]
-    poses = np.column_stack([moved, angles[found[:, 1].astype(np.int64)]])
-    best = int(np.argmax(found[:, 0]))
-    others = np.flatnonzero(apart(poses, poses[best], c))
-    second = int(others[np.argmax(found[others, 0])]) if len(others) else None
-    rival, rival_pose = (0.0, None) if second is None else (float(found[second, 0]), poses[second])
-    fine = field_of(surface_world, poses[best, :2], far, FINE * c.cell_m, FINE * c.cell_m, 4)
-    pose, _ = refine(fine, points, poses[best], 0.5 * c.step_rad, 0.1 * c.cell_m)
-    return Place(pose, float(found[best, 0]), rival, rival_pose)
+    return np.column_stack([moved, angles[found[:, 1].astype(np.int64)]]), found[:, 0]
 
 
 def place_of(
@@ -140,9 +166,14 @@ def place_anywhere(
     surface_world: Float[np.ndarray, "m 2"], points: Float[np.ndarray, "n 2"], config: PlaceSearchConfig
 ) -> Place | None:
     """Return the place that lays points, robot frame, best on known surfaces, whichever way the robot is turned."""
+    return place_on(surface_world, points, _everywhere(surface_world, points), config)
+
+
+def _everywhere(surface_world: Float[np.ndarray, "m 2"], points: Float[np.ndarray, "n 2"]) -> Window:
+    """Return the window of all poses from which any of the points lies near a surface."""
     low, high = surface_world.min(axis=0), surface_world.max(axis=0)
     half_m = 0.5 * float((high - low).max()) + float(np.hypot(*points.T).max())
-    return place_on(surface_world, points, Window(np.array([*(0.5 * (low + high)), 0.0]), half_m, np.pi), config)
+    return Window(np.array([*(0.5 * (low + high)), 0.0]), half_m, np.pi)
 
 
 def along(ends: Float[np.ndarray, "n 2 2"], every_m: float) -> Float[np.ndarray, "m 2"]:

@@ -162,14 +162,6 @@ class Extents:
         columns["log_odds"][row] = max(columns["log_odds"][row], columns["log_odds"][other])
         columns["last_seen"][row] = max(columns["last_seen"][row], columns["last_seen"][other])
 
-    def split(self, wall: int, ids: Int[np.ndarray, " p"], extents: Float[np.ndarray, "p 2"]) -> None:
-        """Begin the faces that take the place of a wall: from and to, m from their anchors; they exist as surely."""
-        rows, old = self._records.rows(ids), int(self._records.rows(np.array([wall]))[0])
-        columns = self._records.columns
-        columns["extents"][rows] = extents
-        for name in ("spacing", "observations", "last_seen", "log_odds", "place"):
-            columns[name][rows] = columns[name][old]
-
     def meet(self, pairs: Int[np.ndarray, "k 2"], along: Float[np.ndarray, "k 2"]) -> None:
         """End the walls of each pair of ids, the one before the other, so far along each, m, where they reach past."""
         before, after = self._records.rows(pairs[:, 0]), self._records.rows(pairs[:, 1])

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from ..estimation.backend import Belief
 from ..extraction.segments import Segments
@@ -13,8 +13,6 @@ from ..robot import Scan
 from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
 from .openings import Openings
 from .polylines.change_points import ChangePoints, ChangePointsConfig
-from .polylines.splits import Split, Splits
-from .polylines.wall_beams import WallBeams
 from .records import Records
 from .reliability import Reliability
 from .stochastic_map import StochasticMap
@@ -39,7 +37,6 @@ class Landmarks:
         self.extents = Extents(walls, self.records, sure_beams)
         self.reliability = Reliability(walls.reliability, self.records)
         self.change_points = ChangePoints(change_points, self.records)
-        self.splits = Splits(walls, self.records)
         self.openings = Openings(walls.shared, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
@@ -71,28 +68,11 @@ class Landmarks:
         self.records.remove(forgotten)
         return Observed(np.where(np.isin(owners, forgotten), -1, owners), forgotten)
 
-    def split_of(self, belief: Belief, seen: WallBeams) -> Split | None:
-        """Return the faces of a wall that is surely two of them, by this scan and those before it."""
-        return self.splits.see(belief, seen, self._off_line_cov)
-
-    def split(self, split: Split, ids: Int[np.ndarray, " p"]) -> None:
-        """Begin the records of the faces that take the place of a wall, whose own are to be removed."""
-        self.extents.split(split.wall, ids, split.extents)
-        self.reliability.split(ids, split.extents)
-        if len(ids) == 2:
-            self.change_points.keep_apart(*ids.tolist())
-
     def merge(self, belief: Belief, keep: int, drop: int) -> None:
         """Make one record of two walls that are one; call it before the back end merges them."""
         row, other = belief.rows([keep, drop])
         shift = directions(belief.means[row, 0]) @ (belief.anchors[other] - belief.anchors[row])
         self.records.merge(keep, drop, float(shift))
-
-    def _off_line_cov(self, wall: int) -> Float[np.ndarray, "2 2"]:
-        """Return how far a wall may be off its line as any wall is: a misfit of its own is what a split mends."""
-        ids = np.array([wall])
-        extents = self.records.columns["extents"][self.records.rows(ids)]
-        return self.reliability.off_line_cov(ids, extents, np.zeros(1))[0]
 
     def remove(self, ids: Int[np.ndarray, " n"]) -> None:
         """End the records of walls that are none."""

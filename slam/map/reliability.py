@@ -77,10 +77,6 @@ class Reliability:
         add_fits(rows, seen.cov, seen.chi2, seen.beam_counts, columns["residue"])
         add_lengths(rows, seen.ends, columns["longest"])
 
-    def split(self, ids: Int[np.ndarray, " p"], extents: Float[np.ndarray, "p 2"]) -> None:
-        """Begin the faces that take the place of a wall: as long as all scans together show them."""
-        self._records.columns["longest"][self._records.rows(ids)] = extents[:, 1:] - extents[:, :1]
-
     def _merge(self, merger: Merger) -> None:
         """Add what was seen of the dropped wall to the kept one's."""
         residue, longest = self._records.columns["residue"], self._records.columns["longest"]

@@ -38,6 +38,8 @@ def lay_out(folder: Path) -> None:
     made = drive(np.random.default_rng(0))
     with gzip.open(folder / "intel.log.gz", "wt") as log:
         log.writelines(f"{line}\n" for line in made.flaser())
+    for day in ("monday", "tuesday"):
+        shutil.copy(folder / "intel.log.gz", folder / f"{day}.log.gz")
     path = np.column_stack([made.time_s, made.poses])
     np.savetxt(folder / "intel.ref_gmapping.txt", path, fmt="%.6f")
     x, y, heading = made.poses[-1] - made.poses[0]

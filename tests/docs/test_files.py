@@ -97,8 +97,8 @@ def test_every_key_of_a_summary_is_told(runs):
     looked_again = {f"second_looks.{name}" for name in ("lines", "duplicate_lines", "chains_closed", "closures")}
     # These worlds have no gap too narrow for the body.
     gaps = {f"certificate.narrow_gaps[].{name}" for name in ("width_m", "beyond_m2", "why", "position_m")}
-    # Nor was a saved map used again (tests/experiments/runs/test_sessions.py).
-    keys = ("map", "first_step", "placed_at_step", "places_world", "pose_anees")
+    # Nor was a saved map used again (tests/experiments/runs: test_sessions.py, test_later_logs.py).
+    keys = ("map", "first_step", "placed_at_step", "places_world", "pose_anees", "place_covs", "place_walls")
     found |= looked_again | gaps | {f"session.{name}" for name in keys}
     assert told("`summary.json`") - given_up == found - given_up
 

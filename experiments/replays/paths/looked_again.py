@@ -63,7 +63,8 @@ def surveyed(
     rules, reach_m = mission.mapper.extraction, mission.scan_matching.reach_m
     segments = [sure_pieces(extract(scan, rules), scan, rules).on_body(on_body) for scan in scans]
     returns = [to_world(returns_within(scan, reach_m), on_body.pose_robot) for scan in scans]
-    drive = Drive(log.heard[1:], log.heard_cov[1:])
+    carried = () if log.carried is None else np.flatnonzero(log.carried).tolist()
+    drive = Drive(log.heard[1:], log.heard_cov[1:], carried=carried)
     rays = Rays(scans, on_body)
     return second_looks(log.estimated_world[0], drive, segments, returns, mission.second_looks, rays, goes_on)
 

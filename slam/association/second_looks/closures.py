@@ -31,11 +31,20 @@ class Drive:
     covs: Float[np.ndarray, "t 3 3"]
     """Of each motion, as it is stated."""
     slipped: Sequence[int] = ()
+    carried: Sequence[int] = ()
+    """Scans to which the robot was carried: the first ones of later sessions."""
+
+    def believed(self, config: SecondLooksConfig) -> Float[np.ndarray, "t 3 3"]:
+        """Return the covariance of each motion as it counts: scan matching states more than its error."""
+        covs = self.covs / config.understated
+        rows = np.array(self.carried, dtype=np.int64) - 1
+        covs[rows] = self.covs[rows]
+        return covs
 
     def links(self, doubt: float, config: SecondLooksConfig) -> Links:
         """Return the motions as links that count less from so many standard deviations on; slips hold little."""
         slip = np.diag(np.square([*[config.closures.slip_m] * 2, config.closures.slip_rad]))
-        covs = self.covs / config.understated + LEAST_COV
+        covs = self.believed(config) + LEAST_COV
         covs[np.array(self.slipped, dtype=np.int64) - 1] = slip
         at = np.arange(len(self.motions))
         return Links(at, at + 1, self.motions, whiteners(covs), doubt)

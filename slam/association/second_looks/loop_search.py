@@ -50,7 +50,7 @@ class LoopSearch:
         motions = drive.motions
         self.poses = np.tile(start_world, (len(motions) + 1, 1))
         self.closures: list[Closure] = []
-        self._motions, self._covs = motions.copy(), drive.covs
+        self._motions, self._driven = motions.copy(), drive
         self._returns, self._config = returns, config
         self._slipped: list[int] = []
         self._found: list[Closure] = []
@@ -68,14 +68,23 @@ class LoopSearch:
     @property
     def drive(self) -> Drive:
         """The motions, those of slips as closures tell them."""
-        return Drive(self._motions, self._covs, self._slipped)
+        return replace(self._driven, motions=self._motions, slipped=self._slipped)
+
+    @property
+    def _breaks(self) -> list[int]:
+        """The scans that do not go on from the one before: after slips, and where the robot was carried."""
+        return sorted([*self._slipped, *self._driven.carried])
 
     def _go_to(self, scan: int) -> None:
         c = self._config.closures
         self.poses[scan] = compose(self.poses[scan - 1], self._motions[scan - 1])
-        before = range(max([scan - c.fit_scans, 0, *self._slipped[-1:]]), scan)
+        before = range(self._since(scan, scan - c.fit_scans), scan)
         if self._returns.fit(scan, before, self.poses) < c.slip_fit:
             self._slipped.append(scan)
+
+    def _since(self, scan: int, first: int) -> int:
+        """Return the first of the scans from one on that go on up to another without a break."""
+        return max([first, 0, *(k for k in self._breaks if k <= scan)])
 
     def _look(self, new: int) -> None:
         """Seek the place of a scan among old ones; take it in if it agrees with one found before."""
@@ -94,7 +103,7 @@ class LoopSearch:
     def _query(self, new: int) -> Float[np.ndarray, "n 2"]:
         """Return the latest returns up to a scan, in its frame."""
         first = int(np.searchsorted(self._ways, self._ways[new] - self._config.closures.query_m))
-        return self._returns.seen_from(range(max([first, *self._slipped[-1:]]), new + 1), self.poses, new)
+        return self._returns.seen_from(range(self._since(new, first), new + 1), self.poses, new)
 
     def _place(self, new: int) -> tuple[Closure, Candidate] | None:
         """Return where a scan was taken, as seen from the old scans on which it lies best, and how it was sought.
@@ -149,8 +158,8 @@ class LoopSearch:
         c, old = self._config.closures, candidate.old
         beside_m = max(c.beside_m, candidate.window.half_m)
         first, last = np.searchsorted(self._ways, self._ways[old] + np.array([-beside_m, beside_m]))
-        low = max([int(first), *(k for k in self._slipped if k <= old)])
-        high = min([int(last), new - c.recent // 2, *(k for k in self._slipped if k > old)])
+        low = self._since(old, int(first))
+        high = min([int(last), new - c.recent // 2, *(k for k in self._breaks if k > old)])
         return range(low, max(high, old + 1))
 
     def _candidates(self, new: int) -> list[Candidate]:
@@ -207,7 +216,7 @@ class LoopSearch:
         motions = np.minimum(nexts, scans)[driven]
         back = np.tile(np.eye(3), (len(motions), 1, 1))
         back[:, :2, :2] = turned(back[:, :2, :2], self.poses[motions, 2])
-        covs[driven] = back.transpose(0, 2, 1) @ (self._covs[motions] / c.understated) @ back
+        covs[driven] = back.transpose(0, 2, 1) @ self._driven.believed(c)[motions] @ back
         # An error of the heading there moves the pose by its lever.
         move = np.tile(np.eye(3), (new, 1, 1))
         move[:, :2, 2] = (self.poses[new, :2] - self.poses[:new, :2]) @ J.T
@@ -224,7 +233,7 @@ class LoopSearch:
         low, high = 2.0 * c.every_m, c.query_m
         if not low <= self._ways[other.new] - self._ways[one.new] <= high:
             return False
-        if any(one.new < k <= other.new for k in self._slipped):
+        if any(one.new < k <= other.new for k in self._breaks):
             return False
         between = compose(inverse(self.poses[one.new]), self.poses[other.new])
         off = compose(compose(self.poses[one.old], one.motion), between)
@@ -241,5 +250,6 @@ class LoopSearch:
             slip, moved = between[-1], compose(put, inverse(self.poses[new]))
             self.poses[slip : new + 1] = [compose(moved, pose) for pose in self.poses[slip : new + 1]]
             self._motions[slip - 1] = compose(inverse(self.poses[slip - 1]), self.poses[slip])
-        so_far = Drive(self._motions[:new], self._covs[:new], self._slipped)
+        carried = [k for k in self._driven.carried if k <= new]
+        so_far = Drive(self._motions[:new], self._driven.covs[:new], self._slipped, carried)
         self.poses[: new + 1] = settled(self.poses[: new + 1], so_far, self.closures, self._config)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ...estimation.mounting import scanner_poses
 from ...map.kernels.ray_evidence import ray_evidence
@@ -24,17 +24,26 @@ NO_RAYS = Rays()
 
 
 def refuted(at: Unknowns, reach: Float[np.ndarray, "l 2"], rays: Rays, margin_m: float) -> Bool[np.ndarray, " l"]:
-    """Return which lines more scans speak against than for.
+    """Return which lines more scans speak against than for."""
+    pro, contra = voted(at, reach, rays, margin_m)
+    return contra > pro
+
+
+def voted(
+    at: Unknowns, reach: Float[np.ndarray, "l 2"], rays: Rays, margin_m: float
+) -> tuple[Int[np.ndarray, " l"], Int[np.ndarray, " l"]]:
+    """Return how many scans speak for each line, and how many against it.
 
     A scan speaks for a line if more of its beams end within a margin of it, along its reach, than go on beyond it.
     Beams that end before it say nothing, nor do those beside its ends.
     """
-    balance = np.zeros(len(at.lines), dtype=np.int64)
+    pro, contra = np.zeros((2, len(at.lines)), dtype=np.int64)
     low, high = reach[:, :1] + margin_m, reach[:, 1:] - margin_m
     for scan, pose in zip(rays.scans, scanner_poses(at.poses, rays.scanner), strict=False):
         seen = ray_evidence(scan, pose, at.anchors, at.lines, margin_m)
         inside = (seen.along > low) & (seen.along < high)
         ended = np.count_nonzero(seen.hits & inside, axis=1)
         passed = np.count_nonzero(seen.passes & inside, axis=1)
-        balance += np.sign(ended - passed)
-    return balance < 0
+        pro += ended > passed
+        contra += passed > ended
+    return pro, contra

@@ -1,1 +1,1 @@
-"""Bends, steps and mixed faces: where a wall is a polyline, and what all scans together know of it."""
+"""Bends: where a wall is a polyline, and what all scans together know of it."""

@@ -14,7 +14,6 @@ from jaxtyping import Float, Int
 
 from ...estimation.shared import SharedConfig, of_shared
 from ...extraction.segments import Segments
-from ...extraction.visible_extent import beam_step
 from ...geometry.quantities import Count, Sigmas, Size
 from ...robot import Scan
 from ..records import Merger, Records
@@ -115,7 +114,7 @@ class ChangePoints:
         if len(ours) < 2:
             return None
         ours = ours[np.argsort(run[ours, 0])]
-        bend = np.mod(change_point.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / beam_step(scan)
+        bend = np.mod(change_point.bearing_rad - scan.bearings_rad[0], 2.0 * np.pi) / scan.step_rad
         bend = np.mod(bend - first, beams)
         nearest = int(np.argmin(np.abs(0.5 * (run[ours[:-1], 1] + run[ours[1:], 0]) - bend)))
         before, after = ours[nearest : nearest + 2].tolist()

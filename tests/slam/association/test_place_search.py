@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chainslam.sim.lidar import LidarConfig, RangeFinder, noisy
-from chainslam.slam.association.place_search import place_of
+from chainslam.slam.association import place_search
+from chainslam.slam.association.place_search import PlaceSearchConfig, place_of, places_anywhere
 from chainslam.slam.association.recovery import RecoveryConfig
 from chainslam.slam.extraction.extract import extract
 from chainslam.slam.geometry.poses import rotation, wrap
@@ -86,3 +87,21 @@ def test_a_robot_that_stands_beside_all_walls_is_found_too():
     outside = CROOKED[:, ::-1]
     place = place_of(extract(scan_at(outside, pose, rng)), walls_of(outside, np.zeros(3)), WHOLE_MAP)
     assert np.hypot(*(place - pose)[:2]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("changed", "most", "expected"),
+    [
+        ({}, 9, [0, 2]),
+        ({"rival": 0.8}, 9, [0, 2, 3]),
+        ({"least": 0.95}, 9, [0]),
+        ({"rival": 0.1, "least": 0.1}, 3, [0, 2, 3]),
+    ],
+)
+def test_places_are_those_about_as_good_as_the_best_and_apart_from_better_ones(monkeypatch, changed, most, expected):
+    poses = np.array([[0.0, 0, 0], [0.1, 0, 0], [3.0, 0, 0], [6.0, 0, 0], [9.0, 0, 0]])
+    scores = np.array([1.0, 0.97, 0.93, 0.85, 0.4])
+    monkeypatch.setattr(place_search, "_fitting", lambda *_: (poses[::-1], scores[::-1]))
+    config = PlaceSearchConfig(least=changed.get("least", 0.5), rival=changed.get("rival", 0.9))
+    found = places_anywhere(np.zeros((2, 2)), np.zeros((2, 2)), config, most)
+    np.testing.assert_array_equal(found, poses[expected])

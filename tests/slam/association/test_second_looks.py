@@ -141,6 +141,15 @@ def test_derivatives_are_those_of_differences(of):
         np.testing.assert_allclose(slope, told, atol=1e-4)
 
 
+def test_where_the_robot_was_carried_the_motion_counts_as_it_is_stated():
+    """A search for the place states its error, and scan matching more than its own."""
+    covs = np.tile(np.diag([0.1, 0.1, 0.02]) ** 2, (4, 1, 1))
+    believed = Drive(np.zeros((4, 3)), covs, carried=(3,)).believed(CONFIG)
+    np.testing.assert_array_equal(believed[2], covs[2])
+    for k in (0, 1, 3):
+        np.testing.assert_allclose(believed[k], covs[k] / CONFIG.understated)
+
+
 def test_a_motion_holds_as_far_as_it_is_stated_and_least_where_it_is_stated_least():
     """A corridor told the motion across it alone: what closes the loop is found in the motion along it."""
     motions = np.array([[1.0, 0.0, 0.0]] * 4)

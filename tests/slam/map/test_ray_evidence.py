@@ -7,8 +7,8 @@ import shapely
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.extraction.config import ExtractionConfig
 from chainslam.slam.extraction.extract import extract
-from chainslam.slam.extraction.segments import EndKind, Segments
-from chainslam.slam.extraction.visible_extent import owners_of_beams, sure_pieces
+from chainslam.slam.extraction.segments import EndKind
+from chainslam.slam.extraction.visible_extent import sure_pieces
 from chainslam.slam.geometry.lines import normals, through
 from chainslam.slam.map.kernels.ray_evidence import ray_evidence
 from chainslam.slam.robot import Scan
@@ -114,39 +114,18 @@ def test_a_corner_far_beyond_the_last_beam_was_not_seen(leap_m, is_believed):
     assert sure.end_kinds[0, 1] == (EndKind.CORNER if is_believed else EndKind.OPEN)
 
 
-def segments_with(beams):
-    count = len(beams)
-    none = np.zeros((count, 2), dtype=np.int64)
-    lines = np.tile([0.0, 1.0], (count, 1))
-    return Segments(
-        lines,
-        np.zeros((count, 2, 2)),
-        np.zeros((count, 2, 2)),
-        np.array(beams),
-        np.full(count, 5),
-        none,
-        np.zeros(count),
-        np.zeros(count, bool),
-    )
-
-
-def test_beams_belong_to_the_walls_of_their_segments_also_across_the_seam():
-    segments = segments_with([[3, 5], [6, 6], [9, 1]])
-    owners = owners_of_beams(segments, np.array([7, -1, 4]), 12)
-    np.testing.assert_array_equal(owners, [4, 4, -1, 7, 7, 7, -1, -1, -1, 4, 4, 4])
-
-
 def test_a_wall_across_the_seam_has_as_many_beams_as_anywhere_else():
     """Turn the robot: the same wall crosses the seam or does not; its beams are those that end on it."""
     room = faces_of(shapely.orient_polygons(shapely.box(0, 0, 3, 2.4)))
     for heading in np.linspace(-np.pi, np.pi, 17):
         scan = scan_from(room, [1.3, 1.1, heading])
         segments = extract(scan)
-        owners = owners_of_beams(segments, np.arange(len(segments)), len(scan.bearings_rad))
         assert len(segments) == 4
         for row in range(4):
             alpha, r = segments.lines[row]
-            mine = owners == row
+            first, last = segments.beams[row]
+            beams = len(scan.bearings_rad)
+            mine = (np.arange(beams) - first) % beams <= (last - first) % beams
             across = scan.ranges_m * np.cos(scan.bearings_rad - alpha) - r
             assert np.abs(across[mine]).max() < 1e-6
             assert mine.sum() >= np.count_nonzero(np.abs(across) < 1e-6) - 4
