@@ -7,6 +7,7 @@ iSAM2 together when a belief is next asked for; a prediction alone is propagated
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import gtsam
 import numpy as np
@@ -179,25 +180,24 @@ class Graph:
         self._isam.enter(line, self.record.see(self._isam.last, line, seen, cov))
 
     def _new_belief(self) -> Belief:
-        isam, frame, version = self._isam, self.record.frame, self._version
-        ahead = Ahead(isam.pose, self.record.motions[isam.last :])
-        anchors, inner, lines = self._anchors, self._inner_anchors, isam.lines
-        means = lines.copy()
-        means[:, 1] -= np.vecdot(normals(lines[:, 0]), inner)
+        isam, frame = self._isam, self.record.frame
+        self._ahead = Ahead(isam.pose, self.record.motions[isam.last :])
+        self._means = isam.lines.copy()
+        self._means[:, 1] -= np.vecdot(normals(isam.lines[:, 0]), self._inner_anchors)
+        pose = self._joint(np.zeros(0, dtype=np.int64), isam.pose_cov())
+        means, query = frame.means_world(self._means), partial(self._query, self._version)
+        return Belief(pose.mean, pose.cov, isam.ids, self._anchors, means, query)
 
-        def joint(rows: Int[np.ndarray, " m"], cov: Float[np.ndarray, "s s"]) -> Joint:
-            mean = np.concatenate([ahead.pose, means[rows].ravel()])
-            return frame.joint_world(Joint(mean, ahead.cov(cov, lines[rows], inner[rows]), inner[rows]))
+    def _query(self, version: int, ids: Int[np.ndarray, " m"]) -> Joint:
+        if version != self._version:
+            raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
+        rows = self._rows(ids)
+        return self._joint(rows, self._isam.joint_cov(rows))
 
-        def query(wanted: Int[np.ndarray, " m"]) -> Joint:
-            if version != self._version:
-                raise StaleBeliefError("expected a belief of the present step, found one whose back end has moved on")
-            rows = belief.rows(wanted)
-            return joint(rows, isam.joint_cov(rows))
-
-        pose = joint(np.zeros(0, dtype=np.int64), isam.pose_cov())
-        belief = Belief(pose.mean, pose.cov, isam.ids, anchors, frame.means_world(means), query)
-        return belief
+    def _joint(self, rows: Int[np.ndarray, " m"], cov: Float[np.ndarray, "s s"]) -> Joint:
+        mean, anchors = np.concatenate([self._ahead.pose, self._means[rows].ravel()]), self._inner_anchors[rows]
+        cov_ahead = self._ahead.cov(cov, self._isam.lines[rows], anchors)
+        return self.record.frame.joint_world(Joint(mean, cov_ahead, anchors))
 
     def _start_from(self, values: gtsam.Values) -> None:
         """Make the graph of the record anew, linearised there."""
@@ -270,12 +270,12 @@ class Graph:
 
     def _rows(self, ids: Sequence[int] | Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return where the ids stand among the lines shown; raises KeyError for others."""
-        wanted = np.asarray(ids, dtype=np.int64)
-        known = self._isam.ids
-        found = np.isin(wanted, known)
-        if not np.all(found):
+        wanted, known = np.asarray(ids, dtype=np.int64), self._isam.ids
+        rows = np.searchsorted(known, wanted)
+        found = np.take(known, rows, mode="clip") == wanted if len(known) else np.zeros(len(wanted), dtype=bool)
+        if not found.all():
             raise KeyError(f"expected ids of lines in the map, found {wanted[~found].tolist()}")
-        return np.searchsorted(known, wanted)
+        return rows
 
     def _anchor(self) -> None:
         shown = [self.record.lines[line].anchor for line in self._isam.ids.tolist()]

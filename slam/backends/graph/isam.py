@@ -119,10 +119,8 @@ class Isam:
 
     def hide(self, rows: Int[np.ndarray, " m"]) -> None:
         """No longer show the lines in these rows."""
-        kept = np.delete(np.arange(len(self.ids)), rows)
-        self.ids, self.lines, self._linear, self._off = (
-            each[kept] for each in (self.ids, self.lines, self._linear, self._off)
-        )
+        self.ids, self._off = np.delete(self.ids, rows), np.delete(self._off, rows)
+        self.lines, self._linear = np.delete(self.lines, rows, axis=0), np.delete(self._linear, rows, axis=0)
         self._keys = [line_key(line) for line in self.ids.tolist()]
         self._near = [key for key in self._near if key in self._keys]
 
