@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from ...estimation.backend import Belief, ContradictionError, Joint, Observations, StaleBeliefError
 from ...estimation.models import initialise, innovations, stack
 from ...geometry.lines import normals
-from ...geometry.poses import to_robot, to_world
+from ...geometry.poses import to_robot, to_world, wrap
 from ...robot import Odometry
 from ..frame.frame import Frame
 from .ahead import Ahead
@@ -98,8 +98,9 @@ class Graph:
             )
             H = seen.H[:, :3]
             isam.move(ahead.pose + ahead.Q @ H.T @ np.linalg.solve(H @ ahead.Q @ H.T + seen.R, seen.e))
+        turns = wrap(second.lines[:, 0] - isam.lines[rows, 0] + isam.pose[2])
         for k in np.lexsort((second.lines[:, 1], second.lines[:, 0], rows)).tolist():
-            self._see(int(second.ids[k]), second.lines[k], second.cov[k])
+            self._see(int(second.ids[k]), second.lines[k], second.cov[k], float(turns[k]))
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
@@ -176,8 +177,8 @@ class Graph:
 
     # -- inside -----------------------------------------------------------------------------------------------------
 
-    def _see(self, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> None:
-        self._isam.enter(line, self.record.see(self._isam.last, line, seen, cov))
+    def _see(self, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"], epsilon: float = 0.0) -> None:
+        self._isam.enter(line, self.record.see(self._isam.last, line, seen, cov, epsilon))
 
     def _new_belief(self) -> Belief:
         isam, frame = self._isam, self.record.frame

@@ -72,10 +72,12 @@ class Record:
         self.lines |= {line: Line(anchor) for line, anchor in zip(ids, anchors, strict=True)}
         return ids
 
-    def see(self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> Observation:
-        """Note an observation and return it."""
+    def see(
+        self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"], epsilon: float
+    ) -> Observation:
+        """Note an observation that departs from its line by epsilon (rad) and return it."""
         (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
-        observation = Observation(pose, (alpha, r, along, cross, across))
+        observation = Observation(pose, (alpha, r, along, cross, across), epsilon=epsilon)
         self.lines[line].observations.append(observation)
         self.fresh.append((line, observation))
         return observation
