@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from ...estimation.backend import Belief, ContradictionError, Joint, Observations, StaleBeliefError
 from ...estimation.models import initialise, innovations, stack
 from ...geometry.lines import normals
-from ...geometry.poses import to_robot, to_world, wrap
+from ...geometry.poses import to_robot, to_world
 from ...robot import Odometry
 from ..frame.frame import Frame
 from .ahead import Ahead
@@ -98,9 +98,8 @@ class Graph:
             )
             H = seen.H[:, :3]
             isam.move(ahead.pose + ahead.Q @ H.T @ np.linalg.solve(H @ ahead.Q @ H.T + seen.R, seen.e))
-        turns = wrap(second.lines[:, 0] - isam.lines[rows, 0] + isam.pose[2])
         for k in np.lexsort((second.lines[:, 1], second.lines[:, 0], rows)).tolist():
-            self._see(int(second.ids[k]), second.lines[k], second.cov[k], float(turns[k]))
+            self._see(int(rows[k]), second.lines[k], second.cov[k])
 
     def grow(
         self, lines: Float[np.ndarray, "m 2"], cov: Float[np.ndarray, "m 2 2"], centres: Float[np.ndarray, "m 2"]
@@ -112,8 +111,8 @@ class Graph:
         new = initialise(isam.pose, lines, centres, at_wall=False)
         ids = self.record.begin(self.record.frame.anchors_world(to_world(centres, isam.pose)))
         isam.enter_lines(ids, new.means)
-        for k, line in enumerate(ids):
-            self._see(line, lines[k], cov[k])
+        for k, row in enumerate(self._rows(ids).tolist()):
+            self._see(row, lines[k], cov[k])
         self._anchor()
         return np.array(ids, dtype=np.int64)
 
@@ -177,8 +176,10 @@ class Graph:
 
     # -- inside -----------------------------------------------------------------------------------------------------
 
-    def _see(self, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"], epsilon: float = 0.0) -> None:
-        self._isam.enter(line, self.record.see(self._isam.last, line, seen, cov, epsilon))
+    def _see(self, row: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"]) -> None:
+        isam = self._isam
+        line, epsilon = int(isam.ids[row]), float(seen[0] - isam.lines[row, 0] + isam.pose[2])
+        isam.enter(line, self.record.see(isam.last, line, seen, cov, epsilon))
 
     def _new_belief(self) -> Belief:
         isam, frame = self._isam, self.record.frame

@@ -75,7 +75,7 @@ class Record:
     def see(
         self, pose: int, line: int, seen: Float[np.ndarray, "2"], cov: Float[np.ndarray, "2 2"], epsilon: float
     ) -> Observation:
-        """Note an observation that departs from its line by epsilon (rad) and return it."""
+        """Note an observation that departs from its line by epsilon, rad, and return it."""
         (alpha, r), ((along, cross), (_, across)) = seen.tolist(), cov.tolist()
         observation = Observation(pose, (alpha, r, along, cross, across), epsilon=epsilon)
         self.lines[line].observations.append(observation)
