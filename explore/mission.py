@@ -21,7 +21,6 @@ from .goal import GivenUp
 from .goals.decider import Driver
 from .goals.explorer import Explorer
 from .goals.explorer_config import ExplorerConfig
-from .goals.first_turns import FirstTurns
 from .goals.homing import Homing, HomingConfig
 from .goals.later_session import LaterSession
 from .goals.lost import Lost, LostConfig
@@ -67,7 +66,7 @@ def explore_mission(
 
     def explorer() -> Driver:
         start, following = mapper.belief.pose_world[:2].copy(), config.explorer.following
-        explorer = FirstTurns(Explorer(strategy, start, config.explorer), following.driving)
+        explorer = Explorer(strategy, start, config.explorer)
         inner = Homing(explorer, start, config.homing, following) if config.return_to_start else explorer
         return Lost(Retreat(inner, floor, config.retreat, following), config.lost, following.driving)
 
@@ -108,7 +107,7 @@ def driven_mission(robot: Robot, mapper: Mapper, driver: Driver, floor: FloorMem
             if floor is not None:
                 floor.move(localisation.unstated_motion)
         if floor is not None and not localisation.is_lost:
-            floor.see(update.map, scan)
+            floor.see(update.map.belief.pose_world, scan)
         decides = time.thread_time()
         seen = sorted({wall for wall in update.walls_of_segments.tolist() if wall >= 0})
         if not localisation.is_lost:

@@ -3,7 +3,7 @@
 `MapUpdate` tells what a scan changed.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from .estimation.backend import Backend, Belief
 from .estimation.mounting import belief_of_body, odometry_of_body
 from .extraction.segments import Segments
 from .extraction.straightness import cov_of_bows, cov_of_misfits
-from .map.chains import Chain, connect
+from .map.chains import Chain
 from .map.existence import LandmarkCandidates
 from .map.landmarks import Landmarks
 from .map.merging import duplicate_of
@@ -106,12 +106,6 @@ class MapKeeper:
         for keep, drop in merged:
             owners = np.where(owners == drop, keep, owners)
         return walls, owners, merged
-
-    def connect(self, walls: StochasticMap, scan: Scan, set_aside: Collection[tuple[int, int]]) -> tuple[Chain, ...]:
-        """Return the chains of the walls, by what this scan and those before saw between them."""
-        openings = self.landmarks.openings
-        openings.see(walls, scan)
-        return connect(walls, set_aside, openings.passed, openings.cut_off, self.config.shared)
 
     def _initialised(
         self, scan: Scan, segments: Segments, matches: Matches, sides: Int[np.ndarray, " c"]

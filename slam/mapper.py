@@ -22,7 +22,7 @@ from .extraction.config import ExtractionConfig
 from .extraction.extract import NO_VERTICES, extract
 from .extraction.segments import Segments
 from .extraction.visible_extent import sure_pieces
-from .map.chains import Chain
+from .map.chains import Chain, connect
 from .map.polylines.vertices import mistaken, vertices_within
 from .map.polylines.wall_beams import beams_on_walls
 from .map.reliability import are_clear, as_told
@@ -168,7 +168,7 @@ class Mapper:
         segments, matches, sides = self._cut_at_change_points(scan, segments, matches)
         walls, owners, merged = self._keeper.store(scan, segments, matches, sides)
         # 6. Initialise a new chain for each new segment.  7. Connect open ends of chains that are near.
-        self._chains = self._keeper.connect(walls, scan, set_aside)
+        self._chains = connect(walls, set_aside, self.config.shared)
         localisation = Localisation(found.nis, motion, noise_factor=self._weighed(found, motion))
         return MapUpdate(segments, matches, owners, walls, self._chains, merged, localisation)
 

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from chainslam.explore.following.wall_following import Following
-from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.following.wall_following import Following, Navigation
 from chainslam.explore.step import Step
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 

@@ -10,8 +10,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chainslam.explore.following.wall_following import Following
-from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.following.wall_following import Following, Navigation
 
 from ..artifacts.reading import read_json
 from ..artifacts.settings import drawing_said, drawing_settings, settings_of

@@ -10,8 +10,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, overload
 
-from chainslam.explore.following.wall_following import Following
-from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.following.wall_following import Following, Navigation
 from chainslam.slam.backends import BACKENDS
 from chainslam.slam.robot import Robot, RobotSpec
 

@@ -60,41 +60,13 @@ class FreeSpace:
         self.config = config
         self._evidence = np.zeros((0, 0), dtype=np.int8)
         self._clearance = np.zeros((0, 0), dtype=np.float32)
-        self._driven = np.zeros((0, 0), dtype=bool)
         self._touched = np.zeros((0, 0), dtype=bool)
         self._beyond = np.zeros((0, 0), dtype=bool)
         self._fence = None if config.fence is None else shapely.Polygon(config.fence)
         self._first = np.zeros(2, dtype=np.int64)
         self._dirty: Box | None = None
-        self._too_tight = np.zeros((0, 2))
         self.range_m = np.inf
         """Maximum range of the last scan."""
-
-    def note_too_tight(self, place_world: Float[np.ndarray, "2"]) -> None:
-        """Remember that the body did not get through a narrow place, once for each."""
-        if not np.any(np.all(self._too_tight == place_world, axis=1)):
-            self._too_tight = np.vstack([self._too_tight, place_world])
-
-    def forget_too_tight(self) -> None:
-        """Forget where the body did not get through: something stood there that moves."""
-        self._too_tight = np.zeros((0, 2))
-
-    def may_fit(self, box: tuple[slice, slice], reach_m: float) -> Bool[np.ndarray, "h w"]:
-        """Return which cells of a part of the grid lie farther than `reach_m` from where the body did not fit.
-
-        Those through which it drove count among them wherever they lie: what let it in lets it out.
-        """
-        r0, r1, _ = box[0].indices(self.shape[0])
-        c0, c1, _ = box[1].indices(self.shape[1])
-        fits = np.ones((r1 - r0, c1 - c0), dtype=bool)
-        reach = int(np.ceil(reach_m / self.config.cell_m))
-        for r, c in self.cells(self._too_tight).tolist():
-            rows = slice(*np.clip([r - reach, r + reach + 1], r0, r1))
-            columns = slice(*np.clip([c - reach, c + reach + 1], c0, c1))
-            row, column = np.ogrid[rows, columns]
-            near = np.hypot(row - r, column - c) * self.config.cell_m <= reach_m
-            fits[rows.start - r0 : rows.stop - r0, columns.start - c0 : columns.stop - c0] &= ~near
-        return fits | self._driven[box]
 
     def note_touched(self, place_world: Float[np.ndarray, "2"]) -> None:
         """Remember that the body touched something at a place: an obstacle, whatever beams say of it."""
@@ -102,21 +74,6 @@ class FreeSpace:
         for row, column in cells[self.inside(cells)].tolist():
             self._touched[row, column] = True
             self._mark(row, row + 1, column, column + 1)
-
-    def note_driven(self, places_world: Float[np.ndarray, "n 2"]) -> None:
-        """Remember that the robot's centre was at some places of the grid: the body fits there."""
-        cells = self.cells(places_world)
-        self._driven[tuple(cells[self.inside(cells)].T)] = True
-
-    def forget_driven(self, place_world: Float[np.ndarray, "2"], reach_m: float) -> None:
-        """Forget that the body fitted within reach of a place."""
-        reach = int(np.ceil(reach_m / self.config.cell_m))
-        r, c = np.maximum(self.cells(place_world[None])[0] - reach, 0).tolist()
-        self._driven[r : r + 2 * reach + 1, c : c + 2 * reach + 1] = False
-
-    def driven(self, box: tuple[slice, slice]) -> Bool[np.ndarray, "h w"]:
-        """Return through which cells of a part of the grid the robot's centre went."""
-        return self._driven[box]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -186,16 +143,9 @@ class FreeSpace:
             self._dirty = None
         return self._clearance
 
-    def blank(self) -> "FreeSpace":
-        """Return a grid of the same size without any scan, way or touch in it."""
-        new = FreeSpace(self.config)
-        new.range_m, new._first = self.range_m, self._first
-        new._lay(self.shape)
-        return new
-
-    def become(self, other: "FreeSpace") -> None:
-        """Take over all that another grid holds, which is not used any more."""
-        self.__dict__.update(other.__dict__)
+    def clear(self) -> None:
+        """Forget every scan and touch."""
+        self._lay(self.shape)
 
     def integrate(self, pose_world: Float[np.ndarray, "3"], scan: Scan) -> None:
         """Take in one scan at an estimated pose of the body; raises FloorTooLargeError for one too far from others."""
@@ -247,7 +197,7 @@ class FreeSpace:
         shape = tuple((end - first)[::-1].tolist())
         if shape[0] * shape[1] > self.config.cells_max:
             raise self._too_large(centre_world)
-        old = self._evidence, self._driven, self._touched, self._clearance
+        old = self._evidence, self._touched, self._clearance
         c, r = (self._first - first).tolist()
         self._first = first
         if old[0].size and self._dirty is not None:
@@ -255,12 +205,12 @@ class FreeSpace:
             self._dirty = r0 + r, r1 + r, c0 + c, c1 + c
         self._lay(shape)
         place = (slice(r, r + old[0].shape[0]), slice(c, c + old[0].shape[1]))
-        self._evidence[place], self._driven[place], self._touched[place], self._clearance[place] = old
+        self._evidence[place], self._touched[place], self._clearance[place] = old
 
     def _lay(self, shape: tuple[int, ...]) -> None:
         """Make a grid of which nothing is known but what lies beyond the fence."""
         self._evidence = np.zeros(shape, dtype=np.int8)
-        self._driven, self._touched, self._beyond = np.zeros((3, *shape), dtype=bool)
+        self._touched, self._beyond = np.zeros((2, *shape), dtype=bool)
         self._clearance = np.full(shape, self.config.clearance_limit_m, dtype=np.float32)
         if self._fence is not None:
             columns, rows = (

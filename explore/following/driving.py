@@ -10,9 +10,9 @@ from chainslam.slam.robot import MotionCommand, RobotSpec
 from chainslam.slam.robot.body import reaches_m, rim_of
 
 from ..floor.accumulated_returns import steadied
-from ..planning.paths import Field, Path, Planner
+from ..planning.paths import Field, Path
 from .driving_config import DrivingConfig
-from .motion_kernels import Motions, cells_ahead, clearance_m, cost_of_plan, metres_at, search, step_room_m
+from .motion_kernels import Motions, cells_ahead, clearance_m, cost_of_plan, search, step_room_m
 from .surroundings import Surroundings
 
 _NOTHING = np.zeros((0, 2))
@@ -55,23 +55,11 @@ class Controller:
 class Pilot:
     """Drives along one path."""
 
-    def __init__(self, path: Path, planner: Planner, config: DrivingConfig) -> None:
-        self._field, self._planner = path.field, planner
+    def __init__(self, path: Path, config: DrivingConfig) -> None:
+        self._field = path.field
         self._controller = Controller(config)
         self.destination_world = path.points_world[-1]
         """Where the path ends, m."""
-
-    def remaining_m(self, pose_world: Float[np.ndarray, "3"]) -> float:
-        """Return what is left of the way, m, a metre in a narrow place for more."""
-        x, y, heading = pose_world.tolist()
-        return metres_at(x, y, heading, self._field)
-
-    def squeeze_world(self, pose_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"] | None:
-        """Return where, within the next half metre, there is hardly room for the body; None if nowhere."""
-        cells = cells_ahead(pose_world[0], pose_world[1], 10, self._field)
-        ahead = self._field.corner_world + (cells[:, ::-1] + 0.5) * self._field.cell_m
-        tight = np.flatnonzero(~self._planner.has_room(ahead))
-        return ahead[tight[len(tight) // 2]] if len(tight) else None
 
     def arrived(self, pose_world: Float[np.ndarray, "3"]) -> bool:
         """Return whether the robot stands where nothing is left of the way."""

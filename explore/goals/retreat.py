@@ -8,6 +8,7 @@ import networkx as nx
 import numpy as np
 from jaxtyping import Float
 
+from chainslam.slam.geometry.poses import to_world
 from chainslam.slam.geometry.quantities import Distance, Number, Share, Size
 from chainslam.slam.map.chains import Chain
 from chainslam.slam.robot import MotionCommand, Odometry, RobotSpec, of_robot
@@ -85,7 +86,7 @@ class Retreat:
                 return self._decided
             return replace(self._decided, words=f"locked in at step {self._step}", outcome=Outcome.FAILED)
         self._rounds, self._since_m = self._rounds + 1, 0.0
-        self._floor.begin_anew(around.walls)
+        self._floor.begin_anew(around.pose_world)
         self._inner.start_over()
         self._decided = Decision(None, "")
         self._back_m, self._why = self._config.locked_back_m, "no way led on where it had driven"
@@ -97,7 +98,8 @@ class Retreat:
     def _note_touch(self, around: Surroundings) -> None:
         """Make an obstacle of what the body met, and turn back; a touch on the way back ends that."""
         places = self._touches.meet(self._points(around))
-        self._floor.note_touched(around.pose_world, places)
+        for place in to_world(places, around.pose_world):
+            around.free_space.note_touched(place)
         self._inner.interrupt(around)
         self._back_m, self._why = self._config.touched_back_m, "" if self._was_back else "the body touched something"
 

@@ -58,12 +58,9 @@ class DrivingField:
             return metres
         return self._lookup(self._far, places_world)
 
-    def can_stay(self, cells: Int[np.ndarray, "n 2"], *, only_near: bool = False) -> Bool[np.ndarray, " n"]:
-        """Return in which cells (row, column of the grid) the robot's centre may stay, and can get to.
-
-        With `only_near`, by a way that leads through the near box only.
-        """
-        at, reach = tuple(cells.T), self._near if only_near else self._far
+    def can_stay(self, cells: Int[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return in which cells (row, column of the grid) the robot's centre may stay, and can get to."""
+        at, reach = tuple(cells.T), self._far
         free, clearance = self._free_space.evidence[at] < 0, self._free_space.clearance()[at]
         block = np.clip(cells // self._block - reach.first_block, -1, np.array(reach.metres.shape) - 2) + 1
         return roomy(free, clearance, self._config) & np.isfinite(reach.metres[tuple(block.T)])
@@ -73,37 +70,25 @@ class DrivingField:
         """Whose body it is that drives."""
         return self._config.robot
 
-    @property
-    def near_box(self) -> tuple[slice, slice]:
-        """The part of the grid in which what is near is searched."""
-        return self._box_of_cells(self._near_blocks)
-
-    @property
-    def _near_blocks(self) -> int:
-        return int(np.ceil(NEAR_M / self._side_m)) + 1
-
     def _box_of_cells(self, reach: int) -> tuple[slice, slice]:
         """Return the cells of the blocks up to `reach` from the start in rows and columns."""
         low, high = self._block * np.maximum(self._start - reach, 0), self._block * (self._start + reach + 1)
         return slice(low[0], high[0]), slice(low[1], high[1])
 
     def stands_around(
-        self, places_world: Float[np.ndarray, "n 2"], metres: Float[np.ndarray, " k"], *, only_near: bool = False
+        self, places_world: Float[np.ndarray, "n 2"], metres: Float[np.ndarray, " k"]
     ) -> Float[np.ndarray, "m 2"]:
-        """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`.
-
-        `only_near` as above.
-        """
+        """Return where the robot's centre may stay on rings around some places, m; the rings' radii are `metres`."""
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         around = (metres[:, None, None] * normals(angle)).reshape(-1, 2)
         stands = (places_world[:, None] + around).reshape(-1, 2)
         cells = self._free_space.cells(stands)
         inside = self._free_space.inside(cells)
-        return stands[inside][self.can_stay(cells[inside], only_near=only_near)]
+        return stands[inside][self.can_stay(cells[inside])]
 
     @cached_property
     def _near(self) -> _Reach:
-        return self._search(self._near_blocks)
+        return self._search(int(np.ceil(NEAR_M / self._side_m)) + 1)
 
     @cached_property
     def _far(self) -> _Reach:

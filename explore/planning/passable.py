@@ -30,8 +30,6 @@ class PathConfig:
     """Smallest clearance beside the body in narrow gaps, which are used only where no regular path exists."""
     squeeze_cost: Weight = 20.0
     """Additional cost of a metre with less clearance than `margin_m`; a metre on open floor costs 1."""
-    tight_beyond_m: Distance = 0.1
-    """A gap is not tried again within this distance, beside the body, of a place where the body did not fit."""
     standoff_beyond_m: Distance = 0.15
     """Clearance beyond the body's radius from which on a path costs nothing extra."""
     narrow_cost: Weight = 4.0
@@ -54,11 +52,6 @@ class PathConfig:
         return self.robot.beside(self.squeeze_beyond_m)
 
     @property
-    def tight_m(self) -> float:
-        """Where the body did not fit, so far around it is not tried again."""
-        return self.robot.beside(self.tight_beyond_m)
-
-    @property
     def standoff_m(self) -> float:
         """Distance of the middle of the body from walls that costs nothing."""
         return self.robot.beyond(self.standoff_beyond_m)
@@ -72,14 +65,10 @@ class PathConfig:
 def passable(
     free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig
 ) -> tuple[Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Return in which cells of a part of the grid the body fits, and in which it has room enough.
-
-    It fits wherever it drove, whatever beams say that were drawn at other poses.
-    """
+    """Return in which cells of a part of the grid the body fits, and in which it has room enough."""
     is_free, clearance = free_space.is_free(box), free_space.clearance()[box]
     roomy_cells = roomy(is_free, clearance, config)
-    fits = is_free & (clearance > config.squeeze_m - 1e-4) & free_space.may_fit(box, config.tight_m)
-    return fits | roomy_cells | free_space.driven(box), roomy_cells
+    return roomy_cells | (is_free & (clearance > config.squeeze_m - 1e-4)), roomy_cells
 
 
 def blind_blocks(free_space: FreeSpace, box: tuple[slice, slice], config: PathConfig) -> Bool[np.ndarray, "p q"]:

@@ -239,10 +239,6 @@ class Planner:
         local = local[np.all((local >= 0) & (local < self._roomy.shape), axis=1)]
         return self._free_space.points(local[self._roomy[tuple(local.T)]] + self._corner)
 
-    def has_room(self, points_world: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
-        """Return at which places, cells of the window, the body has room enough and need not squeeze."""
-        return self._roomy[tuple((self._free_space.cells(points_world) - self._corner).T)]
-
     def _open_start(self, is_free: Bool[np.ndarray, "h w"]) -> None:
         """Make the free cells around the robot passable at a price, where they bring it no nearer to a wall."""
         reach = int(np.ceil(self._config.escape_m / self._free_space.config.cell_m))

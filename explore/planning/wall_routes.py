@@ -34,11 +34,3 @@ def sequence(
                 is_sight = edge.get("kind") != NEIGHBOUR
                 heapq.heappush(queue, (changes + 1, sights + is_sight, (*walls, wall)))
     return ()
-
-
-def route(graph: nx.DiGraph[int], here: int | None, goal: int) -> tuple[int, ...]:
-    """Return the walls to follow from the present one to the goal, both included (`sequence`).
-
-    Where no way is known the goal stands alone: the robot then looks for one over the free floor.
-    """
-    return (() if here is None else sequence(graph, (here,), goal)) or (goal,)

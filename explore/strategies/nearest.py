@@ -1,6 +1,7 @@
 """What several strategies share: the nearest of some open ends, of some places."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -36,57 +37,49 @@ def straight_to_nearest_end(situation: Situation) -> Choice:
     return Choice(end, "no way to stand before any open end is known; nearest")
 
 
-def nearest_place(
-    situation: Situation, places: Sequence[Place], within_m: float = np.inf
-) -> tuple[Place, float] | None:
-    """Return the place that is the shortest drive away, and how far, m; None if no way so short leads to any."""
-    if not places:
-        return None
-    sizes = [len(place.points_world) for place in places]
-    points = np.concatenate([place.points_world for place in places])
-    metres = situation.field.metres(points, beyond_nearest=within_m == np.inf)
-    nearest = np.minimum.reduceat(metres, np.cumsum([0, *sizes[:-1]]))
-    best = int(np.argmin(nearest))
-    is_there = np.isfinite(nearest[best]) and nearest[best] <= within_m
-    return (places[best], float(nearest[best])) if is_there else None
-
-
 def nearest_frontier(situation: Situation, what: str) -> Choice | None:
     """Return the nearest border of seen floor, as a goal for as long as half of it still borders on unseen floor."""
-    return _nearest(situation, situation.frontiers, f"{what}: nearest of {{}} borders of seen floor", _still_frontier)
 
+    def is_left(place: Place, around: Surroundings) -> bool:
+        return bool(np.mean(borders_on_unseen(around.free_space, place.points_world)) >= STILL_UNSEEN)
 
-def nearest_viewpoint(
-    situation: Situation, seen: Mapping[Place, Place], what: str, within_m: float = np.inf
-) -> Choice | None:
-    """Return the nearest place from which another is seen, as a goal while half of that borders on unseen floor."""
-    words = f"{what}: in sight of walls, nearest of {{}}"
-    return _nearest(situation, list(seen), words, lambda stand: _still_frontier(seen[stand]), within_m)
+    return _nearest(situation, situation.frontiers, f"{what}: nearest of {{}} borders of seen floor", is_left)
 
 
 def nearest_unmapped_obstacle(situation: Situation, what: str) -> Choice | None:
     """Return the nearest thing that is no wall of the map, as a goal until a wall stands there."""
-    return _nearest(situation, situation.unmapped_obstacles, f"{what}: nearest of {{}}", _still_unmapped)
+
+    def is_left(place: Place, around: Surroundings) -> bool:
+        return not is_mapped(around.walls, place.centre_world)
+
+    return _nearest(situation, situation.unmapped_obstacles, f"{what}: nearest of {{}}", is_left)
+
+
+def nearest_left(situation: Situation, sweep: bool) -> Choice | None:
+    """Return what is left when no open end is: unseen floor, then things that are no wall of the map.
+
+    Without `sweep` it is only a first wall that is looked for.
+    """
+    if not len(situation.map):
+        return nearest_frontier(situation, "no wall is in sight yet")
+    if not sweep:
+        return None
+    things = "no open end is in reach, things stand that are no wall of the map"
+    frontier = nearest_frontier(situation, "no open end is in reach, unseen floor is left")
+    return frontier or nearest_unmapped_obstacle(situation, things)
 
 
 def _nearest(
-    situation: Situation,
-    places: Sequence[Place],
-    words: str,
-    holds: Callable[[Place], Callable[[Surroundings], bool]],
-    within_m: float = np.inf,
+    situation: Situation, places: Sequence[Place], words: str, is_left: Callable[[Place, Surroundings], bool]
 ) -> Choice | None:
-    """Return the nearest place as a choice, with the reason in `words`, which has a gap for how many there are."""
-    found = nearest_place(situation, places, within_m)
-    if found is None:
+    """Return the place that is the shortest drive away, with the reason in `words`, which has a gap for how many."""
+    if not places:
         return None
-    place, metres = found
-    return Choice(place, f"{words.format(len(places))}, {metres:.1f} m to drive", holds(place))
-
-
-def _still_unmapped(place: Place) -> Callable[[Surroundings], bool]:
-    return lambda around: not is_mapped(around.walls, place.centre_world)
-
-
-def _still_frontier(place: Place) -> Callable[[Surroundings], bool]:
-    return lambda around: bool(np.mean(borders_on_unseen(around.free_space, place.points_world)) >= STILL_UNSEEN)
+    sizes = [len(place.points_world) for place in places]
+    metres = situation.field.metres(np.concatenate([place.points_world for place in places]))
+    nearest = np.minimum.reduceat(metres, np.cumsum([0, *sizes[:-1]]))
+    best = int(np.argmin(nearest))
+    if not np.isfinite(nearest[best]):
+        return None
+    reason = f"{words.format(len(places))}, {nearest[best]:.1f} m to drive"
+    return Choice(places[best], reason, partial(is_left, places[best]))

@@ -18,7 +18,7 @@ from ..following.surroundings import Surroundings
 from ..following.wall_following import FollowingConfig
 from ..planning.driving_field import DrivingField
 from ..planning.visibility_graph import followed_wall
-from ..survey.frontiers import LEAST_CELLS, frontiers, pieces
+from ..survey.frontiers import frontiers
 from ..survey.unmapped_obstacles import obstacle_viewpoints, unmapped_obstacles
 from ..survey.viewpoints import ideal_places
 
@@ -96,15 +96,7 @@ class Situation:
     @cached_property
     def frontiers(self) -> tuple[Place, ...]:
         """Frontiers between reachable and unseen floor, without those that were visited in vain."""
-        return self._places(frontiers(self.around.free_space, self.field))
-
-    @cached_property
-    def frontiers_near(self) -> tuple[Place, ...]:
-        """Pieces of the frontiers close to the robot, at a fraction of the cost in a large building."""
-        borders = frontiers(self.around.free_space, self.field, only_near=True)
-        return self._places([piece for border in borders for piece in pieces(border) if len(piece) >= LEAST_CELLS])
-
-    def _places(self, borders: list[np.ndarray]) -> tuple[Place, ...]:
+        borders = frontiers(self.around.free_space, self.field)
         places = (Place(border, "unseen floor is left") for border in borders)
         return tuple(place for place in places if not self.was_in_vain(place.centre_world))
 

@@ -29,7 +29,7 @@ class SharedConfig:
     """Thickness of a thin wall: ends closer together may be one corner, and beams this far behind a line have passed
     through it."""
     beyond_m: Distance = 0.15
-    """How far beams must reach past a gap to have passed through it, and a wall past a breakpoint to lie across it."""
+    """How far a wall must reach past a breakpoint to lie across it."""
     face_m: Size = 0.2
     """Length below which a face has no reliable direction of its own."""
     short_m: Distance = 0.3
@@ -55,7 +55,7 @@ class SharedConfig:
     outlier_sigmas: Sigmas = 3.0
     """Deviation, in standard deviations, above which a beam is not assigned to a line, and a wall has a lack of fit."""
     scans: Count = 2
-    """Number of scans, or of beams in one scan, that must agree before the map is changed on their evidence."""
+    """Number of scans that must agree before the map is changed on their evidence."""
 
 
 def of_shared() -> Any:

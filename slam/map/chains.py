@@ -14,9 +14,6 @@ from .kernels.chain_kernels import TAIL as TAIL
 from .kernels.chain_kernels import Reach, corner_points, joinable, near_ends, runs, successors
 from .stochastic_map import StochasticMap
 
-NONE = np.zeros(0, dtype=np.int64)
-"""No pairs."""
-
 
 @dataclass(frozen=True)
 class OpenEnd:
@@ -50,27 +47,20 @@ class Chain:
 def connect(
     walls: StochasticMap,
     set_aside: Collection[tuple[int, int]] = (),
-    passed: Collection[tuple[int, int]] = (),
-    cut_off: Collection[tuple[int, int]] = (),
     shared: SharedConfig = SharedConfig(),
 ) -> tuple[Chain, ...]:
     """Join heads to tails, nearest first, and return the chains in the order of their oldest wall.
 
     Free side on the left throughout, so a head joins only a tail. `set_aside` holds (wall id, side) of ends that
-    were looked at closely: two of these may join across a wider gap (a missed short face), unless it is among those
-    that beams have `passed`, (id of the head's wall, id of the tail's). Where beams have `cut_off` the corner in
-    which two lines cross, their ends do not join however near they are: a face between them was missed.
+    were looked at closely: two of these may join across a wider gap (a missed short face).
     """
     rows = np.flatnonzero(~walls.tentative)
     if not len(rows):
         return ()
     ends, lines, ids = walls.ends_world[rows], walls.belief.lines_world[rows], walls.ids[rows]
     pairs = near_ends(ends, max(shared.thickness_m, shared.door_m, shared.long_m))
-    both_aside = _both_aside(pairs, ids, set_aside, passed)
+    both_aside = _both_aside(pairs, ids, set_aside)
     gaps, allowed = joinable(pairs, ends, lines[:, 0].copy(), walls.established[rows], both_aside, _reach(shared))
-    joins = np.flatnonzero(allowed) if cut_off else NONE
-    for k, pair in zip(joins.tolist(), ids[pairs[joins]].tolist(), strict=True):
-        allowed[k] = tuple(pair) not in cut_off
     successor = successors(pairs, gaps, allowed, len(rows))
     before = np.flatnonzero(successor >= 0)
     after = successor[before]
@@ -90,21 +80,15 @@ def _both_aside(
     pairs: Int[np.ndarray, "k 2"],
     ids: Int[np.ndarray, " n"],
     set_aside: Collection[tuple[int, int]],
-    passed: Collection[tuple[int, int]],
 ) -> Bool[np.ndarray, " k"]:
-    """Return of which pairs (head, tail) both ends were set aside, and no beam has passed between."""
-    both_aside = np.zeros(len(pairs), dtype=bool)
+    """Return of which pairs (head, tail) both ends were set aside."""
     if not set_aside:
-        return both_aside
+        return np.zeros(len(pairs), dtype=bool)
     aside, (named, sides) = np.zeros((len(ids), 2), dtype=bool), np.array(list(set_aside)).T
     rows = np.minimum(np.searchsorted(ids, named), len(ids) - 1)
     there = ids[rows] == named
     aside[rows[there], sides[there]] = True
-    both_aside |= aside[pairs[:, 0], HEAD] & aside[pairs[:, 1], TAIL]
-    joins = np.flatnonzero(both_aside)
-    for k, pair in zip(joins.tolist(), ids[pairs[joins]].tolist(), strict=True):
-        both_aside[k] = tuple(pair) not in passed
-    return both_aside
+    return np.asarray(aside[pairs[:, 0], HEAD] & aside[pairs[:, 1], TAIL])
 
 
 @lru_cache

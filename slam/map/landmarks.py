@@ -11,7 +11,6 @@ from ..extraction.segments import Segments
 from ..geometry.lines import directions
 from ..robot import Scan
 from .extents import NO_ODDS, NOBODY, Extents, WallsConfig
-from .openings import Openings
 from .polylines.change_points import ChangePoints, ChangePointsConfig
 from .records import Records
 from .reliability import Reliability
@@ -37,7 +36,6 @@ class Landmarks:
         self.extents = Extents(walls, self.records, sure_beams)
         self.reliability = Reliability(walls.reliability, self.records)
         self.change_points = ChangePoints(change_points, self.records)
-        self.openings = Openings(walls.shared, self.records)
 
     def map(self, belief: Belief) -> StochasticMap:
         """Return the belief together with what is known of its walls."""

@@ -6,6 +6,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from rich.table import Table
@@ -14,7 +15,7 @@ from chainslam.experiments.artifacts.settings import NAVIGATION, nested, record_
 from chainslam.experiments.scenario import TrialConfig
 from chainslam.experiments.terminal.console import plain_console
 from chainslam.experiments.usage import UsageError
-from chainslam.explore.planning.navigators import NAVIGATORS
+from chainslam.explore.following.wall_following import Navigation
 from chainslam.explore.strategies import STRATEGIES
 from chainslam.sim.worlds import WORLDS
 
@@ -64,7 +65,9 @@ class NavigationStudy:
                 raise UsageError(f"expected a folder of plans, found no file {self.named} in {self.plans}: check it")
             plain = TrialConfig("", strategy=self.strategies[0], errorless=True, max_steps=self.max_steps)
             found += [replace(plain, world=name) for name in names[:: self.every]]
-        return [trial_of(record_of(trial), nested([(NAVIGATION, name)])) for trial in found for name in NAVIGATORS]
+        return [
+            trial_of(record_of(trial), nested([(NAVIGATION, name)])) for trial in found for name in get_args(Navigation)
+        ]
 
     def run(self) -> None:
         """Run what is to be run and print the comparison; raises UsageError for bad names and another file."""
@@ -90,8 +93,8 @@ def table(rows: Sequence[Row]) -> Table:
     for group in groups:
         own = [row for row in rows if _group(row) == group]
         sound = [_run(row) for row in own if row["status"] == "complete"]
-        paired = {run for run in sound if sound.count(run) == len(NAVIGATORS)}
-        for name in NAVIGATORS:
+        paired = {run for run in sound if sound.count(run) == len(get_args(Navigation))}
+        for name in get_args(Navigation):
             here = [row for row in own if row["navigation"] == name]
             both = [row for row in here if _run(row) in paired]
             done = sum(row["status"] == "complete" for row in here)

@@ -24,9 +24,7 @@ from chainslam.slam.robot import (
 OF_THE_PAPER = {
     "explorer.near_m": 0.3,
     "explorer.patience_steps": 400,
-    "explorer.following.stall_steps": 60,
     "explorer.following.paths.squeeze_m": 0.2,
-    "explorer.following.paths.tight_m": 0.3,
     "explorer.following.paths.standoff_m": 0.35,
     "explorer.following.paths.escape_m": 0.3,
     "explorer.following.driving.radius_m": 0.2,
@@ -35,8 +33,6 @@ OF_THE_PAPER = {
     "free_space.body_m": 0.2,
     "free_space.clearance_limit_m": 1.0,
     "floor_memory.last_scans": 100,
-    "floor_memory.touched_m": 0.1,
-    "floor_memory.step_m": 0.3,
     "homing.home_m": 0.2,
     "homing.aim_m": 0.1,
     "retreat.touched_back_m": 0.1,

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from chainslam.explore.following.wall_following import Following
-from chainslam.explore.planning.navigators import Navigation
+from chainslam.explore.following.wall_following import Following, Navigation
 from chainslam.sim.worlds import AS_DRAWN, DrawingOptions
 
 from ...artifacts.settings import drawing_settings, parse_settings

@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from chainslam.explore.planning.visibility_graph import followed_wall
-from chainslam.explore.planning.wall_routes import route
+from chainslam.explore.planning.wall_routes import sequence
 from chainslam.explore.step import Step
 from chainslam.explore.strategies import Choice, Place, Situation, Strategy
 from chainslam.explore.survey.viewpoints import lane
@@ -52,7 +52,8 @@ class AlongRoute:
             return self._to(self.plan[0], situation, "to begin with")
         if self._done == 1:
             self.names = {wall: name for name, wall in self.named(situation.map).items()}
-            self.plan = route(situation.graph, self.plan[0], self.plan[-1])
+            start, goal = self.plan[0], self.plan[-1]
+            self.plan = sequence(situation.graph, (start,), goal) or (goal,)
         if self._done >= len(self.plan):
             return None
         self._done += 1

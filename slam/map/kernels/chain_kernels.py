@@ -1,4 +1,4 @@
-"""Which ends of walls may be joined, and where they meet: the loops of `chains` and `openings`."""
+"""Which ends of walls may be joined, and where they meet: the loops of `chains`."""
 
 import math
 from typing import NamedTuple
@@ -176,22 +176,3 @@ def runs(
             place += 1
         starts[k + 1] = place
     return rows, starts, closed[order]
-
-
-@compiled
-def supposed_corners(
-    pairs: Int[np.ndarray, "k 2"],
-    ends: Float[np.ndarray, "n 2 2"],
-    lines: Float[np.ndarray, "n 2"],
-    reach_m: float,
-    least_m: float,
-) -> tuple[Float[np.ndarray, "k 2"], Bool[np.ndarray, " k"]]:
-    """Return where two walls would meet if both went on, and whether that is near to both and away from one's end."""
-    corners, parallel = intersect(lines[pairs[:, 0]], lines[pairs[:, 1]])
-    supposed = np.empty(len(pairs), np.bool_)
-    for k in range(len(pairs)):
-        head, tail = ends[pairs[k, 0], HEAD], ends[pairs[k, 1], TAIL]
-        one = math.hypot(corners[k, 0] - head[0], corners[k, 1] - head[1])
-        other = math.hypot(tail[0] - corners[k, 0], tail[1] - corners[k, 1])
-        supposed[k] = not parallel[k] and max(one, other) <= reach_m and max(one, other) > least_m
-    return corners, supposed

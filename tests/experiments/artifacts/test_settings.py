@@ -180,7 +180,7 @@ def test_a_folder_and_a_pipe_are_no_files_of_settings(capsys, tmp_path):
 def test_the_settings_of_a_campaign_are_those_that_differ_from_the_defaults(tmp_path):
     path = tmp_path / "mine.json"
     path.write_bytes(json_bytes(config_record(trial_of(parse_setting("robot.radius_m=0.25"), {"world": "hall"}))))
-    words = ("mission.mapper.matching.gate=0.95", f"mission.explorer.attempts={LEAVES['mission.explorer.attempts']}")
+    words = ("mission.mapper.matching.gate=0.95", f"mission.explorer.again={LEAVES['mission.explorer.again']}")
     campaign = Compare(tmp_path, "smoke", config=path, set=words).campaign
     assert campaign.settings == (("mission.mapper.matching.gate", 0.95), ("robot.radius_m", 0.25))
     with pytest.raises(UsageError, match=r"--set .*'seed'"):

@@ -18,7 +18,7 @@ from chainslam.slam.association.place_search import Place, along
 from chainslam.slam.geometry.poses import compose, inverse, to_world
 from chainslam.slam.robot import MotionCommand, Odometry, Scan
 from tests.slam.association.test_place_search import CROOKED
-from tests.slam.map.test_openings import map_of
+from tests.slam.map.maps import map_of
 
 HERE = np.array([1.0, 2.0, 0.5])
 ELSEWHERE = np.array([6.0, 0.0, 0.5])

@@ -33,7 +33,7 @@ def test_cells_beyond_the_fence_are_no_floor_however_the_grid_grows():
     assert not (space.evidence < 0)[space.beyond].any()
     assert (space.evidence < 0)[within].any()
     assert space.clearance()[space.beyond].max() == 0.0
-    space.become(space.blank())
+    space.clear()
     assert (space.evidence[space.beyond] > 0).all()
 
 

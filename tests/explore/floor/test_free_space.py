@@ -5,8 +5,6 @@ import pytest
 import shapely
 
 from chainslam.explore.floor.free_space import FreeSpace, FreeSpaceConfig
-from chainslam.explore.planning.passable import PathConfig
-from chainslam.explore.planning.paths import Planner
 from chainslam.sim.lidar import LidarConfig, RangeFinder
 from chainslam.slam.robot import Scan
 from tests.explore.floor.plain_clearance import full_clearance
@@ -203,51 +201,3 @@ def test_unseen_floor_is_unknown_also_beyond_the_grid():
     np.testing.assert_array_equal(
         grid.unknown_at(np.array([[0.5, 0.5], [1.6, 0.0], [500.0, 0.0]])), [False, True, True]
     )
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_where_the_body_did_not_fit_is_known_in_any_part_of_the_grid(seed):
-    rng, grid, reach = np.random.default_rng(seed), FreeSpace(), 0.3
-    room = random_room(rng)
-    grid.integrate(np.zeros(3), scan_from(room, np.zeros(3)))
-    low = grid.origin_world
-    for place in low + rng.uniform(-1.0, CELL * min(grid.shape) + 1.0, (8, 2)):
-        grid.note_too_tight(place)
-    grid.note_driven(np.zeros((1, 2)))
-    index = np.argwhere(np.ones(grid.shape, dtype=bool))
-    tight = grid.cells(grid._too_tight)
-    gap = CELL * np.hypot(*(index[:, None] - tight).transpose(2, 0, 1))
-    expected = (gap > reach).all(axis=1).reshape(grid.shape)
-    r, c = grid.cells(np.zeros((1, 2)))[0]
-    expected[r, c] = True  # the robot was there
-    assert not expected.all()
-    for _ in range(20):
-        (r0, r1), (c0, c1) = np.sort(rng.integers(0, max(grid.shape) + 20, (2, 2)), axis=1)
-        box = (slice(r0, r1), slice(c0, c1))
-        np.testing.assert_array_equal(grid.may_fit(box, reach), expected[box])
-
-
-def test_the_way_through_a_narrow_door_is_open_to_who_came_by_it():
-    walls = shapely.union(shapely.box(0.0, -2.0, 0.1, -0.22), shapely.box(0.0, 0.22, 0.1, 2.0))
-    room = shapely.box(-2, -2, 2, 2).difference(walls)
-    grid, config = FreeSpace(), PathConfig()
-    goal = np.array([[-1.0, 0.0]])
-
-    def way_out():
-        return Planner(grid, np.array([1.0, 0.0]), config).to(goal)
-
-    for x in (-1.0, 1.0):
-        pose = np.array([x, 0.0, 0.0])
-        grid.integrate(pose, scan_from(room, pose))
-    assert way_out() is not None
-    grid.note_too_tight(np.array([0.05, 0.0]))
-    assert way_out() is None
-    grid.note_too_tight(np.array([0.05, 0.0]))
-    assert len(grid._too_tight) == 1, "a place that is tried again and again is one place"
-    grid.note_driven(np.column_stack([np.arange(-1.0, 1.0, 0.02), np.zeros(100)]))
-    assert way_out() is not None
-    grid.become(grid.blank())
-    for x in (-1.0, 1.0):
-        pose = np.array([x, 0.0, 0.0])
-        grid.integrate(pose, scan_from(room, pose))
-    assert way_out() is not None, "where the body did not fit is forgotten with the grid that it was said of"

@@ -26,7 +26,7 @@ def errand(monkeypatch: pytest.MonkeyPatch) -> PlaceErrand:
         return self._stage == 0
 
     monkeypatch.setattr(PlaceErrand, "_plan", plan)
-    for name, told in (("arrived", False), ("command", None), ("remaining_m", 1.0), ("squeeze_world", None)):
+    for name, told in (("arrived", False), ("command", None)):
         monkeypatch.setattr(Pilot, name, lambda *_, told=told: told)
     return PlaceErrand(np.zeros((1, 2)), "there", CONFIG)
 
@@ -53,7 +53,7 @@ def test_after_as_many_scans_as_tries_the_place_is_given_up(errand, around) -> N
 def test_an_open_end_is_looked_at_twice_from_each_place_and_other_places_once(errand, around, monkeypatch) -> None:
     """The second scan has its beams between those of the first."""
     half = MotionCommand(0.0, 0.5 * CONFIG.robot.turn_rad)
-    end = EndErrand(OpenEnd(3, 1, np.zeros(2)), (), CONFIG)
+    end = EndErrand(OpenEnd(3, 1, np.zeros(2)), CONFIG)
     for each, first in ((end, half), (errand, None)):
         each._pilot = Pilot.__new__(Pilot)
         monkeypatch.setattr(Pilot, "arrived", lambda *_: True)

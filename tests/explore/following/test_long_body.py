@@ -63,7 +63,7 @@ def test_a_path_through_a_narrow_door_is_driven_without_touching_it(seed):
         floor.integrate(np.array(place), Scan(finder.bearings_rad, finder.cast(np.array(place))[0], 0.01, 6.0, 0.0))
     paths = fitted(PathConfig(), LONG)
     planner = Planner(floor, pose[:2], paths, None, float(pose[2]))
-    pilot = Pilot(planner.to(goal), planner, CONFIG)
+    pilot = Pilot(planner.to(goal), CONFIG)
     for _ in range(120):
         scan = sensed()
         if pilot.arrived(pose):
@@ -71,7 +71,7 @@ def test_a_path_through_a_narrow_door_is_driven_without_touching_it(seed):
         command = pilot.command(around(pose, scan, floor))
         if command is None:
             planner = Planner(floor, pose[:2], paths, None, float(pose[2]))
-            pilot = Pilot(planner.to(goal), planner, CONFIG)
+            pilot = Pilot(planner.to(goal), CONFIG)
             continue
         pose = compose(pose, arc(command.forward_m, command.turn_rad))
         assert DOOR.contains(body_at(pose))
@@ -124,6 +124,6 @@ def test_what_the_scanner_cannot_see_is_in_the_way_until_a_scan_has_shown_it():
         seen_now = around(pose, ahead, floor)
         assert (len(out_of_view(seen_now, DrivingConfig())) == 0) == backs
         path = straight(pose[:2], np.array([-0.45, 0.0]))
-        command = Pilot(path, Planner(floor, pose[:2], PathConfig()), DrivingConfig()).command(seen_now)
+        command = Pilot(path, DrivingConfig()).command(seen_now)
         assert command is not None
         assert (command.forward_m < 0.0) == backs

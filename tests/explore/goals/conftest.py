@@ -1,4 +1,4 @@
-"""The explorer's three kinds of errand as scripts, and a place for them."""
+"""The explorer's two kinds of errand as scripts, and a place for them."""
 
 import pytest
 
@@ -8,9 +8,9 @@ from tests.explore.goals.scripted import Scripted
 
 @pytest.fixture
 def scripted(monkeypatch):
-    """The three kinds of errand, each a script."""
+    """The two kinds of errand, each a script."""
     made = []
-    kinds = {name: type(name, (Scripted,), {"made": made}) for name in ("EndErrand", "PlaceErrand", "WallErrand")}
+    kinds = {name: type(name, (Scripted,), {"made": made}) for name in ("EndErrand", "PlaceErrand")}
     for name, kind in kinds.items():
         monkeypatch.setattr(module, name, kind)
     return kinds, made

@@ -13,7 +13,7 @@ from chainslam.slam.map.chains import Chain, OpenEnd
 from chainslam.slam.robot import MotionCommand
 
 ON = MotionCommand(0.1, 0.0)
-NO_SWEEP = replace(ExplorerConfig(), sweep=False)
+NO_SWEEP = replace(ExplorerConfig(), sweep=False, first_turns=0)
 
 
 class Scripted(Errand):
@@ -23,7 +23,7 @@ class Scripted(Errand):
     steps = 0
     looks_done = 0
     trouble = "a cupboard"
-    walls_to_follow = None
+    walls_to_follow = ()
 
     def _plan(self, around):
         return None

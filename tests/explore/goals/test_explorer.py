@@ -7,16 +7,14 @@ import pytest
 
 from chainslam.explore.following.wall_following import FollowingConfig
 from chainslam.explore.goals import explorer as module
-from chainslam.explore.planning.visibility_graph import followed_wall
 from chainslam.explore.strategies import Choice, Place
 from tests.explore.goals.scripted import NO_SWEEP, ON, First, around_of, ask, ends_at, explorer_at, names
 
 
-def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scripted, scene, monkeypatch):
+def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scripted, scene):
     kinds, made = scripted
     kinds["EndErrand"].steps = 5
-    monkeypatch.setattr(module, "route", lambda graph, current, wall: (7, wall) if current == followed else ())
-    strategy, followed = First(), followed_wall(around_of(scene).walls)
+    strategy = First()
     explorer = explorer_at(scene, strategy)
     (end,) = ends_at((1, 2), wall=4)
     decision = ask(explorer, scene, [end])
@@ -26,8 +24,8 @@ def test_a_goal_is_that_of_the_strategy_with_its_reason_and_the_walls_to_it(scri
     goal = decision.goal
     assert (goal.kind, goal.wall, goal.side, goal.reason) == ("open-end", 4, 1, "the first")
     np.testing.assert_array_equal(goal.position_world, [1, 2])
-    assert made[0].given == (end, (7, 4), FollowingConfig())
-    assert decision.walls_to_follow == (7, 4)
+    assert made[0].given == (end, FollowingConfig())
+    assert decision.walls_to_follow == ()
     made[0].walls_to_follow = (9,)
     assert ask(explorer, scene, [end]).walls_to_follow == (9,)
     assert strategy.situation.step == 0
@@ -50,22 +48,6 @@ def test_an_end_that_is_open_after_its_views_is_set_aside_and_the_next_one_is_th
         (0, words), (1, words),
     ]  # fmt: skip
     assert names(made) == ["EndErrand", "EndErrand"]
-
-
-def test_an_end_that_nothing_was_seen_of_is_walked_to_once_and_looked_at_again(scripted, scene):
-    kinds, made = scripted
-    kinds["WallErrand"].steps = 1
-    explorer = explorer_at(scene)
-    ends = ends_at((1, 2), wall=3)
-    decision = ask(explorer, scene, ends)
-    assert decision.command is ON
-    assert not decision.given_up.ends
-    assert names(made) == ["EndErrand", "WallErrand"]
-    assert made[1].given == (3, 1, FollowingConfig())
-    decision = ask(explorer, scene, ends)
-    assert names(made) == ["EndErrand", "WallErrand", "EndErrand"]
-    assert made[2].given[1] == (3,)
-    assert [end.reason for end in decision.given_up.ends] == ["a cupboard"]
 
 
 def test_a_goal_goes_with_its_end_its_reason_or_its_strategy(scripted, scene):
@@ -118,30 +100,26 @@ def test_without_a_choice_the_robot_goes_straight_to_the_nearest_end(scripted, s
     assert decision.goal.reason == "no way to stand before any open end is known; nearest"
 
 
-class Swept:
-    """A sweep that always has the same place."""
-
-    place = Place(np.array([[1.0, 1.0], [1.0, 2.0]]), "unseen floor")
-
-    def __init__(self):
-        self.left = []
-
-    def choose(self, situation):
-        return Choice(self.place, "unseen floor is left") if not self.left else None
-
-    def ended(self, place, trouble):
-        self.left.append((place, trouble))
-
-    def was_in_vain(self, place):
-        return False
+PLACE = Place(np.array([[1.0, 1.0], [1.0, 2.0]]), "unseen floor")
 
 
+@pytest.fixture
+def swept(monkeypatch):
+    """What is left when no open end is: always the same place, until it was visited in vain."""
+
+    def nearest_left(situation, sweep):
+        in_vain = situation.was_in_vain(PLACE.centre_world)
+        return None if in_vain else Choice(PLACE, "unseen floor is left")
+
+    monkeypatch.setattr(module, "nearest_left", nearest_left)
+
+
+@pytest.mark.usefixtures("swept")
 @pytest.mark.parametrize("patience", [2, 9])
 def test_a_place_is_gone_to_when_no_end_is_left_and_what_came_of_it_is_kept(scripted, scene, patience):
     kinds, made = scripted
     kinds["PlaceErrand"].steps = 4
     explorer = explorer_at(scene, config=replace(NO_SWEEP, patience_m=0.15 * patience))
-    sweep = explorer._sweep = Swept()
     decision = ask(explorer, scene, [])
     assert (decision.goal.kind, decision.goal.wall, decision.goal.side) == ("unseen", None, None)
     np.testing.assert_array_equal(decision.goal.position_world, [1.0, 1.5])
@@ -149,18 +127,44 @@ def test_a_place_is_gone_to_when_no_end_is_left_and_what_came_of_it_is_kept(scri
     assert decision.walls_to_follow == ()
     assert made[0].given[1:] == ("to where unseen floor", FollowingConfig())
     for _ in range(4):
-        ask(explorer, scene, [])
-    assert sweep.left == [(Swept.place, f"not reached in {patience} steps" if patience < 4 else "a cupboard")]
+        left = ask(explorer, scene, []).given_up
+    assert left.troubles_at(PLACE.centre_world)[0] == (
+        f"not reached in {patience} steps" if patience < 4 else "a cupboard"
+    )
 
 
+@pytest.mark.usefixtures("swept")
+@pytest.mark.parametrize("trouble", ["", "the way was blocked"])
+def test_a_place_is_visited_twice_and_what_came_of_it_is_kept(scripted, scene, trouble):
+    kinds, made = scripted
+    kinds["PlaceErrand"].trouble = trouble
+    explorer = explorer_at(scene)
+    places = ask(explorer, scene, []).given_up.places
+    assert names(made) == ["PlaceErrand", "PlaceErrand"]
+    assert [left.trouble for left in places] == [trouble, trouble]
+    np.testing.assert_allclose(places[0].position_world, [1.0, 1.5])
+
+
+@pytest.mark.usefixtures("swept")
 def test_a_sweep_is_dropped_as_soon_as_there_is_an_end(scripted, scene):
     kinds, made = scripted
     kinds["PlaceErrand"].steps = kinds["EndErrand"].steps = 99
     explorer = explorer_at(scene)
-    explorer._sweep = Swept()
     ask(explorer, scene, [])
     assert ask(explorer, scene, ends_at((1, 2))).goal.kind == "open-end"
     assert names(made) == ["PlaceErrand", "EndErrand"]
+
+
+def test_a_mission_begins_with_turns_on_the_spot_and_never_again(scripted, scene):
+    _, made = scripted
+    explorer, ends = explorer_at(scene, config=replace(NO_SWEEP, first_turns=3)), ends_at((1, 2))
+    turns = [ask(explorer, scene, ends) for _ in range(3)]
+    assert all(each.command.forward_m == 0.0 and "first turns" in each.words for each in turns)
+    assert np.all([each.command.turn_rad == NO_SWEEP.robot.turn_rad for each in turns])
+    assert not made
+    explorer.start_over()
+    ask(explorer, scene, ends)
+    assert names(made) == ["EndErrand"]
 
 
 @pytest.mark.parametrize("sweep", [True, False])

@@ -54,7 +54,7 @@ class Idle:
 class Stubborn(FloorMemory):
     """Cannot make anything of its last scans."""
 
-    def begin_anew(self, walls):
+    def begin_anew(self, pose_world):
         pass
 
 
@@ -72,7 +72,7 @@ def driven(scene_of):
         retreat = Retreat(Idle(), floor, RetreatConfig(), FollowingConfig())
         pose = np.array([1.0, 1.5, 0.0])
         for step in range(28):
-            floor.see(scene.walls(pose), scan_at(pose))
+            floor.see(pose, scan_at(pose))
             if step < 27:
                 floor.move(Odometry(STEP, np.zeros((3, 3))))
                 retreat.moved(MotionCommand(0.15, 0.0), Odometry(STEP, np.zeros((3, 3))))
@@ -83,46 +83,21 @@ def driven(scene_of):
     return make
 
 
-def shut(grid, pose, forget):
+def shut(grid, pose):
     angle = np.linspace(0.0, 2.0 * np.pi, 400)
     ring = [pose[:2] + r * np.stack([np.cos(angle), np.sin(angle)], axis=-1) for r in (0.1, 0.15, 0.2, 0.25)]
     cells = grid.cells(np.concatenate(ring))
     grid.evidence[tuple(cells.T)] = 6
     grid._mark(*np.array([cells.min(axis=0), cells.max(axis=0) + 1]).T.ravel().tolist())
-    if forget:
-        grid._driven[:] = False
 
 
 def way_back(grid, pose):
     return Planner(grid, pose[:2], PathConfig()).to(np.array([[1.5, 1.5]]))
 
 
-def test_what_the_robot_drove_through_is_passable_whatever_is_drawn_over_it(driven):
-    floor, retreat, around = driven()
-    grid, pose = floor.free_space, around.pose_world
-    shut(grid, pose, forget=False)
-    assert way_back(grid, pose) is not None
-    decision = retreat.decide(around, (), nx.DiGraph())
-    assert (decision.command, decision.outcome) == (None, Outcome.NONE_REACHABLE)
-    grid._driven[:] = False
-    assert way_back(grid, pose) is None
-
-
-def test_the_way_goes_where_the_walls_go(driven):
-    floor, _, around = driven()
-    floor._follow(around.walls)
-    before = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
-    shift = np.array([0.0, -0.4])
-    belief = around.walls.belief
-    floor._follow(replace(around.walls, belief=replace(belief, anchors=belief.anchors + shift)))
-    after = np.argwhere(floor.free_space.driven((slice(None), slice(None))))
-    assert len(after) >= 0.9 * len(before)
-    np.testing.assert_allclose((after.mean(axis=0) - before.mean(axis=0))[::-1] * 0.05, shift, atol=0.06)
-
-
 def test_a_robot_locked_in_where_it_drove_begins_its_floor_anew_and_backs_out(driven):
     floor, retreat, around = driven()
-    shut(floor.free_space, around.pose_world, forget=True)
+    shut(floor.free_space, around.pose_world)
     decisions = [retreat.decide(around, (), nx.DiGraph()) for _ in range(3)]
     assert [decision.command.forward_m for decision in decisions] == pytest.approx([-0.15] * 3)
     assert retreat._inner.started_over == 1
@@ -132,7 +107,7 @@ def test_a_robot_locked_in_where_it_drove_begins_its_floor_anew_and_backs_out(dr
 
 def test_a_robot_that_cannot_get_back_has_failed_and_says_at_which_step(driven):
     floor, retreat, around = driven(Stubborn)
-    shut(floor.free_space, around.pose_world, forget=True)
+    shut(floor.free_space, around.pose_world)
     steps = 0
     while (decision := retreat.decide(around, (), nx.DiGraph())).command is not None:
         steps += 1

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from chainslam.explore.goals import second_tries as module
-from chainslam.explore.goals.ledger import Event, Ledger
-from chainslam.explore.goals.second_tries import SecondTries
 from chainslam.explore.outcome import Outcome
 from chainslam.slam.robot import Scan
-from tests.explore.goals.scripted import NO_SWEEP, around_of, ask, ends_at, explorer_at
+from tests.explore.goals.scripted import NO_SWEEP, ask, ends_at, explorer_at
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
 
@@ -57,9 +55,7 @@ def test_ends_are_tried_again_and_then_left_as_blocked(scripted, scene, moving, 
     kinds, made = scripted
     kinds["EndErrand"].steps = NO_SWEEP.moving_scans
     moving += [True] * NO_SWEEP.moving_scans
-    scene.grid.note_too_tight(scene.places[0])
     decisions = run(explorer_at(scene), scene, ends_at((1, 2)), monkeypatch)
-    assert not len(scene.grid._too_tight), "the body may fit now where it did not"
     tries = sum(type(errand).__name__ == "EndErrand" for errand in made)
     assert tries >= 1 + NO_SWEEP.again
     assert decisions[-1].outcome is Outcome.ENDS_LEFT
@@ -104,40 +100,3 @@ def test_unseen_floor_that_something_is_in_the_way_of_is_left_too(scripted, scen
     decisions = run(explorer_at(scene, config=replace(NO_SWEEP, sweep=True)), scene, [], monkeypatch)
     assert decisions[-1].outcome is Outcome.ENDS_LEFT
     assert decisions[-1].words.startswith("ends-left: 0 open ends")
-
-
-def second_tries(scene, moving, ledger):
-    """Second tries of a robot that has seen things move."""
-    tries = SecondTries(NO_SWEEP)
-    moving[:] = [True] * NO_SWEEP.moving_scans
-    for _ in range(NO_SWEEP.moving_scans):
-        tries.watch(around_of(scene))
-    tries.start_over(ledger)
-    return tries
-
-
-@pytest.mark.parametrize(
-    ("end_is_open", "trouble", "again"),
-    [(None, None, False), (False, None, False), (True, None, True), (None, "", False), (None, "a box", True)],
-)
-def test_all_is_taken_up_where_an_open_end_or_a_place_with_trouble_is_left(scene, moving, end_is_open, trouble, again):
-    ledger, (end,) = Ledger(0.3), ends_at((1, 2))
-    if end_is_open is not None:
-        ledger.put_aside(end, "a box")
-    if trouble is not None:
-        ledger.note(Event.VISITED, end.position_world, trouble)
-    ends = {(end.wall, end.side): end} if end_is_open else {}
-    assert second_tries(scene, moving, ledger).take_up_all(around_of(scene), ends) == again
-    if again:
-        assert not ledger.given_up.keys
-        assert not ledger.given_up.places
-
-
-def test_of_another_ledger_nothing_was_tried_again(scene, moving):
-    (end,) = ends_at((1, 2))
-    tries = second_tries(scene, moving, ledger := Ledger(0.3))
-    for _ in range(2):
-        for k in range(NO_SWEEP.again + 1):
-            ledger.put_aside(end, "a box")
-            assert tries.take_up_all(around_of(scene), {(end.wall, end.side): end}) == (k < NO_SWEEP.again)
-        tries.start_over(ledger := Ledger(0.3))

@@ -69,22 +69,6 @@ def test_reachable_cells_are_those_with_a_path(seed):
             assert planner.to(grid.points(cell[None])) is None
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_what_can_be_reached_within_the_near_box_can_be_reached(seed, monkeypatch):
-    """And nothing outside of it is said to be."""
-    monkeypatch.setattr(driving_field, "NEAR_M", 2.0)
-    grid, places = seen(seed, 12)
-    field = DrivingField(grid, places[0], LENGTH)
-    every = np.argwhere(np.ones(grid.shape, dtype=bool))
-    near, anywhere = field.can_stay(every, only_near=True), field.can_stay(every)
-    inside = np.zeros(grid.shape, dtype=bool)
-    inside[field.near_box] = True
-    assert near.any()
-    assert not np.any(near & ~(anywhere & inside.ravel()))
-    at_hand = np.hypot(*(grid.points(every) - places[0]).T) < 0.5
-    np.testing.assert_array_equal(near[at_hand], anywhere[at_hand])
-
-
 def test_places_off_the_grid_and_behind_walls_are_infinitely_far():
     grid, places = seen(0)
     field = DrivingField(grid, places[0], LENGTH)

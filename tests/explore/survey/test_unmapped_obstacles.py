@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chainslam.explore.goals.ledger import Ledger
-from chainslam.explore.goals.sweep import Sweep, SweepConfig
 from chainslam.explore.planning.driving_field import DrivingField
+from chainslam.explore.strategies.nearest import nearest_left
 from chainslam.explore.survey.unmapped_obstacles import (
     APART_M,
     LOOK_BEYOND_M,
@@ -58,17 +57,17 @@ def test_the_robot_stands_where_it_can_and_not_too_near(scene_of):
     assert np.all((nearest > 0.2 + LOOK_BEYOND_M[0] - 1e-3) & (nearest < 0.2 + LOOK_BEYOND_M[1] + 1e-3))
 
 
-def test_the_last_layer_goes_there_twice_at_most_and_only_when_it_is_on(scene_of):
+def test_the_last_layer_goes_to_each_until_it_was_in_vain_and_only_when_it_is_on(scene_of):
     some, _ = without_some(scene_of(1), np.random.default_rng(1))
-    sweep = Sweep(SweepConfig(), Ledger(0.3), is_on=True)
-    pose = np.append(some.places[0], 0.0)
-    visits = 0
-    while True:
-        situation = replace(some.situation(pose, []), was_in_vain=sweep.was_in_vain)
-        choice = sweep.choose(situation)
-        if choice is None or visits > 20:
-            break
-        visits += choice.target.kind == "unexplained"
-        sweep.ended(choice.target, "")
-    assert 0 < visits <= 2 * len(unmapped_obstacles(some.grid, some.walls(pose)))
-    assert Sweep(SweepConfig(), Ledger(0.3), is_on=False).choose(some.situation(pose, [])) is None
+    pose, visited = np.append(some.places[0], 0.0), []
+
+    def situation():
+        return replace(
+            some.situation(pose, []), was_in_vain=lambda place: any(np.all(place == each) for each in visited)
+        )
+
+    while (choice := nearest_left(situation(), sweep=True)) is not None:
+        visited.append(choice.target.centre_world)
+        assert len(visited) < 30
+    assert visited
+    assert nearest_left(some.situation(pose, []), sweep=False) is None

@@ -13,7 +13,7 @@ from chainslam.slam.extraction.extract import extract
 from chainslam.slam.geometry.poses import rotation, wrap
 from chainslam.slam.robot import Scan
 from tests.slam.extraction.test_extract import loop
-from tests.slam.map.test_openings import map_of as walls_of
+from tests.slam.map.maps import map_of as walls_of
 
 CROOKED = loop((0, 0), (6, 0), (6, 2), (4.5, 2), (4.5, 4.2), (2, 4.2), (2, 3), (0, 3))
 SQUARE = loop((0, 0), (4, 0), (4, 4), (0, 4))

@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import networkx as nx
 import numpy as np
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +16,6 @@ from chainslam.slam.map.kernels.chain_kernels import (
     overlap_at_a_bend,
     runs,
     successors,
-    supposed_corners,
 )
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
@@ -88,26 +86,6 @@ def test_two_sides_overlap_at_a_bend_where_each_reaches_along_the_other(seed, tu
     goes_on = (after[HEAD] - head)[0] > 0.0 and u @ (tail - before[TAIL]) > 0.0
     near = abs((head - tail)[1]) <= 0.2 and abs(u[0] * (head - tail)[1] - u[1] * (head - tail)[0]) <= 0.2
     assert found == (overlaps and goes_on and near and 0.02 < abs(turn) < 0.5)
-
-
-@few
-@given(seed=seeds)
-def test_a_corner_is_supposed_where_both_lines_would_meet_nearby(seed):
-    ends, lines = walls(seed)
-    pairs = near_ends(ends, 0.9)
-    corners, supposed = supposed_corners(pairs, ends, lines, 0.5, 0.05)
-    for k, (one, other) in enumerate(pairs):
-        if abs(np.sin(lines[one, 0] - lines[other, 0])) < 0.05:
-            assert not supposed[k]
-            continue
-        far = [shapely.LineString([e[0] - 99.0 * (e[1] - e[0]), e[1] + 99.0 * (e[1] - e[0])]) for e in ends[pairs[k]]]
-        meet = far[0].intersection(far[1])
-        if meet.is_empty:
-            assert not supposed[k]
-            continue
-        np.testing.assert_allclose(corners[k], [meet.x, meet.y], atol=1e-8)
-        reach = max(np.linalg.norm(corners[k] - ends[one, HEAD]), np.linalg.norm(corners[k] - ends[other, TAIL]))
-        assert supposed[k] == (0.05 < reach <= 0.5)
 
 
 @few

@@ -69,16 +69,14 @@ def test_no_evidence_is_lost_or_left_behind(seed, doings):
         elif doing == "relate" and len(alive) > 1:
             one, other = map(int, rng.choice(alive, 2, replace=False))
             landmarks.change_points.keep_apart(one, other)
-            landmarks.openings.passed.add((one, other))
-            landmarks.openings.cut_off.add((other, one))
         elif doing == "merge" and len(alive) > 1:
             keep, drop = map(int, rng.choice(alive, 2, replace=False))
-            related = {other for pair in landmarks.openings.passed for other in pair if drop in pair} - {keep, drop}
+            related = {other for pair in landmarks.change_points.cut for other in pair if drop in pair} - {keep, drop}
             landmarks.records.merge(keep, drop, float(rng.uniform(-2.0, 2.0)))
             alive.remove(drop)
             ended.add(drop)
             np.testing.assert_allclose(totals(landmarks), before)
-            assert all({(keep, one), (one, keep)} & landmarks.openings.passed for one in related)
+            assert all({(keep, one), (one, keep)} & landmarks.change_points.cut for one in related)
         elif doing == "remove" and alive:
             gone = int(rng.choice(alive))
             landmarks.remove(np.array([gone]))
