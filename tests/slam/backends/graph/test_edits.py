@@ -1,9 +1,11 @@
 """What only a graph can do: merge without a loss."""
 
+import numpy as np
 import pytest
 
 from chainslam.slam.backends.graph.graph import Graph
-from chainslam.slam.estimation.backend import StaleBeliefError
+from chainslam.slam.estimation.backend import Observations, StaleBeliefError
+from chainslam.slam.robot import Odometry
 from tests.slam.backends.trips import P0, START, Trip, assert_same, everything
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
@@ -33,3 +35,17 @@ def test_what_only_a_graph_can_do_makes_beliefs_stale_too(verb):
     with pytest.raises(StaleBeliefError):
         belief.joint(belief.ids[:1])
     everything(backend)
+
+
+@pytest.mark.parametrize("turn_rad", [-0.2, 0.0, 0.1])
+def test_an_observation_is_weighed_by_the_angle_by_which_it_departs_from_its_line(turn_rad):
+    """The odometry is certain of the heading, so that the pose does not turn to explain it."""
+    graph = Graph(np.zeros(3), 1e-6 * np.eye(3))
+    cov = np.diag([0.05, 0.01])[None] ** 2
+    ids = graph.grow(np.array([[0.3, 2.0]]), cov, np.array([[1.9, 0.6]]))
+    graph.predict(Odometry(np.array([0.1, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-12])))
+    seen = Observations(ids, np.array([[0.3 + turn_rad, 1.9]]), cov)
+    graph.update(seen, seen)
+    first, again = graph.record.lines[int(ids[0])].observations
+    assert first.epsilon == pytest.approx(0.0, abs=1e-9)
+    assert again.epsilon == pytest.approx(turn_rad, abs=1e-3)
